@@ -10,18 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import SensorInput
-from acquisition.dataq.protocol import (
-    DATAQ_RANGES,
-    DEC_LIMITS,
-    DECA_LIMITS,
-    DIGITAL_INPUTS_CODE,
-    OVERFLOW_REPLY,
-    REFUSAL_REPLIES,
-    SRATE_LIMITS,
-    RateSetting,
-    packet_bytes,
-    split_lines,
-)
+from acquisition.dataq import protocol
+from acquisition.dataq.protocol import DIGITAL_INPUTS_CODE
 from acquisition.dataq.stream import CLOCK_BIT
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
 
@@ -29,7 +19,10 @@ DATAQ_BUFFER_SECONDS = 1.0
 """Samples kept for a slow host before the device stops (s)."""
 MAX_SCANS_PER_STEP = 512
 """Scans generated at a time, at most."""
-UNKNOWN_COMMAND_REPLY, INVALID_PARAMETER_REPLY = REFUSAL_REPLIES[:2]
+SRATE, DEC, DECA = protocol.SRATE_LIMITS, protocol.DEC_LIMITS, protocol.DECA_LIMITS
+PARAMETER_LIMITS = {"srate": SRATE, "dec": DEC, "deca": DECA, "ps": (0, 7), "encode": (0, 1)}
+"""Smallest and largest argument of each command with a number."""
+UNKNOWN_COMMAND_REPLY, INVALID_PARAMETER_REPLY = protocol.REFUSAL_REPLIES[:2]
 
 
 @dataclass(frozen=True)
@@ -115,7 +108,7 @@ class DataqEmulator(EmulatorThread):
         self._realtime, self._clock = realtime, clock
         self._traits, self._faults = traits or DataqTraits(), faults or DataqFaults()
         self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: "5E0ABC12", 9: "60000000"}
-        self._ranges = DATAQ_RANGES[self._traits.model]
+        self._ranges = protocol.DATAQ_RANGES[self._traits.model]
         self._scan_list = [0]
         self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}
         self._received = b""
@@ -126,19 +119,16 @@ class DataqEmulator(EmulatorThread):
             self._start()
 
     def serve_once(self) -> bool:
-        lines, self._received = split_lines(self._received + self.wire.exchange(self._wait_time()))
+        wait = 0.05
+        if self.streaming:
+            wait = 0.002 if self._realtime or not self._has_room() else 0.0
+        lines, self._received = protocol.split_lines(self._received + self.wire.exchange(wait))
         for line in [] if self._faults.ignores_commands else lines:
             self._execute(line)
         if self.streaming:
             self._stream()
         limit = self._faults.unplug_after
         return limit is None or not self.streaming or self._scan < limit
-
-    def _wait_time(self) -> float:
-        """Return how long to wait for the host (s)."""
-        if not self.streaming:
-            return 0.05
-        return 0.002 if self._realtime or not self._has_room() else 0.0
 
     def _execute(self, line: str) -> None:
         if self.streaming:
@@ -159,7 +149,6 @@ class DataqEmulator(EmulatorThread):
 
     def _answer(self, name: str, arguments: list[str], line: str) -> str:
         """Return the echo with its additions. ValueError or LookupError for invalid arguments."""
-        limits = {"srate": SRATE_LIMITS, "dec": DEC_LIMITS, "deca": DECA_LIMITS, "ps": (0, 7), "encode": (0, 1)}
         if name == "info":
             return f"{line} {self._info[int(arguments[0])]}"
         if name == "slist":
@@ -167,9 +156,9 @@ class DataqEmulator(EmulatorThread):
         elif name == "filter":
             if arguments[0] != "*" or not 0 <= int(arguments[1]) <= 3:
                 raise ValueError(line)
-        elif name in limits:
+        elif name in PARAMETER_LIMITS:
             value = int(arguments[0])
-            if not limits[name][0] <= value <= limits[name][1]:
+            if not PARAMETER_LIMITS[name][0] <= value <= PARAMETER_LIMITS[name][1]:
                 raise ValueError(line)
             self._settings[name] = value
         elif name != "stop":
@@ -188,7 +177,7 @@ class DataqEmulator(EmulatorThread):
         self.wire.pending += line.encode() + (b"\r\0" if self._traits.trailing_nul else b"\r")
 
     def _start(self) -> None:
-        setting = RateSetting(*(self._settings[name] for name in ("srate", "dec", "deca")))
+        setting = protocol.RateSetting(*(self._settings[name] for name in ("srate", "dec", "deca")))
         self._rate = setting.rate(int(self._info[9])) * (0.5 if self._faults.halved_rate else 1.0)
         self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.is_multiplexed else 1))
         self._started, self._scan, self._sent = self._clock(), 0, 0
@@ -207,7 +196,7 @@ class DataqEmulator(EmulatorThread):
             due = min(int((self._clock() - self._started) * self._rate) - self._scan, MAX_SCANS_PER_STEP)
         if due > 0:
             self._unsent += self._scans(due).tobytes()
-        size = packet_bytes(self._settings["ps"])
+        size = protocol.packet_bytes(self._settings["ps"])
         while len(self._unsent) >= size:
             self._send(self._unsent[:size])
             self._unsent = self._unsent[size:]
@@ -222,17 +211,15 @@ class DataqEmulator(EmulatorThread):
         return len(self.wire.pending) <= size
 
     def _overflow(self) -> None:
-        self.wire.pending += OVERFLOW_REPLY + b"1\r"
+        self.wire.pending += protocol.OVERFLOW_REPLY + b"1\r"
         self.streaming = False
 
     def _send(self, packet: bytes) -> None:
-        if self._faults.drop_at is not None:
-            start = max(self._faults.drop_at - self._sent, 0)
-            end = max(self._faults.drop_at + self._faults.drop_bytes - self._sent, 0)
-            self.wire.pending += packet[:start] + packet[end:]
-        else:
-            self.wire.pending += packet
         self._sent += len(packet)
+        if self._faults.drop_at is not None:
+            start = self._faults.drop_at - self._sent + len(packet)
+            packet = packet[: max(start, 0)] + packet[max(start + self._faults.drop_bytes, 0) :]
+        self.wire.pending += packet
 
     def _scans(self, count: int) -> NDArray[np.int16]:
         """Return the next words, shape (count, length of the scan list)."""

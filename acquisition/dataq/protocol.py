@@ -82,9 +82,8 @@ def choose_rate(wanted: float, dividend: int) -> RateSetting:
     """Return the setting nearest to a rate (Hz) with the least decimation. ValueError if it is out of reach."""
     fastest, slowest = dividend / SRATE_LIMITS[0], dividend / (SRATE_LIMITS[1] * DEC_LIMITS[1] * DECA_LIMITS[1])
     if not slowest <= wanted <= fastest:
-        raise ValueError(
-            f"sample rate {wanted:g} Hz is not between {slowest:.2g} and {fastest:g} Hz, what this DAQ has"
-        )
+        limits = f"{slowest:.2g} and {fastest:g} Hz"
+        raise ValueError(f"sample rate {wanted:g} Hz is not between {limits}, what this DAQ has")
     dec = min(math.ceil(dividend / wanted / SRATE_LIMITS[1]), DEC_LIMITS[1])
     deca = min(math.ceil(dividend / wanted / SRATE_LIMITS[1] / dec), DECA_LIMITS[1])
     srate = round(dividend / wanted / dec / deca)
@@ -157,10 +156,8 @@ DATAQ_STOP_SILENCE = 0.2
 """Silence that shows that a device has stopped (s)."""
 MAX_DRAIN_TIME = 1.0
 """Time that a device may go on sending before `stop` is sent again (s)."""
-CDC_HINT = (
-    "its LED must blink yellow (CDC mode): "
-    "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
-)
+_CDC_STEPS = "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
+CDC_HINT = f"its LED must blink yellow (CDC mode): {_CDC_STEPS}"
 
 
 @dataclass(frozen=True)
@@ -169,17 +166,10 @@ class DataqInfo:
 
     model: str
     """Model, a key of DATAQ_RANGES, e.g. "4108"."""
-    serial: str
-    """Serial number."""
-    firmware: str
-    """Firmware version, as the device writes it."""
     dividend: int
     """Dividend of the rate formula (Hz)."""
-
-    @property
-    def identity(self) -> DeviceIdentity:
-        """Identity in the form common to all devices."""
-        return DeviceIdentity(f"DI-{self.model}", self.serial, self.firmware)
+    identity: DeviceIdentity
+    """Identity in the form common to all devices."""
 
 
 class DataqCommandLink:
@@ -202,10 +192,8 @@ class DataqCommandLink:
             self._link.write(encode_command("stop"))
             if self.drain():
                 return
-        raise DeviceError(
-            f"the device on {self._link.port} does not stop sending ({self._tries} tries)",
-            "check that this is the DAQ's port, then unplug it and plug it in again",
-        )
+        text = f"the device on {self._link.port} does not stop sending ({self._tries} tries)"
+        raise DeviceError(text, "check that this is the DAQ's port, then unplug it and plug it in again")
 
     def drain(self) -> bool:
         """Read until nothing more arrives. Return whether that happened in time."""
@@ -228,7 +216,8 @@ class DataqCommandLink:
                 raise ValueError(f"maker {maker!r} is not DATAQ")
             if not serial:
                 raise ValueError("it names no serial number, by which its measured sample rate is known again")
-            return DataqInfo(parse_model(model), serial[:8], firmware, int(dividend))
+            model = parse_model(model)
+            return DataqInfo(model, int(dividend), DeviceIdentity(f"DI-{model}", serial[:8], firmware))
         except ValueError as error:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
 
@@ -252,12 +241,10 @@ class DataqCommandLink:
                     if answer is not None and not any(refusal in answer for refusal in REFUSAL_REPLIES):
                         return answer
                     last_line = line or last_line
-        tries = f"{self._tries} tries"
+        port, tries = self._link.port, f"{self._tries} tries"
         if not last_line:
-            raise DeviceError(f"no DATAQ device answers on {self._link.port} ({command}, {tries})", CDC_HINT)
-        raise DeviceError(
-            f"the device on {self._link.port} does not take {command!r} ({tries}); it says {last_line[:60]!r}"
-        )
+            raise DeviceError(f"no DATAQ device answers on {port} ({command}, {tries})", CDC_HINT)
+        raise DeviceError(f"the device on {port} does not take {command!r} ({tries}); it says {last_line[:60]!r}")
 
 
 def probe_dataq(link: SerialLink) -> DeviceIdentity | None:

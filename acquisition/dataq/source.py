@@ -6,22 +6,12 @@ import enum
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 from acquisition.channel import Block, SensorInput
-from acquisition.dataq.protocol import (
-    DIGITAL_INPUTS_CODE,
-    MIN_FIRMWARE_VERSION,
-    DataqCommandLink,
-    DataqInfo,
-    check_inputs,
-    choose_packet_code,
-    choose_rate,
-    encode_command,
-    encode_range,
-    encode_scan_entry,
-    parse_firmware,
-)
-from acquisition.dataq.stream import CodeBlock, ScanDecoder
+from acquisition.dataq import protocol
+from acquisition.dataq.protocol import DataqCommandLink, DataqInfo
+from acquisition.dataq.stream import ScanDecoder
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
 from acquisition.source import ClosedOnExit, Event
@@ -79,7 +69,7 @@ class DataqSource(ClosedOnExit):
         *,
         digital_clock: bool = False,
     ) -> None:
-        check_inputs(inputs)
+        protocol.check_inputs(inputs)
         self.channels = tuple(sensor.channel for sensor in inputs)
         """Channel of each input."""
         self.loss_detection = "digital word" + " and clock" * digital_clock if digital_word else "none"
@@ -100,9 +90,8 @@ class DataqSource(ClosedOnExit):
             self._commands.halt()
             device = self._identify()
             self.identity = device.identity
-            self.sample_rate = self._configure(
-                device, inputs, DATAQ_DEFAULT_RATE if sample_rate is None else sample_rate
-            )
+            wanted = DATAQ_DEFAULT_RATE if sample_rate is None else sample_rate
+            self.sample_rate = self._configure(device, inputs, wanted)
         except BaseException:
             self._link.close()
             raise
@@ -114,7 +103,7 @@ class DataqSource(ClosedOnExit):
         self._has_sent, self._next_scan = True, 0
         self._last_arrival = time.monotonic()
         self._decoder.begin()
-        self._link.write(encode_command("start"))  # no echo: the stream begins
+        self._link.write(protocol.encode_command("start"))  # no echo: the stream begins
         self.status = DataqStatus.SCANNING
 
     def stop(self) -> None:
@@ -124,12 +113,9 @@ class DataqSource(ClosedOnExit):
     def close(self) -> None:
         """Stop the device if it still answers, and close the port."""
         self.status = DataqStatus.STOPPED
-        try:
-            self._link.write(encode_command("stop"))
-        except DeviceError:
-            pass
-        finally:
-            self._link.close()
+        with suppress(DeviceError):
+            self._link.write(protocol.encode_command("stop"))
+        self._link.close()
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged.
@@ -145,65 +131,50 @@ class DataqSource(ClosedOnExit):
                     last_progress = time.monotonic()
                 self._start_again()
                 continue
-            for block in self._decoder.feed(data):
+            for codes, lost in self._decoder.feed(data):
                 self.status = DataqStatus.SCANNING
-                yield self._block(block)
+                first = self._next_scan + lost
+                self._next_scan = first + codes.shape[1]
+                yield Block(first, codes, lost_before=lost)
                 last_progress = self._last_arrival = time.monotonic()
             if time.monotonic() - last_progress > DATAQ_SILENCE_TIMEOUT:
                 raise self._failed(bool(data))
-
-    def _block(self, block: CodeBlock) -> Block:
-        codes, lost = block
-        first = self._next_scan + lost
-        self._next_scan = first + codes.shape[1]
-        return Block(first, codes, lost_before=lost)
 
     def _start_again(self) -> None:
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
         self._commands.halt()
         self._commands.synchronize()
-        self._link.write(encode_command("start"))
+        self._link.write(protocol.encode_command("start"))
         self._overruns = self._link.overruns
         self._decoder.begin(lost=max(round((time.monotonic() - self._last_arrival) * self.sample_rate), 1))
 
     def _failed(self, sends: bool) -> DeviceError:
+        daq = f"the DAQ on {self._link.port}"
         if sends:
-            return DeviceError(
-                f"the digital inputs of the DAQ on {self._link.port} do not hold still: lost bytes cannot be told",
-                "leave them unconnected, or set loss_detection = false in [daq]",
-            )
-        return DeviceError(
-            f"the DAQ on {self._link.port} has sent no samples for {DATAQ_SILENCE_TIMEOUT:g} s",
-            "switch it off and on and give the same command again",
-        )
+            text = f"the digital inputs of {daq} do not hold still: lost bytes cannot be told"
+            return DeviceError(text, "leave them unconnected, or set loss_detection = false in [daq]")
+        text = f"{daq} has sent no samples for {DATAQ_SILENCE_TIMEOUT:g} s"
+        return DeviceError(text, "switch it off and on and give the same command again")
 
     def _identify(self) -> DataqInfo:
-        identity = self._commands.identify()
-        version = parse_firmware(identity.firmware)
-        if version is not None and version < MIN_FIRMWARE_VERSION:
-            raise DeviceError(
-                f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}",
-                f"{MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool",
-            )
-        return identity
+        device = self._commands.identify()
+        version = protocol.parse_firmware(device.identity.firmware)
+        if version is not None and version < protocol.MIN_FIRMWARE_VERSION:
+            remedy = f"{protocol.MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool"
+            raise DeviceError(f"the DI-{device.model} on {self._link.port} has firmware {version:.2f}", remedy)
+        return device
 
     def _configure(self, device: DataqInfo, inputs: Sequence[SensorInput], wanted: float) -> float:
         """Configure the device and return the resulting sample rate (Hz)."""
-        codes = [
-            encode_scan_entry(sensor.number, encode_range(device.model, sensor.channel.full_scale)) for sensor in inputs
-        ]
-        if self.loss_detection != "none":
-            codes.append(DIGITAL_INPUTS_CODE)
-        setting = choose_rate(wanted, device.dividend)
+        ranges = [protocol.encode_range(device.model, sensor.channel.full_scale) for sensor in inputs]
+        codes = [protocol.encode_scan_entry(sensor.number, code) for sensor, code in zip(inputs, ranges, strict=True)]
+        codes += [protocol.DIGITAL_INPUTS_CODE] * (self.loss_detection != "none")
+        setting = protocol.choose_rate(wanted, device.dividend)
         rate = setting.rate(device.dividend)
-        setup = [
-            "encode 0",
-            *(f"slist {position} {code}" for position, code in enumerate(codes)),
-            "filter * 0",
-        ]
+        setup = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
         setup += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
-        for command in (*setup, f"ps {choose_packet_code(2 * len(codes) * rate)}"):
+        for command in (*setup, f"ps {protocol.choose_packet_code(2 * len(codes) * rate)}"):
             self._commands.send_command(command)
         self._commands.drain()  # a NUL after the last echo would be taken for the first byte of the stream
         return rate

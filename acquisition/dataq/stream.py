@@ -75,16 +75,10 @@ class DigitalClock:
         self._measured_periods.append(scans)
         if len(self._measured_periods) < CLOCK_TRAINING_PERIODS:
             return
-        even = [
-            length
-            for length in self._measured_periods
-            if abs(length - np.median(self._measured_periods)) <= CLOCK_PERIOD_TOLERANCE
-        ]
-        self._period = float(np.mean(even))
-        if (
-            len(even) < CLOCK_TRAINING_PERIODS - 2
-            or not CLOCK_PERIOD_LIMITS[0] <= self._period <= CLOCK_PERIOD_LIMITS[1]
-        ):
+        periods = np.array(self._measured_periods)
+        even = periods[np.abs(periods - np.median(periods)) <= CLOCK_PERIOD_TOLERANCE]
+        self._period, (low, high) = float(np.mean(even)), CLOCK_PERIOD_LIMITS
+        if even.size < CLOCK_TRAINING_PERIODS - 2 or not low <= self._period <= high:
             raise _make_clock_error()
 
     def _advance(self, high: Flags) -> None:
@@ -98,10 +92,8 @@ class DigitalClock:
 
 def _make_clock_error() -> DeviceError:
     low, high = CLOCK_PERIOD_LIMITS
-    return DeviceError(
-        f"digital input 0 of the DAQ has no even square wave with a period of {low:g} to {high:g} scans",
-        "connect the generator again, or take digital_clock out of [daq]",
-    )
+    text = f"digital input 0 of the DAQ has no even square wave with a period of {low:g} to {high:g} scans"
+    return DeviceError(text, "connect the generator again, or take digital_clock out of [daq]")
 
 
 HELD_BACK_BYTES = 32
@@ -144,10 +136,7 @@ class ScanDecoder:
     def feed(self, data: bytes) -> list[CodeBlock]:
         """Return the scans that these bytes complete."""
         self._bytes += data
-        blocks = []
-        while (block := self._next_block()) is not None:
-            blocks.append(block)
-        return blocks
+        return list(iter(self._next_block, None))
 
     def has_overflowed(self) -> bool:
         """Return whether the stream ends with the overflow reply of the device."""

@@ -43,10 +43,6 @@ class SensorDataLocation:
     """Name of a skew (s) there."""
 
 
-def accept_any_settings(settings: DeviceSettings) -> None:
-    """Accept all settings."""
-
-
 def skip_serial_probe(_link: SerialLink) -> DeviceIdentity | None:
     """Probe no serial port: for a driver whose devices are on none.
 
@@ -79,7 +75,7 @@ class Driver:
     """Function that asks once who answers on an open link, None if no device of this kind does.
     `skip_serial_probe` for devices on no serial port.
     """
-    check: Callable[[DeviceSettings], None] = accept_any_settings
+    check: Callable[[DeviceSettings], None] = lambda _: None
     """Function that raises ValueError for settings that no device of this kind supports. Its sensors are checked
     already.
     """
@@ -133,9 +129,8 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
     from acquisition.dataq import DataqSource
 
-    return DataqSource(
-        port, settings.inputs, settings.sample_rate, settings.loss_detection, digital_clock=settings.digital_clock
-    )
+    rate, clock = settings.sample_rate, settings.digital_clock
+    return DataqSource(port, settings.inputs, rate, settings.loss_detection, digital_clock=clock)
 
 
 def _check_dataq(settings: DeviceSettings) -> None:
@@ -161,46 +156,40 @@ def _open_text_board(port: str, settings: DeviceSettings) -> Device:
     return TextBoardSource(port, settings.inputs, settings.sample_rate, settings.printing)
 
 
-def _check_text_board(settings: DeviceSettings) -> None:
-    from acquisition.text_boards import check_text_board
-
-    check_text_board(settings.inputs, settings.sample_rate)
-
-
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
     from acquisition.text_boards import TextBoardEmulator
 
-    channels = [sensor.channel for sensor in setup.inputs]
-    sensitivities = tuple(channel.sensitivity for channel in channels)
-    rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), channels[0].full_scale
-    return TextBoardEmulator(
-        setup.signal_at(rate), sensitivities, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp
-    )
+    volts = tuple(sensor.channel.sensitivity for sensor in setup.inputs)
+    rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), setup.inputs[0].channel.full_scale
+    return TextBoardEmulator(setup.signal_at(rate), volts, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp)
 
 
-def _import_when_called(module: str, function: str) -> Callable[..., Any]:
-    """Return a function that imports the named function when it is called."""
-    return lambda *arguments: getattr(import_module(module), function)(*arguments)
+def _import_when_called(package: str, function: str) -> Callable[..., Any]:
+    """Return a function that imports the named function of a package of `acquisition` when it is called."""
+    return lambda *arguments: getattr(import_module(f"acquisition.{package}"), function)(*arguments)
 
 
 def _make_library_driver(name: str, title: str) -> Driver:
     """Make the driver of a device that a vendor library reads. The extra that installs it has the driver's name."""
+    open_device, search = (_import_when_called("vendor_drivers", f"{verb}_{name}") for verb in ("open", "search"))
+    return Driver(
+        name,
+        title,
+        lambda port, settings: open_device(port, settings.inputs, settings.sample_rate),
+        skip_serial_probe,
+        search=search,
+        is_hardware_tested=False,
+        extra=name,
+    )
 
-    def open_device(port: str, settings: DeviceSettings) -> Device:
-        opened: Device = open_with_library(port, settings.inputs, settings.sample_rate)
-        return opened
 
-    open_with_library = _import_when_called("acquisition.vendor_drivers", f"open_{name}")
-    search = _import_when_called("acquisition.vendor_drivers", f"search_{name}")
-    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=name)
-
-
+_check_text_board = _import_when_called("text_boards", "check_text_board")
 BUILT_IN_DRIVERS = (
     Driver(
         "taps",
         "a TAPS/1 device",
         _open_taps,
-        _import_when_called("acquisition.taps", "probe_taps"),
+        _import_when_called("taps", "probe_taps"),
         _check_taps,
         SensorDataLocation("the device's own channel data (INFO)", "sens_V_per_EU", "skew_s"),
         emulate=_emulate_taps,
@@ -210,7 +199,7 @@ BUILT_IN_DRIVERS = (
         "dataq",
         "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B",
         _open_dataq,
-        _import_when_called("acquisition.dataq", "probe_dataq"),
+        _import_when_called("dataq", "probe_dataq"),
         _check_dataq,
         usb_vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
@@ -219,8 +208,8 @@ BUILT_IN_DRIVERS = (
         "lines",
         "a board that prints lines of numbers",
         _open_text_board,
-        _import_when_called("acquisition.text_boards", "probe_text_board"),
-        _check_text_board,
+        _import_when_called("text_boards", "probe_text_board"),
+        lambda settings: _check_text_board(settings.inputs, settings.sample_rate),
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,

@@ -74,13 +74,13 @@ def _query_port(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | N
     """Return who answers a driver on a port, None for nobody, or a remark on a driver that fails."""
     about = f"who is on {link.port}"
     answer = query_driver(driver.name, lambda: driver.probe(link), about)
-    if answer is None or isinstance(answer, Remark) or is_device_identity(answer):
+    if answer is None or isinstance(answer, Remark) or _is_identity(answer):
         return cast("DeviceIdentity | Remark | None", answer)
     text = f"answers {type(answer).__name__} when asked {about}, not a DeviceIdentity of texts"
     return driver_failure_remark(driver.name, text)
 
 
-def is_device_identity(answer: object) -> bool:
+def _is_identity(answer: object) -> bool:
     """Return whether an answer is a DeviceIdentity of texts."""
     return isinstance(answer, DeviceIdentity) and all(isinstance(word, str) for word in vars(answer).values())
 
@@ -118,21 +118,18 @@ def search_devices(driver: Driver, remarks: list[Remark]) -> list[DeviceAddress]
         remarks.append(answer)
     if not isinstance(answer, list):
         return []
-    usable = [device for device in answer if _is_valid_address(driver, device)]
+    usable = [device for device in answer if _is_address(device, f"{driver.name}:")]
     if len(usable) < len(answer):
         text = f"lists what is no DeviceAddress that begins with {driver.name}: when asked {SEARCH_QUESTION}"
         remarks.append(driver_failure_remark(driver.name, text))
     return usable
 
 
-def _is_valid_address(driver: Driver, device: object) -> bool:
-    """Return whether this is an address by which the driver finds its device again."""
-    return (
-        isinstance(device, DeviceAddress)
-        and isinstance(device.address, str)
-        and device.address.startswith(f"{driver.name}:")
-        and is_device_identity(device.identity)
-    )
+def _is_address(device: object, prefix: str) -> bool:
+    """Return whether this is an address by which the driver with this prefix finds its device again."""
+    if not isinstance(device, DeviceAddress) or not isinstance(device.address, str):
+        return False
+    return device.address.startswith(prefix) and _is_identity(device.identity)
 
 
 @dataclass(frozen=True)

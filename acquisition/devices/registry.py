@@ -78,7 +78,8 @@ def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
 
 def driver_failure_remark(name: str, text: str) -> Remark:
     """Return the remark on a driver whose package fails."""
-    return make_unusable_remark(Driver, name, f"the package {_find_package(name)} {text}")
+    package = " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
+    return make_unusable_remark(Driver, name, f"the package {package} {text}")
 
 
 @contextmanager
@@ -107,15 +108,9 @@ def convert_driver_errors(name: str, doing: str, kind: type[DeviceError | DataEr
         raise kind(str(driver_failure_remark(name, f"fails when {doing} ({format_exception_line(error)})"))) from error
 
 
-def _find_package(name: str) -> str:
-    """Return the package that brings a driver."""
-    return " and ".join(map(get_package_name, entry_points(group=DRIVER_ENTRY_POINTS, name=name))) or "lobewatch"
-
-
 def _load_driver(name: str) -> Driver | Remark:
-    for driver in BUILT_IN_DRIVERS:
-        if driver.name == name:
-            return driver
+    if (ours := next((driver for driver in BUILT_IN_DRIVERS if driver.name == name), None)) is not None:
+        return ours
     points = sorted(entry_points(group=DRIVER_ENTRY_POINTS, name=name), key=get_package_name)
     if not points:
         text = f"driver={name!r} is none of {', '.join(list_driver_names())}"
@@ -176,10 +171,8 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
     if driver.sensor_data is None:
         _check_sensors(driver, settings)
     elif settings.inputs:
-        raise ValueError(
-            f"channel: {driver.title} names its own sensors: leave [[daq.channel]] out, or name another driver "
-            '("dataq" takes them)'
-        )
+        text = 'leave [[daq.channel]] out, or name another driver ("dataq" takes them)'
+        raise ValueError(f"channel: {driver.title} names its own sensors: {text}")
     if settings.printing and not driver.prints_samples:
         raise ValueError(f'printing: [daq.printing] is for driver = "lines"; leave it out for {driver.title}')
     with convert_driver_errors(driver.name, "checking [daq]", DataError):
@@ -190,19 +183,15 @@ def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
     quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
     if quantities.count("acceleration") == 0 or quantities.count("force") > 1:
         listed = ", ".join(quantities) or "nothing"
-        raise ValueError(
-            f'driver = "{driver.name}" needs two [[daq.channel]], one of force and one of acceleration; '
-            f'here are {listed}; with hammer = "none" in [tap] that of acceleration alone'
-        )
+        needed = "two [[daq.channel]], one of force and one of acceleration"
+        alone = 'with hammer = "none" in [tap] that of acceleration alone'
+        raise ValueError(f'driver = "{driver.name}" needs {needed}; here are {listed}; {alone}')
     directions = [sensor.channel.direction for sensor in settings.inputs if sensor.channel.quantity == "acceleration"]
     named = sorted(filter(None, directions))
     if len(directions) > 1 and (not named or len(set(named)) < len(named)):
-        raise ValueError(
-            f"{len(directions)} channels of acceleration: each that is tapped along needs its own "
-            'direction = "x" or "y" in [[daq.channel]]'
-        )
+        needed = 'each that is tapped along needs its own direction = "x" or "y" in [[daq.channel]]'
+        raise ValueError(f"{len(directions)} channels of acceleration: {needed}")
     numbers = [sensor.number for sensor in settings.inputs]
-    for second, number in enumerate(numbers):
-        if (first := numbers.index(number)) < second:
-            text = f"channel {second + 1}: input={number} is that of channel {first + 1}; each sensor needs its own"
-            raise ValueError(text)
+    for second, number in enumerate(numbers, 1):
+        if (first := numbers.index(number) + 1) < second:
+            raise ValueError(f"channel {second}: input={number} is that of channel {first}; each sensor needs its own")

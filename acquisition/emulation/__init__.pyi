@@ -7,7 +7,6 @@ from .emulated_device import (
     SignalFunction,
     SimulatedSource,
     TcpWire,
-    Wire,
     quantise,
 )
 from .hammered_structure import HammeredStructure, Hammering, Structure
@@ -30,7 +29,6 @@ __all__ = [
     "Structure",
     "TcpWire",
     "TipMotion",
-    "Wire",
     "make_random_housing",
     "quantise",
     "sample_housing",

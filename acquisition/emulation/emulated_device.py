@@ -12,8 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -74,6 +73,8 @@ class SimulatedSource(ClosedOnExit):
     """False, as scans come as fast as they are read."""
     loss_detection = ""
     """Empty: no scans can be lost."""
+    fault = ""
+    """Empty: the source has no faults."""
 
     def __init__(
         self, signal: SignalFunction, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
@@ -85,11 +86,6 @@ class SimulatedSource(ClosedOnExit):
         self.events: deque[Event] = deque()
         """Events, to be added by the test."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
-
-    @property
-    def fault(self) -> str:
-        """Empty: the source has no faults."""
-        return ""
 
     def start(self) -> None:
         """Start: nothing to prepare."""
@@ -126,29 +122,6 @@ class EmulationSetup:
     """True if a square wave is on digital input 0."""
 
 
-class Wire(Protocol):
-    """Emulator's end of the cable, without blocking."""
-
-    port: str
-    """Port that the host opens."""
-    pending: bytearray
-    """Bytes waiting to be sent."""
-
-    def exchange(self, timeout: float) -> bytes:
-        """Send what fits of `pending` and return what has arrived.
-
-        Parameters
-        ----------
-        timeout
-            Longest time to wait (s).
-        """
-        ...
-
-    def close(self) -> None:
-        """Hang up."""
-        ...
-
-
 class PtyWire:
     """Pseudo-terminal in raw mode.
 
@@ -172,14 +145,15 @@ class PtyWire:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            raise DataError(
-                f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
-            ) from error
+            text = f"no pseudo-terminal can be had here ({error}); go through TCP, with EmulationSetup.tcp"
+            raise DataError(text) from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
+        """Port that the host opens."""
         self.pending = bytearray()
+        """Bytes waiting to be sent."""
         if link is not None:
             link.unlink(missing_ok=True)
             link.symlink_to(self.port)
@@ -223,7 +197,9 @@ class TcpWire:
         self._host: socket.socket | None = None
         host = f"[{address}]" if ":" in address else address
         self.port = f"socket://{host}:{self._listener.getsockname()[1]}"
+        """Port that the host opens."""
         self.pending = bytearray()
+        """Bytes waiting to be sent."""
 
     @property
     def has_host(self) -> bool:
@@ -269,6 +245,10 @@ class TcpWire:
             self._host = None
 
 
+Wire = PtyWire | TcpWire
+"""Emulator's end of the cable, without blocking."""
+
+
 class EmulatorThread(ABC):
     """Thread that serves one end of a wire, whose other end opens like a real port. A context manager.
 
@@ -291,9 +271,7 @@ class EmulatorThread(ABC):
         self.serve()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.unplug()
 
     def plug_in(self) -> None:

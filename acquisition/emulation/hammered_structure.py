@@ -72,11 +72,8 @@ class Structure:
         result = np.zeros(time.shape)
         wave = np.exp(1j * np.outer(nu, time[during]))
         quasi_static = (self.residual * _PULSE_HARMONICS * -(nu**2)) @ wave
-        result[during] = (
-            ((forced * -(nu**2)).sum(0) @ wave).real
-            + quasi_static.real
-            + ((start * root**2) @ np.exp(np.outer(root, time[during]))).real
-        )
+        free = (start * root**2) @ np.exp(np.outer(root, time[during]))
+        result[during] = ((forced * -(nu**2)).sum(0) @ wave).real + quasi_static.real + free.real
         result[later] = ((after * root**2) @ np.exp(np.outer(root, time[later] - width))).real
         return result
 
@@ -173,6 +170,5 @@ class HammeredStructure:
 
     def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
-        return np.stack(
-            [force, *(structure.response(time, width) for structure in (self.structure, *self.cross_structures))]
-        )
+        structures = (self.structure, *self.cross_structures)
+        return np.stack([force, *(structure.response(time, width) for structure in structures)])

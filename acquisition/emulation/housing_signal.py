@@ -137,9 +137,8 @@ class HousingSignal:
     def __post_init__(self) -> None:
         fine = _housing_acceleration(self.motion, self.housing)
         time = np.arange(int(self.motion.acceleration.shape[1] * self.sample_rate / self.motion.sample_rate))
-        self._tip = np.interp(
-            time * (HOUSING_OVERSAMPLING * self.motion.sample_rate / self.sample_rate), np.arange(fine.size), fine
-        )
+        place = time * (HOUSING_OVERSAMPLING * self.motion.sample_rate / self.sample_rate)
+        self._tip = np.interp(place, np.arange(fine.size), fine)
         self._phases = self.random.uniform(0, 2 * np.pi, len(self.housing.tones) + 1)
 
     @property

@@ -26,14 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.arrays import Complexes, Floats
-from acquisition.emulation.milling_cut import (
-    MillingCut,
-    ModeTables,
-    Passage,
-    ToothTables,
-    build_tables,
-    count_steps_needed,
-)
+from acquisition.emulation import milling_cut
+from acquisition.emulation.milling_cut import MillingCut, ModeTables, Passage, ToothTables
 
 MAX_STEP_COUNT_FACTOR = 1.25
 """Factor by which steps per turn may exceed those needed, to make pitches whole numbers of steps."""
@@ -41,12 +35,12 @@ MAX_STEP_COUNT_FACTOR = 1.25
 
 def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
     """Build the tables of one tooth over a turn."""
-    needed = count_steps_needed(cut) * cut.teeth
+    needed = milling_cut.count_steps_needed(cut) * cut.teeth
     number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
     steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
     off = np.max(np.abs(steps - np.rint(steps)), axis=1) / number
     single = replace(cut, teeth=1, pitch=(), runout=())
-    return build_tables([single], int(number[np.argmin(np.round(off, 9))]))
+    return milling_cut.build_tables([single], int(number[np.argmin(np.round(off, 9))]))
 
 
 def simulate_uneven_cutting(
@@ -60,9 +54,8 @@ def simulate_uneven_cutting(
     behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
     share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
     stands_out = np.array(cut.runout or np.zeros(cut.teeth))
-    thick, root, reach, push, rub = (
-        part[:, 0] for part in (tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain)
-    )
+    tables = tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain
+    thick, root, reach, push, rub = (table[:, 0] for table in tables)
     number = math.ceil(passage.cutting / step)
     depth = passage.depth_at(np.asarray((np.arange(number) + 0.5) * step))
     surface, swing = np.zeros_like(thick), np.zeros(modes.flight.shape[1], dtype=complex)
@@ -145,7 +138,7 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
             yield number, _simulate_uneven_cut(cut, passage)
     for group in _group_cuts(cuts):
         members = [cuts[i] for i in group]
-        modes, teeth = build_tables(members, max(map(count_steps_needed, members)))
+        modes, teeth = milling_cut.build_tables(members, max(map(milling_cut.count_steps_needed, members)))
         cutting, swing = _simulate_group(members, modes, teeth, passage)
         for place, number in enumerate(group):
             steps_per_turn = len(teeth.root) * cuts[number].teeth
@@ -163,10 +156,8 @@ def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
     """Yield the indices of cuts to step together, all with evenly spaced teeth."""
     group: list[int] = []
     for i in sorted((i for i, cut in enumerate(cuts) if not cut.pitch), key=lambda i: cuts[i].tooth_period):
-        if group and (
-            len(group) == MAX_CUTS_PER_GROUP
-            or cuts[i].tooth_period > MAX_TOOTH_PERIOD_RATIO * cuts[group[0]].tooth_period
-        ):
+        longest = MAX_TOOTH_PERIOD_RATIO * cuts[group[0]].tooth_period if group else math.inf
+        if len(group) == MAX_CUTS_PER_GROUP or cuts[i].tooth_period > longest:
             yield group
             group = []
         group.append(i)
@@ -224,10 +215,8 @@ def _step_tooth_period(
 def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Floats:
     """Return q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), at the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
-    acceleration: Floats = np.einsum(
-        "cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis]
-    )
-    return acceleration
+    of_modes = free + gains * modes.pole.imag / modes.step[:, np.newaxis]
+    return np.asarray(np.einsum("cam,scm->sca", modes.axis, of_modes))
 
 
 def _assemble_motion(

@@ -62,23 +62,18 @@ class MillingCut:
             raise ValueError(f"angles {self.entry_angle} to {self.exit_angle} rad: give 0 <= entry < exit <= pi")
         above = (self.tangential, self.depth, self.feed_per_tooth, self.speed_rpm)
         if not (min(above) > 0 and sum(above) < np.inf):
-            raise ValueError(
-                f"tangential={self.tangential} Pa, depth={self.depth} m, feed_per_tooth={self.feed_per_tooth} m and "
-                f"speed_rpm={self.speed_rpm} must be finite and > 0"
-            )
+            text = f"tangential={self.tangential} Pa, depth={self.depth} m, feed_per_tooth={self.feed_per_tooth} m"
+            raise ValueError(f"{text} and speed_rpm={self.speed_rpm} must be finite and > 0")
         least = (self.radial, self.tangential_edge, self.radial_edge, self.helix_lag)
         if not (min(least) >= 0 and sum(least) < np.inf):
             raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and >= 0")
         if len(self.runout) not in (0, self.teeth):
             raise ValueError(f"runout has {len(self.runout)} values for {self.teeth} teeth; give one a tooth, or none")
-        if self.pitch and not (len(self.pitch) == self.teeth and min(self.pitch) > 0 and self._is_turn):
+        is_turn = abs(sum(self.pitch) - 2 * np.pi) < 1e-6
+        if self.pitch and not (len(self.pitch) == self.teeth and min(self.pitch) > 0 and is_turn):
             raise ValueError(f"pitch={self.pitch} rad: give one above 0 for each of {self.teeth} teeth, a turn in all")
         if self.x is None and self.y is None:
             raise ValueError("x and y are both rigid; give the modes of one direction at least")
-
-    @property
-    def _is_turn(self) -> bool:
-        return abs(sum(self.pitch) - 2 * np.pi) < 1e-6
 
     @property
     def tooth_period(self) -> float:
@@ -194,10 +189,8 @@ def build_tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, To
 def _stack_padded(of_cuts: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[Any]:
     """Stack the arrays of each cut along a new axis, padded with zeros along the last one."""
     most = max(arrays[0].shape[-1] for arrays in of_cuts)
-    return [
-        np.stack([np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, most - a.shape[-1])]) for a in same], axis=axis)
-        for same in zip(*of_cuts, strict=True)
-    ]
+    padded = [[np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, most - a.shape[-1])]) for a in cut] for cut in of_cuts]
+    return [np.stack(same, axis=axis) for same in zip(*padded, strict=True)]
 
 
 def _build_mode_arrays(cut: MillingCut, step: float) -> tuple[NDArray[Any], ...]:

@@ -38,10 +38,8 @@ def find_usb_port(vid: int, serial_number: str) -> str | None:
         Port, None while the device is not plugged in.
     """
     wanted = (vid, serial_number.casefold())
-    ports = (
-        port.device for port in list_ports.comports() if (port.vid, (port.serial_number or "").casefold()) == wanted
-    )
-    return next(ports, None)
+    ports = list_ports.comports()
+    return next((port.device for port in ports if (port.vid, (port.serial_number or "").casefold()) == wanted), None)
 
 
 def find_usb_identity(port: str) -> tuple[int, str] | None:
@@ -93,11 +91,11 @@ def list_serial_ports() -> list[PortInfo]:
     ]
 
 
+_PLUG_IN = "plug the DAQ in and"
 NO_PORTS_REMEDIES = {
-    "linux": "plug the DAQ in and look at the last lines of `sudo dmesg`; hand it through to a container or "
-    "virtual machine",
-    "darwin": "plug the DAQ in and look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
-    "win32": "plug the DAQ in and look under Ports (COM & LPT) of the Device Manager",
+    "linux": f"{_PLUG_IN} look at the last lines of `sudo dmesg`; hand it through to a container or virtual machine",
+    "darwin": f"{_PLUG_IN} look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
+    "win32": f"{_PLUG_IN} look under Ports (COM & LPT) of the Device Manager",
 }
 """Remedy by sys.platform."""
 
@@ -116,10 +114,8 @@ def explain_no_ports(platform: str | None = None) -> str:
         Sentence with the remedy.
     """
     cure = NO_PORTS_REMEDIES.get(platform or sys.platform, "plug the DAQ in")
-    return (
-        f"No serial port on this computer: {cure}; try another cable, some carry no data. "
-        "A DATAQ device shows none until its LED blinks yellow (CDC mode)."
-    )
+    dataq = "A DATAQ device shows none until its LED blinks yellow (CDC mode)."
+    return f"No serial port on this computer: {cure}; try another cable, some carry no data. {dataq}"
 
 
 def explain_open_error(port: str, error: Exception, platform: str = sys.platform) -> DeviceError:
@@ -130,12 +126,10 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
         busy += f" (`sudo fuser -v {port}` names it; ModemManager lets go after half a minute)"
     missing = "check the cable and the port's name (`acquisition.scan_ports` lists all)"
     hints = {
-        "lock": busy,
-        "busy": busy,
+        **dict.fromkeys(("lock", "busy"), busy),
         "Permission denied": busy if platform == "win32" else _explain_permission(port, platform),
         "Access is denied": busy,
-        "No such file": missing,
-        "FileNotFound": missing,
+        **dict.fromkeys(("No such file", "FileNotFound"), missing),
         "refused": "nothing listens there: start the device or emulator first",
     }
     cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
@@ -207,9 +201,8 @@ class SerialLink:
         try:
             self._serial.write(data)
         except serial.SerialTimeoutException as error:
-            raise DeviceError(
-                f"the DAQ on {self.port} takes no commands", "switch it off and on and repeat the command"
-            ) from error
+            text = f"the DAQ on {self.port} takes no commands"
+            raise DeviceError(text, "switch it off and on and repeat the command") from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
 

@@ -101,11 +101,9 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     source.stop()
     elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
     if len(scans) < MIN_RATE_BLOCKS or elapsed < seconds:
-        raise DeviceError(
-            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s",
-            f"to measure its rate, at least {MIN_RATE_BLOCKS} over {seconds:g} s are needed: check its sample rate "
-            "and the cable",
-        )
+        needed = f"to measure its rate, at least {MIN_RATE_BLOCKS} over {seconds:g} s are needed"
+        text = f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s"
+        raise DeviceError(text, f"{needed}: check its sample rate and the cable")
     period, scatter = _fit_scan_period(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, USB_POLL_INTERVAL / np.sqrt(6) / n_scans) / period**2)
     return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
@@ -137,18 +135,14 @@ def check_rate(measured: MeasuredRate, nominal: float) -> None:
     acquisition.errors.DeviceError: the DAQ delivers 24000.00 ± 0.50 scans a second, not 25600: every ...
     """
     if measured.std > MAX_RATE_STD * measured.rate:
-        raise DeviceError(
-            f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({measured.rate:.6g} Hz "
-            f"± {measured.std / measured.rate:.2%}, needed ± {MAX_RATE_STD:.2%})",
-            "close other programs and try again",
-        )
+        rate = f"{measured.rate:.6g} Hz ± {measured.std / measured.rate:.2%}, needed ± {MAX_RATE_STD:.2%}"
+        text = f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({rate})"
+        raise DeviceError(text, "close other programs and try again")
     off = nominal / measured.rate - 1
     if abs(measured.rate / nominal - 1) > RATE_TOLERANCE + (0 if measured.is_accurate else 2 * measured.std / nominal):
-        raise DeviceError(
-            f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: every "
-            f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}",
-            "correct the DAQ's sample rate or work with the measured one",
-        )
+        error = f"every frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}"
+        text = f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: {error}"
+        raise DeviceError(text, "correct the DAQ's sample rate or work with the measured one")
 
 
 def rate_remark(measured: MeasuredRate) -> Remark | None:
@@ -168,9 +162,8 @@ def rate_remark(measured: MeasuredRate) -> Remark | None:
         return None
     share = measured.std / measured.rate
     text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
-    return Remark(
-        "rate-not-sure", "", text, "close other programs and run acquisition.measure_rate, which measures it again"
-    )
+    remedy = "close other programs and run acquisition.measure_rate, which measures it again"
+    return Remark("rate-not-sure", "", text, remedy)
 
 
 def _fit_scan_period(scans: Floats, arrived: Floats) -> tuple[float, float]:
@@ -287,11 +280,9 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     counts = (g2 > MIN_SKEW_COHERENCE) & (np.arange(g2.size) > 0)
     share = float(np.mean(counts))
     if share < MIN_COHERENT_SHARE:
-        raise ValueError(
-            "the two channels do not carry one broad-band signal "
-            f"(coherence over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the "
-            f"lines, {MIN_COHERENT_SHARE:.0%} are needed); join both inputs with a T-piece and feed noise or taps"
-        )
+        shares = f"at {share:.0%} of the lines, {MIN_COHERENT_SHARE:.0%} are needed"
+        text = f"the two channels do not carry one broad-band signal (coherence over {MIN_SKEW_COHERENCE:g} {shares})"
+        raise ValueError(f"{text}; join both inputs with a T-piece and feed noise or taps")
     omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
     rough = _find_correlation_peak(np.where(counts, mean, 0.0))
     turned = cross[:, counts] * np.exp(-1j * omega * rough)
@@ -316,10 +307,8 @@ def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
     n_least = MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES
     for record, name in zip(records, ("first", "second"), strict=True):
         if record.ndim != 1 or record.size < n_least or not np.all(np.isfinite(record)):
-            raise ValueError(
-                f"the {name} record has shape {record.shape} or holds NaN or inf; "
-                f"at least {n_least} finite samples are needed"
-            )
+            text = f"the {name} record has shape {record.shape} or holds NaN or inf"
+            raise ValueError(f"{text}; at least {n_least} finite samples are needed")
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
     return np.stack([record - np.mean(record) for record in records])

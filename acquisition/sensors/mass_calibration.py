@@ -80,12 +80,9 @@ class MassCalibration:
 
     def _find_faults(self) -> Iterator[Remark]:
         if abs(self.phase) > MAX_RIGID_PHASE:
-            yield Remark(
-                "phase-not-rigid",
-                "",
-                f"the phase of {self.phase:+.1f} deg is not that of a rigid mass",
-                "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass",
-            )
+            text = f"the phase of {self.phase:+.1f} deg is not that of a rigid mass"
+            cure = "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass"
+            yield Remark("phase-not-rigid", "", text, cure)
         if self.inverted:
             cure = "turn the accelerometer or negate its sensitivity"
             yield Remark("opposite-signs", "", "force and acceleration have opposite signs", cure)
@@ -94,12 +91,9 @@ class MassCalibration:
         large, share = ("force", self.ratio - 1) if self.ratio > 1 else ("acceleration", 1 / self.ratio - 1)
         much = f"{share:.1%}" if share < 1 else f"{1 + share:.4g} times"
         wrong = "large" if self.ratio > 1 else "small"
-        yield Remark(
-            "sensitivities-disagree",
-            "",
-            f"against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}",
-            "before you change one: is the mass the total that moves, with accelerometer and mount?",
-        )
+        text = f"against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}"
+        cure = "before you change one: is the mass the total that moves, with accelerometer and mount?"
+        yield Remark("sensitivities-disagree", "", text, cure)
         if mistake := unit_mistake_remark(self.ratio):
             yield mistake
 
@@ -115,11 +109,9 @@ class MassCalibration:
             lines.append(f"Both sensitivities agree within {MAX_SENSITIVITY_DEVIATION:.0%}.")
         elif self.channels is not None:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
-            lines.append(
-                f"If the accelerometer is trusted, the hammer has {old[0] * self.ratio:.4g} mV/N instead of "
-                f"{old[0]:.4g}; if the hammer is trusted, the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 "
-                f"instead of {old[1]:.4g}."
-            )
+            force = f"the hammer has {old[0] * self.ratio:.4g} mV/N instead of {old[0]:.4g}"
+            response = f"the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 instead of {old[1]:.4g}"
+            lines.append(f"If the accelerometer is trusted, {force}; if the hammer is trusted, {response}.")
         return "\n".join(lines)
 
 
@@ -177,11 +169,9 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     s_fa = mass * np.array([cross[inside] for _, _, cross in spectra])
     n = _count_flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
     if n < MIN_CALIBRATION_LINES:
-        raise ValueError(
-            "force and acceleration of this mass keep no fixed ratio: "
-            f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} "
-            "are needed; hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
-        )
+        lines = f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} are needed"
+        cure = "hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
+        raise ValueError(f"force and acceleration of this mass keep no fixed ratio: {lines}; {cure}")
     f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]
     sign = float(np.sign(np.sum(s_fa).real))
     fits = np.array([_fit_ratio(f, force, sign * cross.real) for force, cross in zip(s_ff, s_fa, strict=True)])
@@ -214,6 +204,5 @@ def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Complexe
 def _fit_ratio(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Floats) -> Floats:
     """Return q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
     root = np.sqrt(s_ff)
-    return np.asarray(
-        np.linalg.lstsq(np.stack([root, root * (f / f[-1]) ** 2], axis=1), s_fa / root)[0] / [1, f[-1] ** 2]
-    )
+    rows = np.stack([root, root * (f / f[-1]) ** 2], axis=1)
+    return np.asarray(np.linalg.lstsq(rows, s_fa / root)[0] / [1, f[-1] ** 2])

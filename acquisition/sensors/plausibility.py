@@ -24,20 +24,15 @@ UNIT_MISTAKE_TOLERANCE = 0.15
 """Relative deviation from the factor of a unit mistake up to which it explains a ratio."""
 DAYS_PER_MONTH = 365.25 / 12
 
-_LBF = POUND_FORCE
+_G, _LBF = STANDARD_GRAVITY, POUND_FORCE
+_MILLIVOLTS = "is one sensitivity in mV, the other in V"
 _UNIT_MISTAKES: Mapping[float, tuple[str, str]] = {
-    STANDARD_GRAVITY: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
-    1 / STANDARD_GRAVITY: (
-        "1/9.81",
-        "was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?",
-    ),
+    _G: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
+    1 / _G: ("1/9.81", "was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?"),
     1 / _LBF: ("1/4.45", "is the force in lbf, not N? A sensitivity in V/lbf is divided by 4.44822"),
     _LBF: ("4.45", "was a force sensitivity in V/N divided by 4.44822 as if it were V/lbf?"),
-    1e3: ("1000", "is one sensitivity in mV, the other in V (force 1000 times too large or acceleration too small)?"),
-    1e-3: (
-        "1/1000",
-        "is one sensitivity in mV, the other in V (force 1000 times too small or acceleration too large)?",
-    ),
+    1e3: ("1000", f"{_MILLIVOLTS} (force 1000 times too large or acceleration too small)?"),
+    1e-3: ("1/1000", f"{_MILLIVOLTS} (force 1000 times too small or acceleration too large)?"),
 }
 
 
@@ -90,26 +85,18 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
     """
     low, high, unit, usual = SENSITIVITY_LIMITS[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
-    remarks = []
-    sensitivity = abs(channel.sensitivity) * unit
-    if not low / SENSITIVITY_SPREAD <= sensitivity <= high * SENSITIVITY_SPREAD:
-        text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
-        remarks.append(
-            Remark(
-                "sensitivity-not-believed",
-                channel.name,
-                text,
-                _explain_slip(sensitivity, low / SENSITIVITY_SPREAD, high * SENSITIVITY_SPREAD),
-            )
-        )
-    if not FULL_SCALE_LIMITS[0] <= channel.full_scale <= FULL_SCALE_LIMITS[1]:
-        text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
-        remarks.append(
-            Remark(
-                "input-range-not-believed", channel.name, text, _explain_slip(channel.full_scale, *FULL_SCALE_LIMITS)
-            )
-        )
-    return tuple(remarks)
+    text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
+    limits = low / SENSITIVITY_SPREAD, high * SENSITIVITY_SPREAD
+    range_text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
+    checks = (
+        ("sensitivity-not-believed", text, abs(channel.sensitivity) * unit, limits),
+        ("input-range-not-believed", range_text, channel.full_scale, FULL_SCALE_LIMITS),
+    )
+    return tuple(
+        Remark(code, channel.name, text, _explain_slip(value, *limits))
+        for code, text, value, limits in checks
+        if not limits[0] <= value <= limits[1]
+    )
 
 
 def _explain_slip(value: float, low: float, high: float) -> str:
@@ -140,12 +127,9 @@ def stiffness_remark(stiffness: float) -> Remark | None:
     if low <= abs(stiffness) <= high:
         return None
     shown = f"{stiffness:.0f} N/m" if abs(stiffness) < low else f"{stiffness / 1e6:.0f} N/um"
-    return Remark(
-        "stiffness-not-believed",
-        "",
-        f"K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um",
-        "check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass",
-    )
+    text = f"K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
+    cure = "check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass"
+    return Remark("stiffness-not-believed", "", text, cure)
 
 
 def calibration_remark(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
@@ -173,9 +157,8 @@ def calibration_remark(channel: Channel, today: date, interval_months: float = 1
     ('calibration-old', None)
     """
     if not channel.calibration_date:
-        return Remark(
-            "calibration-unknown", channel.name, "date of calibration not known", "enter it beside the sensitivity"
-        )
+        text = "date of calibration not known"
+        return Remark("calibration-unknown", channel.name, text, "enter it beside the sensitivity")
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
     except ValueError:

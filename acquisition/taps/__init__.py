@@ -4,10 +4,4 @@ from acquisition.taps.bridge import TapsBridge
 from acquisition.taps.emulator import TapsEmulator, TapsFaults
 from acquisition.taps.source import TapsSource, probe_taps
 
-__all__ = [
-    "TapsBridge",
-    "TapsEmulator",
-    "TapsFaults",
-    "TapsSource",
-    "probe_taps",
-]
+__all__ = ["TapsBridge", "TapsEmulator", "TapsFaults", "TapsSource", "probe_taps"]

@@ -11,21 +11,8 @@ from typing import Any
 from acquisition.channel import Channel
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction, quantise
 from acquisition.source import DeviceIdentity, Event, EventKind
-from acquisition.taps.protocol import (
-    LOST_BEFORE_FLAG,
-    SAMPLE_BITS,
-    STATUS_INTERVAL,
-    DeviceCommands,
-    DeviceStatus,
-    Frame,
-    FrameDecoder,
-    MessageType,
-    build_info,
-    encode_data,
-    encode_event,
-    encode_frame,
-    parse_sample_bits,
-)
+from acquisition.taps import protocol
+from acquisition.taps.protocol import MessageType, TapsServer
 
 NOISE_BYTES = bytes(range(7, 71)) + b"\x00" + bytes(range(200, 230))
 """Bytes that are no frame. Their end damages the next frame."""
@@ -91,7 +78,7 @@ TAPS_BUFFER_SECONDS = 1.0
 """Samples kept for a slow host before scans are dropped (s)."""
 
 
-class TapsEmulator(EmulatorThread):
+class TapsEmulator(TapsServer, EmulatorThread):
     """Emulated TAPS/1 device. A context manager whose `port` opens like a real one.
 
     Parameters
@@ -144,12 +131,8 @@ class TapsEmulator(EmulatorThread):
         self._power_on()
 
     def _power_on(self) -> None:
-        self._decoder = FrameDecoder()
-        self._seq = self._session = self._frames = self._infos = 0
-        self._scan = self._sent = self._overruns = self._peak = 0
-        self._streaming = self._lost = False
-        self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
-        self._per_frame, self._bits = 512, SAMPLE_BITS[0]
+        super()._power_on()
+        self._frames = self._infos = 0
         if self._faults.noise_at_start:
             self.wire.pending += NOISE_BYTES
         if self._faults.start_streaming:
@@ -177,8 +160,7 @@ class TapsEmulator(EmulatorThread):
         self._pending_events.append(event)
 
     def serve_once(self) -> bool:
-        for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
-            self._send(*DeviceCommands(self._info, self._configure, self._start, self._stop).answer(frame))
+        self._serve_host(0.0 if self._streaming and self._has_room() else 0.05)
         while self._pending_events:
             self._send_now(self._pending_events.popleft())
         if self._streaming:
@@ -196,39 +178,30 @@ class TapsEmulator(EmulatorThread):
             self.wire.exchange(0.05)
 
     def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
-        encoded = encode_frame(Frame(kind, self._seq, body, self._session, flags))
-        self._seq += 1
+        place = len(self.wire.pending)
+        super()._send(kind, body, flags)
+        encoded = bytes(self.wire.pending[place:])
         if kind == MessageType.DATA:
             self._frames += 1
-            encoded = self._faults.apply(encoded, self._frames)
+            self.wire.pending[place:] = self._faults.apply(encoded, self._frames)
         elif kind == MessageType.INFO:
             self._infos += 1
-            encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
-        self.wire.pending += encoded
+            if self._infos <= self._faults.cut_infos:
+                del self.wire.pending[place + len(encoded) // 2 :]
 
     def _send_now(self, event: Event) -> None:
         if event.kind != EventKind.BUTTON:
             self._active_faults[event.kind, event.channel] = event
-        self._send(MessageType.EVENT, encode_event(replace(event, scan=self._scan)))
+        self._send(MessageType.EVENT, protocol.encode_event(replace(event, scan=self._scan)))
 
     def _info(self) -> dict[str, Any]:
-        return build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
-
-    def _configure(self, config: dict[str, Any]) -> None:
-        if self._streaming:
-            raise ValueError("CONFIG while streaming; send STOP first")
-        self._bits = parse_sample_bits(config, self._channels, self._rate)
-        self._per_frame = int(config["samples_per_frame"])
-
-    def _stop(self) -> None:
-        self._streaming = False
+        return protocol.build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
 
     def _start(self, n_scans: int) -> None:
         """Start a session and report active faults."""
         self._session = (self._session + 1) % 0x10000
-        self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
-        self._sent = self._overruns = self._peak = 0
-        self._started = self._status_due = time.monotonic()
+        self._begin_count(n_scans)
+        self._started = self._status_due
         self._pending_events.extend(event for event in self._active_faults.values() if event.begins)
 
     def _stream(self) -> None:
@@ -239,11 +212,7 @@ class TapsEmulator(EmulatorThread):
         due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
         while self._scan + self._per_frame <= due:
             self._send_scans(overrun=not self._has_room())
-        if now >= self._status_due:
-            self._status_due = now + STATUS_INTERVAL
-            self._send(
-                MessageType.STATUS, DeviceStatus(self._scan, self._sent, self._peak, self._overruns, 31.5).encode()
-            )
+        self._report_status(31.5)
         if self._realtime:
             time.sleep(0.5 * self._per_frame / self._rate)
 
@@ -270,11 +239,8 @@ class TapsEmulator(EmulatorThread):
             self._lost = True
             self._overruns += 1
         else:
-            body = encode_data(self._scan, codes, self._bits, self._faults.overload)
-            self._send(MessageType.DATA, body, LOST_BEFORE_FLAG if self._lost else 0)
-            self._sent += self._per_frame
-            self._lost = False
-            self._peak = max(self._peak, min(100 * len(self.wire.pending) // self._buffer_bytes(), 100))
+            self._send_data(codes, self._faults.overload)
+            self._note_fill(self._buffer_bytes())
         self._scan += self._per_frame
         if self._n_scans and self._scan >= self._n_scans:
             self._streaming = False

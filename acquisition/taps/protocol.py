@@ -9,11 +9,12 @@ from __future__ import annotations
 import enum
 import json
 import struct
+import time
 import zlib
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from cobs import cobs
@@ -21,6 +22,9 @@ from cobs import cobs
 from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel
 from acquisition.source import DeviceIdentity, Event, EventKind
+
+if TYPE_CHECKING:
+    from acquisition.emulation.emulated_device import Wire
 
 MAX_FRAME = 8192
 """Longest decoded frame (bytes)."""
@@ -89,8 +93,8 @@ class DeviceStatus:
 
     def encode(self) -> bytes:
         """Encode the body."""
-        numbers = (self.samples_taken, self.samples_sent, self.buffer_peak_percent, self.overruns)
-        return _STATUS_BODY.pack(*numbers, round(self.temperature * 100))
+        *counts, temperature = astuple(self)
+        return _STATUS_BODY.pack(*counts, round(temperature * 100))
 
     @classmethod
     def decode(cls, body: bytes) -> DeviceStatus:
@@ -131,9 +135,8 @@ def decode_frame(encoded: bytes) -> Frame | None:
         raw = cobs.decode(encoded)
     except cobs.DecodeError:
         return None
-    if not _FRAME_HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != int.from_bytes(
-        raw[-4:], "little"
-    ):
+    crc = int.from_bytes(raw[-4:], "little")
+    if not _FRAME_HEADER.size + 4 <= len(raw) <= MAX_FRAME or zlib.crc32(raw[:-4]) != crc:
         return None
     kind, flags, session, seq = _FRAME_HEADER.unpack_from(raw)
     return Frame(kind, seq, bytes(raw[_FRAME_HEADER.size : -4]), session, flags)
@@ -187,10 +190,8 @@ def decode_data(body: bytes) -> Block:
 
 
 def _decode_words(samples: bytes, bits: int) -> Codes:
-    if bits == 16:
-        return np.frombuffer(samples, "<i2").astype(np.int32)
-    if bits == 32:
-        return np.frombuffer(samples, "<i4").astype(np.int32)
+    if bits != 24:
+        return np.frombuffer(samples, f"<i{bits // 8}").astype(np.int32)
     packed = np.frombuffer(samples, np.uint8).reshape(-1, 3)
     words = np.zeros((len(packed), 4), np.uint8)
     words[:, 1:] = packed
@@ -244,47 +245,98 @@ class EventLog:
 
     def fault(self, channels: Mapping[int, Channel]) -> str:
         """Describe the active faults in one sentence, empty if there are none. channels: by their i in INFO."""
-        return "; ".join(
-            _FAULT_TEXTS[EventKind(event.kind)].format(_sensor_name(event, channels)) for event in self._standing
-        )
+        names: dict[int | None, str] = {number: channel.quantity for number, channel in channels.items()}
+        names[None] = "force or acceleration"
+        standing = [(event.kind, names.get(event.channel, f"(channel {event.channel})")) for event in self._standing]
+        return "; ".join(_FAULT_TEXTS[EventKind(kind)].format(name) for kind, name in standing)
 
 
-def _sensor_name(event: Event, channels: Mapping[int, Channel]) -> str:
-    if event.channel is None:
-        return "force or acceleration"
-    return channels[event.channel].quantity if event.channel in channels else f"(channel {event.channel})"
+class TapsServer:
+    """Device's end of a TAPS/1 wire. It answers the commands of the host and counts what it sends."""
 
+    wire: Wire
+    _channels: tuple[Channel, ...]
+    _rate: float
 
-@dataclass(frozen=True)
-class DeviceCommands:
-    """Actions of a device for the commands of its host. ValueError, LookupError and TypeError reject one."""
+    def _power_on(self) -> None:
+        """Begin without a session or settings of a host."""
+        self._decoder = FrameDecoder()
+        self._seq = self._session = 0
+        self._bits, self._per_frame = SAMPLE_BITS[0], 512
+        self._begin_count(0)
+        self._streaming = False
 
-    info: Callable[[], dict[str, Any]]
-    """Function that returns the body of INFO."""
-    configure: Callable[[dict[str, Any]], None]
-    """Function that applies the body of CONFIG."""
-    start: Callable[[int], None]
-    """Function that starts a session of this many scans, 0 for endless."""
-    stop: Callable[[], None]
-    """Function that ends the session."""
+    def _begin_count(self, n_scans: int) -> None:
+        """Begin to count the scans of a session of this many, 0 for endless."""
+        self._streaming, self._lost, self._n_scans = True, False, n_scans
+        self._scan = self._sent = self._overruns = self._peak = 0
+        self._status_due = time.monotonic()
 
-    def answer(self, frame: Frame) -> tuple[MessageType, bytes]:
-        """Execute a command frame and return type and body of the answer."""
-        about = frame.seq.to_bytes(4, "little")
-        try:
-            if frame.type == MessageType.HELLO:
-                return MessageType.INFO, json.dumps(self.info()).encode()
-            if frame.type == MessageType.CONFIG:
-                self.configure(json.loads(frame.body))
-            elif frame.type == MessageType.START:
-                self.start(int.from_bytes(frame.body, "little"))
-            elif frame.type == MessageType.STOP:
-                self.stop()
-            else:
-                raise ValueError(f"unknown command {frame.type:#04x}")
-        except (ValueError, LookupError, TypeError) as error:
-            return MessageType.NACK, about + b"\x01\x00" + str(error).encode()
-        return MessageType.ACK, about + b"\x00\x00"
+    def _info(self) -> dict[str, Any]:
+        """Return the body of INFO."""
+        raise NotImplementedError
+
+    def _start(self, n_scans: int) -> None:
+        """Start a session of this many scans, 0 for endless."""
+        raise NotImplementedError
+
+    def _stop(self) -> None:
+        """End the session."""
+        self._streaming = False
+
+    def _configure(self, config: dict[str, Any]) -> None:
+        if self._streaming:
+            raise ValueError("CONFIG while streaming; send STOP first")
+        if config["fs"] != self._rate or config["channels"] != list(range(len(self._channels))):
+            raise ValueError(f"CONFIG asks for what this device does not have: {config}")
+        self._bits, self._per_frame = SAMPLE_BITS[config["format"]], int(config["samples_per_frame"])
+
+    def _serve_host(self, timeout: float) -> None:
+        """Send what is pending, and execute and answer the commands that have arrived."""
+        for frame in self._decoder.feed(self.wire.exchange(timeout)):
+            about = frame.seq.to_bytes(4, "little")
+            try:
+                if frame.type == MessageType.HELLO:
+                    self._send(MessageType.INFO, json.dumps(self._info()).encode())
+                    continue
+                self._execute(frame)
+                self._send(MessageType.ACK, about + b"\x00\x00")
+            except (ValueError, LookupError, TypeError) as error:
+                self._send(MessageType.NACK, about + b"\x01\x00" + str(error).encode())
+
+    def _execute(self, frame: Frame) -> None:
+        """Execute a command. ValueError, LookupError or TypeError reject it."""
+        if frame.type == MessageType.CONFIG:
+            self._configure(json.loads(frame.body))
+        elif frame.type == MessageType.START:
+            self._start(int.from_bytes(frame.body, "little"))
+        elif frame.type == MessageType.STOP:
+            self._stop()
+        else:
+            raise ValueError(f"unknown command {frame.type:#04x}")
+
+    def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
+        self.wire.pending += encode_frame(Frame(kind, self._seq, body, self._session, flags))
+        self._seq = (self._seq + 1) % 2**32
+
+    def _send_data(self, codes: Codes, overload: int) -> None:
+        """Send the next scans. Those lost before them are reported."""
+        body = encode_data(self._scan, codes, self._bits, overload)
+        self._send(MessageType.DATA, body, LOST_BEFORE_FLAG if self._lost else 0)
+        self._lost = False
+        self._sent += codes.shape[1]
+
+    def _note_fill(self, capacity: int) -> None:
+        """Note how full a buffer of this size (bytes) is."""
+        self._peak = max(self._peak, min(100 * len(self.wire.pending) // capacity, 100))
+
+    def _report_status(self, temperature: float) -> None:
+        """Send the status if it is due. temperature: of the board (degC)."""
+        now = time.monotonic()
+        if now >= self._status_due:
+            self._status_due = now + STATUS_INTERVAL
+            status = DeviceStatus(self._scan, self._sent, self._peak, self._overruns, temperature)
+            self._send(MessageType.STATUS, status.encode())
 
 
 def build_info(
@@ -318,10 +370,3 @@ def build_info(
             for i, channel in enumerate(channels)
         ],
     }
-
-
-def parse_sample_bits(config: dict[str, Any], channels: Sequence[Channel], rate: float) -> int:
-    """Return the sample bits that a CONFIG requests. ValueError if the device does not support the CONFIG."""
-    if config["fs"] != rate or config["channels"] != list(range(len(channels))):
-        raise ValueError(f"CONFIG asks for what this device does not have: {config}")
-    return SAMPLE_BITS[config["format"]]

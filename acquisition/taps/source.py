@@ -14,26 +14,15 @@ from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SerialLink
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
-from acquisition.taps.protocol import (
-    FRAME_OVERHEAD,
-    LOST_BEFORE_FLAG,
-    MAX_FRAME,
-    SAMPLE_BITS,
-    DeviceStatus,
-    EventLog,
-    Frame,
-    FrameDecoder,
-    MessageType,
-    decode_data,
-    encode_frame,
-)
+from acquisition.taps import protocol
+from acquisition.taps.protocol import SAMPLE_BITS, DeviceStatus, EventLog, Frame, FrameDecoder, MessageType
 
 TAPS_PROBE_TIMEOUT = 1.0
 """Time to wait for an answer to HELLO (s)."""
 
 
 def probe_taps(link: SerialLink) -> DeviceIdentity | None:
-    """Send one HELLO and return who answers.
+    """Send HELLO once and return who answers.
 
     Parameters
     ----------
@@ -46,25 +35,22 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
         Identity from INFO, None if no TAPS/1 device answers.
     """
     decoder = FrameDecoder()
-    link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
+    hello = protocol.encode_frame(Frame(MessageType.HELLO))
+    link.write(b"\x00" + hello)  # the zero ends what another program has left half said
     deadline = time.monotonic() + TAPS_PROBE_TIMEOUT
     while (remaining := deadline - time.monotonic()) > 0:
         for frame in decoder.feed(link.read(remaining)):
             if frame.type == MessageType.INFO:
-                return _parse_identity_json(frame.body)
+                try:
+                    return parse_identity(json.loads(frame.body))
+                except (ValueError, AttributeError):
+                    return None
     return None
 
 
 def parse_identity(info: dict[str, Any]) -> DeviceIdentity:
     """Return the identity of the device that sent this INFO."""
     return DeviceIdentity(*(str(info.get(key) or "") for key in ("model", "serial", "fw")))
-
-
-def _parse_identity_json(body: bytes) -> DeviceIdentity | None:
-    try:
-        return parse_identity(json.loads(body))
-    except (ValueError, AttributeError):
-        return None
 
 
 class ScanStream:
@@ -91,14 +77,13 @@ class ScanStream:
             self.foreign += 1
             return None
         try:
-            block = decode_data(frame.body)
+            block = protocol.decode_data(frame.body)
         except ValueError:
+            block = None
+        if block is None or block.codes.shape[0] != self._n_channels or block.first_scan < self._next_scan:
             self.refused += 1
             return None
-        if block.codes.shape[0] != self._n_channels or block.first_scan < self._next_scan:
-            self.refused += 1
-            return None
-        lost = block.first_scan - self._next_scan or int(bool(frame.flags & LOST_BEFORE_FLAG))
+        lost = block.first_scan - self._next_scan or int(bool(frame.flags & protocol.LOST_BEFORE_FLAG))
         self._next_scan = block.first_scan + block.codes.shape[1]
         self.lost_scans += lost
         self.foreign = 0
@@ -145,6 +130,8 @@ class TapsSource(ClosedOnExit):
         self._frames: deque[Frame] = deque()
         self._seq = 0
         self._events = EventLog()
+        self.events: deque[Event] = self._events.new
+        """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
         self._stream: ScanStream | None = None
         self._streaming = False
         self.status: DeviceStatus | None = None
@@ -158,11 +145,6 @@ class TapsSource(ClosedOnExit):
         except BaseException:
             self._link.close()
             raise
-
-    @property
-    def events(self) -> deque[Event]:
-        """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
-        return self._events.new
 
     @property
     def fault(self) -> str:
@@ -199,12 +181,9 @@ class TapsSource(ClosedOnExit):
 
     def close(self) -> None:
         """Stop the device if it still answers, and close the port."""
-        try:
+        with contextlib.suppress(DeviceError):
             self._link.write(self._encode(MessageType.STOP))
-        except DeviceError:
-            pass
-        finally:
-            self._link.close()
+        self._link.close()
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged."""
@@ -220,28 +199,27 @@ class TapsSource(ClosedOnExit):
                 raise self._silent()
 
     def _silent(self) -> DeviceError:
-        restarted = self._stream is not None and self._stream.foreign
-        reason = (
-            "has begun another stream by itself" if restarted else f"has sent no samples for {TAPS_SILENCE_TIMEOUT:g} s"
-        )
-        return DeviceError(
-            f"the DAQ on {self._link.port} {reason}", "switch it off and on and give the same command again"
-        )
+        reason = f"has sent no samples for {TAPS_SILENCE_TIMEOUT:g} s"
+        if self._stream is not None and self._stream.foreign:
+            reason = "has begun another stream by itself"
+        text = f"the DAQ on {self._link.port} {reason}"
+        return DeviceError(text, "switch it off and on and give the same command again")
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
         try:
             info = json.loads(body)
             channels = _parse_channels(info)
-            info["fs_choices"] = _check_rates(info["fs_choices"])
+            rates = [float(rate) for rate in info["fs_choices"]]
+            if not rates or not all(0 < rate < float("inf") for rate in rates):
+                raise ValueError(f"fs_choices={info['fs_choices']} are no sample rates > 0")
+            info["fs_choices"] = rates
             for key in ("model", "serial"):
                 if not info[key]:
                     raise ValueError(f"{key} is empty; the measured sample rate is kept by it")
         except (ValueError, KeyError, TypeError) as error:
-            raise DeviceError(
-                f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error})",
-                "its firmware must send the INFO of TAPS/1",
-            ) from error
+            text = f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error})"
+            raise DeviceError(text, "its firmware must send the INFO of TAPS/1") from error
         return info, channels
 
     def _configure(self, sample_rate: float | None) -> float:
@@ -252,19 +230,15 @@ class TapsSource(ClosedOnExit):
             raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
         form = next(form for form, bits in enumerate(SAMPLE_BITS) if self._info["adc_bits"] <= bits)
         channels = [entry["i"] for entry in self._info["channels"]]
-        fit = (MAX_FRAME - FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
-        config = {
-            "fs": rate,
-            "channels": channels,
-            "format": form,
-            "samples_per_frame": min(max(MIN_SCANS_PER_FRAME, round(self._frame_time * rate)), fit),
-        }
+        fit = (protocol.MAX_FRAME - protocol.FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
+        scans = min(max(MIN_SCANS_PER_FRAME, round(self._frame_time * rate)), fit)
+        config = {"fs": rate, "channels": channels, "format": form, "samples_per_frame": scans}
         self._command(MessageType.CONFIG, json.dumps(config).encode())
         return float(rate)
 
     def _encode(self, kind: MessageType, body: bytes = b"") -> bytes:
         self._seq += 1
-        return encode_frame(Frame(kind, self._seq, body))
+        return protocol.encode_frame(Frame(kind, self._seq, body))
 
     def _command(self, kind: MessageType, body: bytes = b"", answer: MessageType = MessageType.ACK) -> Frame:
         """Send a command and wait for its ACK, or for the one frame it requests."""
@@ -275,10 +249,8 @@ class TapsSource(ClosedOnExit):
                 frame = self._next_frame(remaining)
                 if frame is not None and self._answers(frame, answer):
                     return frame
-        raise DeviceError(
-            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TAPS_COMMAND_TRIES} tries)",
-            "check that this is the DAQ's port and that it is switched on",
-        )
+        text = f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TAPS_COMMAND_TRIES} tries)"
+        raise DeviceError(text, "check that this is the DAQ's port and that it is switched on")
 
     def _next_frame(self, timeout: float) -> Frame | None:
         """Return the next frame in order of arrival, None after the timeout (s)."""
@@ -297,17 +269,9 @@ class TapsSource(ClosedOnExit):
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
         about = int.from_bytes(frame.body[:4], "little")
         if frame.type == MessageType.NACK and about == self._seq:
-            raise DeviceError(
-                f"the DAQ on {self._link.port} refuses a command: {frame.body[6:].decode(errors='replace')}"
-            )
+            text = frame.body[6:].decode(errors="replace")
+            raise DeviceError(f"the DAQ on {self._link.port} refuses a command: {text}")
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
-
-
-def _check_rates(choices: list[float]) -> list[float]:
-    rates = [float(rate) for rate in choices]
-    if not rates or not all(0 < rate < float("inf") for rate in rates):
-        raise ValueError(f"fs_choices={choices} are no sample rates > 0")
-    return rates
 
 
 def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:

@@ -63,23 +63,16 @@ class TextBoardEmulator(EmulatorThread):
         traits: TextBoardTraits | None = None,
     ) -> None:
         super().__init__(tcp)
-        self._signal, self._rate, self._realtime, self._printing = (
-            signal,
-            sample_rate,
-            realtime,
-            printing or OutputFormat(),
-        )
-        self._traits = traits or TextBoardTraits()
+        self._signal, self._rate, self._realtime = signal, sample_rate, realtime
+        self._printing, self._traits = printing or OutputFormat(), traits or TextBoardTraits()
         self._sensitivities, self._full_scale = np.array(sensitivities)[:, None], full_scale
         self._scan, self._begun = 0, time.monotonic()
 
     def serve_once(self) -> bool:
         self.wire.exchange(0.002)
         while self._due():
-            volts = np.clip(
-                self._signal(self._scan, SCANS_PER_PRINT) * self._sensitivities, -self._full_scale, self._full_scale
-            )
-            for k, row in enumerate(volts.T):
+            volts = self._signal(self._scan, SCANS_PER_PRINT) * self._sensitivities
+            for k, row in enumerate(np.clip(volts, -self._full_scale, self._full_scale).T):
                 self._print(self._scan + k, row)
             self._scan += SCANS_PER_PRINT
         return True

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -94,9 +95,8 @@ class TextBoardSource(ClosedOnExit):
         self.events: deque[Event] = deque()
         self.loss_detection = "broken lines"
         self._printing = printing or OutputFormat()
-        self.channels: tuple[Channel, ...] = tuple(
-            replace(sensor.channel, adc_bits=self._printing.bits) for sensor in inputs
-        )
+        bits = self._printing.bits
+        self.channels: tuple[Channel, ...] = tuple(replace(sensor.channel, adc_bits=bits) for sensor in inputs)
         self._rows = [sensor.number for sensor in inputs]
         self._running = False
         self._link = SerialLink(port, self._printing.baud_rate)
@@ -124,10 +124,8 @@ class TextBoardSource(ClosedOnExit):
         """Yield blocks as they arrive. DeviceError if the board is unplugged or prints no samples."""
         scan, last_arrival, overruns = 0, time.monotonic(), self._link.overruns
         while self._running:
-            runs = [
-                run for printed in self._decoder.feed(self._link.read(0.2)) for run in self._counter.split_runs(printed)
-            ]
-            for run in runs:
+            pieces = list(self._decoder.feed(self._link.read(0.2)))
+            for run in chain.from_iterable(map(self._counter.split_runs, pieces)):
                 late, overruns = self._link.overruns - overruns, self._link.overruns
                 lost = max(run.lost_before, late)
                 scan += lost
@@ -135,10 +133,9 @@ class TextBoardSource(ClosedOnExit):
                 scan, last_arrival = scan + run.values.shape[1], time.monotonic()
             if time.monotonic() - last_arrival > BOARD_SILENCE_TIMEOUT:
                 wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
-                raise DeviceError(
-                    f"the board on {self._link.port} has printed no samples for {BOARD_SILENCE_TIMEOUT:g} s",
-                    f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
-                )
+                text = f"the board on {self._link.port} has printed no samples for {BOARD_SILENCE_TIMEOUT:g} s"
+                remedy = f"check its program and baud_rate: it must print counter,{wanted} or {wanted}"
+                raise DeviceError(text, remedy)
 
     def _codes(self, values: Floats) -> Codes:
         """Return the codes of the converter, one row per channel."""
@@ -173,10 +170,9 @@ def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -
         The sample rate is missing, or the inputs are no columns.
     """
     if sample_rate is None:
-        raise ValueError(
-            'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '
-            "lines a second that it was made for: it is measured against the clock"
-        )
+        text = 'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate'
+        cure = "give the number of lines a second that it was made for: it is measured against the clock"
+        raise ValueError(f"{text}; {cure}")
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
         before = ", ".join(map(str, range(len(inputs) - 1)))
         last = f"the inputs {before} and {len(inputs) - 1}" if before else "input 0, and there is one alone"

@@ -18,19 +18,12 @@ import numpy as np
 from acquisition.channel import Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
-from acquisition.vendor_drivers.library_device import (
-    LibraryDevice,
-    LibraryReader,
-    VoltageBlock,
-    check_input_numbers,
-    find_library,
-    load_library,
-)
+from acquisition.vendor_drivers import library_device
+from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
-MODAL_SHOP_MODEL_PATTERN = r"(?P<model>(?:485B|333D|633A|SDC0)\w\w)"
-MODAL_SHOP_NAME_PATTERN = re.compile(
-    MODAL_SHOP_MODEL_PATTERN + r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\d{6})"
-)
+_MODEL = r"(?P<model>(?:485B|333D|633A|SDC0)\w\w)"
+_DATA = r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\d{6})"
+MODAL_SHOP_NAME_PATTERN = re.compile(_MODEL + _DATA)
 
 
 @dataclass(frozen=True)
@@ -69,9 +62,8 @@ def parse_name_calibration(name: str) -> NameCalibration | None:
     half = len(counts) // 2
     factor = 20 if kind == "3" else 1
     scales = tuple(2.0**23 / (factor * int(part)) for part in (counts[:half], counts[half:]))
-    year, month, day = (int(match["date"][k : k + 2]) for k in (0, 2, 4))
-    date = f"20{year:02d}-{month:02d}-{day:02d}"
-    return NameCalibration(match["model"], match["serial"], date, scales, kind == "1")
+    date = "-".join(match["date"][k : k + 2] for k in (0, 2, 4))
+    return NameCalibration(match["model"], match["serial"], f"20{date}", scales, kind == "1")
 
 
 AUDIO_DEFAULT_RATE = 48000.0
@@ -94,12 +86,9 @@ def search_audio() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_audio` takes, empty if the library is not installed.
     """
-    library = find_library("sounddevice")
-    return (
-        [_make_address(entry) for entry in library.query_devices() if entry["max_input_channels"] >= 2]
-        if library
-        else []
-    )
+    library = library_device.find_library("sounddevice")
+    devices = library.query_devices() if library else ()
+    return [_make_address(entry) for entry in devices if entry["max_input_channels"] >= 2]
 
 
 def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
@@ -126,10 +115,10 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     ValueError
         The device does not have an input, range or rate.
     """
-    library = load_library("sounddevice")
+    library = library_device.load_library("sounddevice")
     entry = _find_sound_device(library.query_devices(), port.removeprefix("audio:"))
     numbers = tuple(sensor.number for sensor in inputs)
-    check_input_numbers(numbers, entry["max_input_channels"], entry["name"])
+    library_device.check_input_numbers(inputs, entry["max_input_channels"], entry["name"])
     rate, calibration = sample_rate or AUDIO_DEFAULT_RATE, parse_name_calibration(entry["name"])
     channels = tuple(_calibrate_channel(sensor.channel, sensor.number, calibration) for sensor in inputs)
     try:
@@ -153,16 +142,13 @@ class AudioReader(LibraryReader):
         self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
         self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
         self._blocks = queue.SimpleQueue[VoltageBlock]()
-        self._stream = library.InputStream(
-            rate, round(rate * AUDIO_BLOCK_TIME), index, max(numbers) + 1, "int32", callback=self._keep
-        )
-        if abs(self._stream.samplerate / rate - 1) > 1e-3:
-            actual = self._stream.samplerate
+        size, count = round(rate * AUDIO_BLOCK_TIME), max(numbers) + 1
+        self._stream = library.InputStream(rate, size, index, count, "int32", callback=self._keep)
+        actual = self._stream.samplerate
+        if abs(actual / rate - 1) > 1e-3:
             self._stream.close()
-            raise DeviceError(
-                f"the sound device samples at {actual:g} Hz where {rate:g} Hz was asked",
-                "name its rate as sample_rate_hz in [daq]",
-            )
+            text = f"the sound device samples at {actual:g} Hz where {rate:g} Hz was asked"
+            raise DeviceError(text, "name its rate as sample_rate_hz in [daq]")
 
     def start(self) -> None:
         self._blocks = queue.SimpleQueue()
@@ -187,9 +173,8 @@ class AudioReader(LibraryReader):
 
 def _make_address(entry: dict[str, Any]) -> DeviceAddress:
     calibration = parse_name_calibration(entry["name"])
-    identity = DeviceIdentity(entry["name"], entry["name"])
-    if calibration:
-        identity = DeviceIdentity(calibration.model, calibration.serial)
+    model, serial = (calibration.model, calibration.serial) if calibration else (entry["name"], entry["name"])
+    identity = DeviceIdentity(model, serial)
     return DeviceAddress(f"audio:{entry['name']}", identity, f"{entry['max_input_channels']} inputs")
 
 
@@ -218,8 +203,6 @@ def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibrati
             raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
         scale *= abs(channel.sensitivity)
     if abs(channel.full_scale / scale - 1) > MAX_RANGE_DEVIATION:
-        raise ValueError(
-            f"range_v={channel.full_scale:g}: the calibration of {calibration.model} says {scale:.4g} V for input "
-            f"{number}; write that"
-        )
+        text = f"the calibration of {calibration.model} says {scale:.4g} V for input {number}; write that"
+        raise ValueError(f"range_v={channel.full_scale:g}: {text}")
     return replace(channel, adc_bits=24, full_scale=scale)

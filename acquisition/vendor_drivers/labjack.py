@@ -16,15 +16,8 @@ import numpy as np
 from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
 from acquisition.source import DeviceAddress, DeviceIdentity
-from acquisition.vendor_drivers.library_device import (
-    LibraryDevice,
-    LibraryReader,
-    VoltageBlock,
-    check_input_numbers,
-    convert_open_errors,
-    find_library,
-    load_library,
-)
+from acquisition.vendor_drivers import library_device
+from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
 T7_DEFAULT_RATE = 40000.0
 """Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
@@ -46,8 +39,7 @@ def search_ljm() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_ljm` takes, empty if the library is not installed.
     """
-    library = find_library("labjack.ljm")
-    if library is None:
+    if (library := library_device.find_library("labjack.ljm")) is None:
         return []
     constants = library.constants
     names = {constants.dtT7: "LabJack T7", constants.dtT8: "LabJack T8"}
@@ -80,18 +72,18 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
     ValueError
         The device does not have an input or range.
     """
-    library = load_library("labjack.ljm")
-    numbers = [sensor.number for sensor in inputs]
-    check_input_numbers(numbers, T7_INPUT_COUNT, "a LabJack T7")
+    library = library_device.load_library("labjack.ljm")
+    library_device.check_input_numbers(inputs, T7_INPUT_COUNT, "a LabJack T7")
     for sensor in inputs:
         if sensor.channel.full_scale not in T7_RANGES:
             listed = ", ".join(f"{scale:g}" for scale in T7_RANGES)
             raise ValueError(f"range_v={sensor.channel.full_scale:g} is none of {listed}, the ranges of a LabJack T7")
-    with convert_open_errors(port, library.LJMError), ExitStack() as cleanup:
+    with library_device.convert_errors((library.LJMError,), f"{port} cannot be opened"), ExitStack() as cleanup:
         handle = library.openS("ANY", "ANY", port.removeprefix("ljm:"))
         cleanup.callback(library.close, handle)
         for sensor in inputs:
             library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
+        numbers = [sensor.number for sensor in inputs]
         reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
         serial = library.getHandleInfo(handle)[2]
         firmware = library.eReadName(handle, "FIRMWARE_VERSION")

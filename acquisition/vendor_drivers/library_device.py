@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.arrays import Codes, Floats
-from acquisition.channel import Block, Channel
+from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
@@ -36,10 +36,9 @@ def load_library(module: str) -> Any:  # a module without types
     try:
         return import_module(module)
     except (ImportError, OSError) as error:
-        raise DeviceError(
-            f"the library {package} cannot be used ({' '.join(str(error).split())})",
-            f"pip install 'lobewatch[{EXTRAS[package]}]', and what its maker says it needs (docs/devices.md)",
-        ) from error
+        remedy = f"pip install 'lobewatch[{EXTRAS[package]}]', and what its maker says it needs (docs/devices.md)"
+        text = " ".join(str(error).split())
+        raise DeviceError(f"the library {package} cannot be used ({text})", remedy) from error
 
 
 def find_library(module: str) -> Any | None:  # as above
@@ -51,18 +50,19 @@ def find_library(module: str) -> Any | None:  # as above
 
 
 @contextmanager
-def convert_open_errors(port: str, errors: type[Exception], remedy: str = OPEN_REMEDY) -> Iterator[None]:
-    """Convert errors of a vendor library on opening a device to DeviceError with its port."""
+def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: str = OPEN_REMEDY) -> Iterator[None]:
+    """Convert errors of a vendor library to DeviceError. failure: what cannot be done or has failed."""
     try:
         yield
     except errors as error:
-        raise DeviceError(f"{port} cannot be opened ({' '.join(str(error).split())})", remedy) from error
+        raise DeviceError(f"{failure} ({' '.join(str(error).split())})", remedy) from error
 
 
-def check_input_numbers(numbers: Sequence[int], count: int, device: str) -> None:
-    for number in numbers:
-        if number >= count:
-            raise ValueError(f"input={number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]")
+def check_input_numbers(inputs: Sequence[SensorInput], count: int, device: str) -> None:
+    for sensor in inputs:
+        if sensor.number >= count:
+            text = f"input={sensor.number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]"
+            raise ValueError(text)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,22 +162,13 @@ class LibraryDevice(ClosedOnExit):
                 yield Block(scan, self._codes(block.volts), lost_before=block.lost_before)
                 scan, last_arrival = scan + block.volts.shape[1], time.monotonic()
             elif time.monotonic() - last_arrival > LIBRARY_SILENCE_TIMEOUT:
-                raise DeviceError(
-                    f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s",
-                    "unplug it and plug it in again",
-                )
+                text = f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s"
+                raise DeviceError(text, "unplug it and plug it in again")
 
     def _codes(self, volts: Floats) -> Codes:
         rows = zip(self.channels, volts, strict=True)
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 
-    @contextmanager
-    def _convert_errors(self) -> Iterator[None]:
-        """Convert errors of the library to DeviceError with the address."""
-        try:
-            yield
-        except self.reader.errors as error:
-            text = " ".join(str(error).split())
-            raise DeviceError(
-                f"the DAQ {self.address} has failed ({text})", "check its cable and that no other program uses it"
-            ) from error
+    def _convert_errors(self) -> AbstractContextManager[None]:
+        remedy = "check its cable and that no other program uses it"
+        return convert_errors(self.reader.errors, f"the DAQ {self.address} has failed", remedy)

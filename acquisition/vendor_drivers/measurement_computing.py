@@ -18,16 +18,8 @@ from acquisition.arrays import Floats
 from acquisition.channel import SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
-from acquisition.vendor_drivers.library_device import (
-    OPEN_REMEDY,
-    LibraryDevice,
-    LibraryReader,
-    VoltageBlock,
-    check_input_numbers,
-    convert_open_errors,
-    find_library,
-    load_library,
-)
+from acquisition.vendor_drivers import library_device
+from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
 MCC172_MAX_RATE = 51200.0
 """Highest sample rate (Hz). The others are this rate divided by 2 to 256."""
@@ -47,14 +39,10 @@ def search_mcc172() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_mcc172` takes, empty if the library is not installed.
     """
-    library = find_library("daqhats")
-    if library is None:
+    if (library := library_device.find_library("daqhats")) is None:
         return []
-    boards = library.hat_list(filter_by_id=library.HatIDs.MCC_172)
-    return [
-        DeviceAddress(f"mcc172:{board.address}", DeviceIdentity("MCC 172"), f"{board.product_name}, 2 inputs")
-        for board in boards
-    ]
+    boards, identity = library.hat_list(filter_by_id=library.HatIDs.MCC_172), DeviceIdentity("MCC 172")
+    return [DeviceAddress(f"mcc172:{board.address}", identity, f"{board.product_name}, 2 inputs") for board in boards]
 
 
 def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
@@ -81,15 +69,15 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     ValueError
         The address, an input or a range does not exist.
     """
-    library = load_library("daqhats")
+    library = library_device.load_library("daqhats")
     address = port.removeprefix("mcc172:")
     if not address.isdigit():
         raise ValueError(f"port={port!r}: mcc172: is followed by the address of the board, 0 to 7, as in mcc172:0")
-    check_input_numbers([sensor.number for sensor in inputs], 2, "an MCC 172")
+    library_device.check_input_numbers(inputs, 2, "an MCC 172")
     for sensor in inputs:
         if sensor.channel.full_scale != MCC172_FULL_SCALE:
             raise ValueError(f"range_v={sensor.channel.full_scale:g}: an MCC 172 has {MCC172_FULL_SCALE:g} V alone")
-    with convert_open_errors(port, library.HatError):
+    with library_device.convert_errors((library.HatError,), f"{port} cannot be opened"):
         board = library.mcc172(int(address))
         for sensor in inputs:
             board.iepe_config_write(sensor.number, int(sensor.iepe))
@@ -157,13 +145,10 @@ def search_uldaq() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_uldaq` takes, empty if the library is not installed.
     """
-    library = find_library("uldaq")
-    if library is None:
+    if (library := library_device.find_library("uldaq")) is None:
         return []
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
-    return [
-        DeviceAddress(f"uldaq:{entry.unique_id}", _read_uldaq_identity(entry), entry.product_name) for entry in devices
-    ]
+    return [DeviceAddress(f"uldaq:{box.unique_id}", _read_uldaq_identity(box), box.product_name) for box in devices]
 
 
 def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
@@ -190,23 +175,21 @@ def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     ValueError
         The device does not have an input or range.
     """
-    library = load_library("uldaq")
+    library = library_device.load_library("uldaq")
     wanted = port.removeprefix("uldaq:")
-    entries = [
-        entry
-        for entry in library.get_daq_device_inventory(library.InterfaceType.USB)
-        if entry.unique_id.casefold() == wanted.casefold()
-    ]
-    if not entries:
-        raise DeviceError(f"{wanted!r} is not plugged in", OPEN_REMEDY)
-    device = library.DaqDevice(entries[0])
-    with convert_open_errors(port, library.ULException, "check that no other program uses it"), ExitStack() as cleanup:
+    listed = library.get_daq_device_inventory(library.InterfaceType.USB)
+    entry = next((entry for entry in listed if entry.unique_id.casefold() == wanted.casefold()), None)
+    if entry is None:
+        raise DeviceError(f"{wanted!r} is not plugged in", library_device.OPEN_REMEDY)
+    device = library.DaqDevice(entry)
+    errors, remedy = (library.ULException,), "check that no other program uses it"
+    with library_device.convert_errors(errors, f"{port} cannot be opened", remedy), ExitStack() as cleanup:
         cleanup.callback(device.release)
         device.connect()
         reader = UldaqReader(library, device, inputs, sample_rate or ULDAQ_DEFAULT_RATE)
         cleanup.pop_all()
     channels = tuple(replace(sensor.channel, adc_bits=reader.bits) for sensor in inputs)
-    return LibraryDevice(port, reader, _read_uldaq_identity(entries[0]), channels, reader.rate, "scan count")
+    return LibraryDevice(port, reader, _read_uldaq_identity(entry), channels, reader.rate, "scan count")
 
 
 class UldaqReader(LibraryReader):
@@ -219,10 +202,10 @@ class UldaqReader(LibraryReader):
         info = self._inputs.get_info()
         numbers = [sensor.number for sensor in inputs]
         self._mode = library.AiInputMode.SINGLE_ENDED
-        check_input_numbers(numbers, info.get_num_chans_by_mode(self._mode), device.get_descriptor().product_name)
-        self._range = _find_uldaq_range(
-            library, info.get_ranges(self._mode), {sensor.channel.full_scale for sensor in inputs}
-        )
+        count, name = info.get_num_chans_by_mode(self._mode), device.get_descriptor().product_name
+        library_device.check_input_numbers(inputs, count, name)
+        wanted = {sensor.channel.full_scale for sensor in inputs}
+        self._range = _find_uldaq_range(library, info.get_ranges(self._mode), wanted)
         self._first, self._last = min(numbers), max(numbers)
         self._rows = [number - self._first for number in numbers]
         self.bits = int(info.get_resolution())
@@ -272,6 +255,5 @@ def _find_uldaq_range(library: Any, ranges: Sequence[Any], wanted: set[float]) -
     if len(wanted) == 1 and names.issuperset(volts.values()):
         return getattr(library.Range, *volts.values())
     bipolar = sorted(name.removeprefix("BIP").removesuffix("VOLTS") for name in names if name.startswith("BIP"))
-    listed = ", ".join(bipolar)
     given = " and ".join(f"{scale:g}" for scale in sorted(wanted))
-    raise ValueError(f"range_v={given}: both inputs need one range of this device: {listed} V")
+    raise ValueError(f"range_v={given}: both inputs need one range of this device: {', '.join(bipolar)} V")

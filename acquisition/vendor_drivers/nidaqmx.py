@@ -11,15 +11,8 @@ import numpy as np
 
 from acquisition.channel import Channel, SensorInput
 from acquisition.source import DeviceAddress, DeviceIdentity
-from acquisition.vendor_drivers.library_device import (
-    LibraryDevice,
-    LibraryReader,
-    VoltageBlock,
-    check_input_numbers,
-    convert_open_errors,
-    find_library,
-    load_library,
-)
+from acquisition.vendor_drivers import library_device
+from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
 NIDAQMX_BLOCK_TIME = 0.02
 """Length of a block (s)."""
@@ -37,18 +30,15 @@ def search_nidaqmx() -> Sequence[DeviceAddress]:
     Sequence of DeviceAddress
         Addresses that `open_nidaqmx` takes, empty if the library or NI's driver is not installed.
     """
-    if find_library("nidaqmx") is None:
+    if library_device.find_library("nidaqmx") is None:
         return []
     try:
-        devices = [*load_library("nidaqmx.system").System.local().devices]
+        devices = [*library_device.load_library("nidaqmx.system").System.local().devices]
         listed = [(device, len(device.ai_physical_chans)) for device in devices]
-    except load_library("nidaqmx.errors").Error:  # NI's own driver is not installed
+    except library_device.load_library("nidaqmx.errors").Error:  # NI's own driver is not installed
         return []
-    return [
-        DeviceAddress(f"nidaqmx:{device.name}", _read_identity(device), f"{count} inputs")
-        for device, count in listed
-        if count >= 2
-    ]
+    usable = [(device, f"{count} inputs") for device, count in listed if count >= 2]
+    return [DeviceAddress(f"nidaqmx:{device.name}", _read_identity(device), text) for device, text in usable]
 
 
 def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
@@ -77,10 +67,11 @@ def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | 
     ValueError
         The device does not have an input.
     """
-    library = load_library("nidaqmx")
-    with convert_open_errors(port, load_library("nidaqmx.errors").Error), ExitStack() as cleanup:
-        device = load_library("nidaqmx.system").Device(port.removeprefix("nidaqmx:"))
-        check_input_numbers([sensor.number for sensor in inputs], len(device.ai_physical_chans), device.product_type)
+    library = library_device.load_library("nidaqmx")
+    errors = (library_device.load_library("nidaqmx.errors").Error,)
+    with library_device.convert_errors(errors, f"{port} cannot be opened"), ExitStack() as cleanup:
+        device = library_device.load_library("nidaqmx.system").Device(port.removeprefix("nidaqmx:"))
+        library_device.check_input_numbers(inputs, len(device.ai_physical_chans), device.product_type)
         task = library.Task()
         cleanup.callback(task.close)
         channels = tuple(_add_input(task, device, sensor) for sensor in inputs)
@@ -95,9 +86,9 @@ class NidaqmxReader(LibraryReader):
 
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:
         """Take the task with its inputs and its rate (Hz)."""
-        self.errors: tuple[type[Exception], ...] = (load_library("nidaqmx.errors").Error,)
+        self.errors: tuple[type[Exception], ...] = (library_device.load_library("nidaqmx.errors").Error,)
         self._task = task
-        self._reader = load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
+        self._reader = library_device.load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
         self._shape = n_channels, round(rate * NIDAQMX_BLOCK_TIME)
 
     def start(self) -> None:
@@ -133,7 +124,7 @@ def _read_identity(device: Any) -> DeviceIdentity:
 
 def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
     """Add an input to the task, powered if it feeds its sensor. Return the channel with its real range."""
-    constants = load_library("nidaqmx.constants")
+    constants = library_device.load_library("nidaqmx.constants")
     scale = sensor.channel.full_scale
     entry = task.ai_channels.add_ai_voltage_chan(f"{device.name}/ai{sensor.number}", min_val=-scale, max_val=scale)
     currents = device.ai_current_int_excit_discrete_vals
@@ -146,6 +137,6 @@ def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
 
 def _set_rate(task: Any, rate: float) -> float:
     """Set the clock of a task and return the real sample rate (Hz)."""
-    continuous = load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
+    continuous = library_device.load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
     task.timing.cfg_samp_clk_timing(rate, sample_mode=continuous, samps_per_chan=round(rate * NIDAQMX_BUFFER_TIME))
     return float(task.timing.samp_clk_rate)

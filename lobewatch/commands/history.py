@@ -38,8 +38,9 @@ def history(
     if hdf5 is not None:
         from lobes import write_history
         from lobewatch.history.export_columns import make_export_columns
+        from lobewatch.show.terminal.option_names import with_option_names
 
-        write_history(hdf5, make_export_columns(logbook.history, logbook.machine))
+        write_history(hdf5, make_export_columns(logbook.history, logbook.machine, with_option_names))
     if as_csv:
         results.out(history_csv(logbook), end="", highlight=False)
     else:

@@ -23,7 +23,7 @@ def ports(
       lobewatch ports --port /dev/pts/3
     """
     from acquisition.devices import scan_ports
-    from lobewatch.show.ports import ports_json, ports_texts
+    from lobewatch.show.sensors import ports_json, ports_texts
 
     survey = scan_ports(port)
     emit(ports_json(survey), as_json, *ports_texts(survey))

@@ -30,7 +30,7 @@ def suggest(
     from lobewatch.cuts.learning.pocket_depth import choose_first_depth, find_pocket_depths
     from lobewatch.cuts.learning.program_learning import find_next_cut, find_program
     from lobewatch.logbook import Logbook
-    from lobewatch.show.cuts.suggested_cuts import (
+    from lobewatch.show.cuts.recorded_cuts import (
         learned_remarks,
         learned_texts,
         speed_pocket_table,

@@ -65,8 +65,7 @@ def tap(
     from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status
     from lobewatch.show.measurement import emit_tap_results
-    from lobewatch.show.terminal.tap_printer import TapPrinter
-    from lobewatch.show.terminal.terminal_screen import TerminalScreen
+    from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped
     from lobewatch.tap.session import TapSession, plan_session
     from lobewatch.tap.visit import TapVisit, choose_first_direction

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -13,14 +13,8 @@ from numpy.typing import NDArray
 from acquisition import Conditions
 from lobes import SldHistory, StabilityLobes
 from lobewatch.arrays import Floats
-from lobewatch.history.history import (
-    ESTIMATE_UNITS,
-    MAX_STORED_MODES,
-    MODEL_VALUE_UNITS,
-    History,
-    HistoryRow,
-    ModeValues,
-)
+from lobewatch.history import history as stored
+from lobewatch.history.history import ESTIMATE_UNITS, MODEL_VALUE_UNITS, History, HistoryRow
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import compute_tip_lobes, speed_grid
 from lobewatch.verdicts.verdict import StoredVerdict
@@ -33,27 +27,27 @@ CONDITION_UNITS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": 
 CONDITION_TEXT_COLUMNS = ("state", "note")
 
 
-def make_export_columns(history: History, machine: Machine) -> SldHistory:
-    """Make the columns for `lobes.write_history`."""
+def make_export_columns(history: History, machine: Machine, render: Callable[[str], str] = str) -> SldHistory:
+    """Make the columns for `lobes.write_history`; render: translates the names in remarks."""
     rows, programs = history.rows, [program.name for program in machine.program]
     columns: dict[str, Any] = {name: _text_column(getattr(row, name) for row in rows) for name in TEXT_COLUMNS}
     columns["time"] = _text_column(row.time.isoformat() for row in rows)
     columns["baseline"] = _text_column(row.baseline.isoformat() if row.baseline else "" for row in rows)
-    columns["notes"] = _text_column("\n".join(map(str, row.remarks)) for row in rows)
-    columns["remarks"] = _text_column(_encode_json([asdict(remark) for remark in row.remarks]) for row in rows)
+    columns["notes"] = _text_column(render("\n".join(map(str, row.remarks))) for row in rows)
+    remarks = (msgspec.json.encode([asdict(remark) for remark in row.remarks]).decode() for row in rows)
+    columns["remarks"] = _text_column(map(render, remarks))
     columns |= _condition_columns([row.conditions for row in rows])
     for name in ESTIMATE_UNITS:
         columns[name], columns[f"{name}_std"] = _number_column([getattr(row, name) for row in rows], 2).T
     for name in MODEL_VALUE_UNITS:
         columns[name] = _number_column([getattr(row, name) for row in rows])
-    table = np.full((len(rows), MAX_STORED_MODES, len(MODE_COLUMNS)), np.nan)
+    table = np.full((len(rows), stored.MAX_STORED_MODES, len(MODE_COLUMNS)), np.nan)
     for i, row in enumerate(rows):
         table[i, : len(row.modes)] = np.reshape(row.modes, (-1, len(MODE_COLUMNS)))
     columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
     if programs:
-        columns["program_limit"] = _number_column(
-            [_program_limits(row.verdicts, programs) for row in rows], len(programs)
-        )
+        limits = [_program_limits(row.verdicts, programs) for row in rows]
+        columns["program_limit"] = _number_column(limits, len(programs))
         columns["program_verdict"] = _text_column(_program_verdicts(row.verdicts, programs) for row in rows)
     speeds = speed_grid(machine)
     depth = _lobe_depths(rows, machine, speeds)
@@ -70,7 +64,7 @@ def compute_row_lobes(
     return compute_tip_lobes(row.tool, _to_modes(row.x), _to_modes(row.y), machine, names)
 
 
-def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
+def _to_modes(values: Sequence[stored.ModeValues]) -> list[Mode]:
     return [Mode(frequency, damping, stiffness, phase_deg=phase) for frequency, damping, stiffness, phase in values]
 
 
@@ -80,20 +74,15 @@ def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -
     diagrams = [compute_row_lobes(row, machine) for row in rows]
     return {
         name: _number_column([lobes[name].depth if name in lobes else nowhere for lobes in diagrams], speeds.size)
-        for name in machine.cut_names
+        for name in machine.cut_tables
     }
 
 
 def _condition_columns(conditions: Sequence[Conditions]) -> dict[str, NDArray[Any]]:
     stated = [under.specified for under in conditions]
-    numbers = {
-        name: np.array([under.get(name, np.nan) for under in stated], dtype=np.float64) for name in CONDITION_UNITS
-    }
-    texts = {
-        name: np.array([under.get(name, "") for under in stated], dtype=np.str_) for name in CONDITION_TEXT_COLUMNS
-    }
-    reclamped = np.array([under.reclamped for under in conditions], dtype=np.float64)
-    return {**numbers, **texts, "reclamped": reclamped}
+    numbers = {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
+    texts = {name: _text_column(under.get(name, "") for under in stated) for name in CONDITION_TEXT_COLUMNS}
+    return {**numbers, **texts, "reclamped": _number_column([under.reclamped for under in conditions])}
 
 
 def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:
@@ -112,7 +101,3 @@ def _text_column(values: Any) -> NDArray[np.str_]:
 
 def _number_column(values: Sequence[Any], *width: int) -> Floats:
     return np.array(values, dtype=np.float64).reshape(len(values), *width)
-
-
-def _encode_json(value: Any) -> str:
-    return msgspec.json.encode(value).decode()

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Remark
-from dsm import Calibration
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
@@ -33,8 +33,6 @@ MODEL_VALUE_UNITS = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"
 """Units of the values of the model."""
 ModeValues = tuple[float, float, float, float]
 """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of a mode."""
-WatchedEstimates = Sequence[tuple[float, float]]
-"""Monitored values with their standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +103,8 @@ class HistoryRow:
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
 
     @property
-    def watched(self) -> WatchedEstimates:
-        """Monitored values."""
+    def watched(self) -> Sequence[tuple[float, float]]:
+        """Monitored values with their standard errors."""
         return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
 
     @property
@@ -152,7 +150,7 @@ class History:
         """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
 
-    def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict]) -> History:
+    def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict] | None) -> History:
         """Return the history with the verdicts after one of its rows.
 
         Parameters
@@ -160,7 +158,7 @@ class History:
         number
             Index of the row.
         verdicts
-            Stored verdicts by name of the program.
+            Stored verdicts by name of the program; None clears them.
         """
         row = replace(self.rows[number], verdicts=verdicts)
         return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
@@ -183,52 +181,23 @@ def make_empty_history(machine: Machine) -> History:
     return History(machine.settings_hash, f"lobewatch {CURRENT_SOFTWARE.lobewatch}", ())
 
 
-def clear_newest_verdicts(history: History) -> History:
-    """Return the history without the verdicts after the newest tap test."""
-    *before, last = history.rows
-    return replace(history, rows=(*before, replace(last, verdicts=None)))
-
-
 def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
     """Make the row of a measurement, with tip modes and remarks of its assembly."""
-    frequency, damping_ratio, stiffness, phase = _mode_estimates(m.followed)
-    calibration = m.calibration
-    return HistoryRow(
-        tap_id=m.tap_id,
-        time=m.time,
-        tool=m.tool,
-        direction=m.direction,
-        baseline=place.baseline,
-        series=place.series,
-        conditions=place.entry.conditions,
-        operator=place.entry.operator,
-        frequency=frequency,
-        damping_ratio=damping_ratio,
-        stiffness=stiffness,
-        phase_deg=phase,
-        bearing_stiffness=_bearing_estimate(calibration),
-        static_tip_stiffness=calibration.static_stiffness_after if calibration else np.nan,
-        modal_tip_stiffness=calibration.modal_stiffness_after if calibration else np.nan,
-        modes=_mode_values(m.modes[:MAX_STORED_MODES]),
-        remarks=tuple(assembly.remarks),
-        x=_mode_values(assembly.x or ()),
-        y=_mode_values(assembly.y or ()),
-    )
-
-
-def _mode_estimates(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate, Estimate]:
-    if mode is None:
-        return UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE, UNKNOWN_ESTIMATE
-    values = mode.frequency, mode.damping_ratio, mode.stiffness
-    frequency, damping_ratio, stiffness = map(Estimate, values, mode.standard_error.tolist())
-    return frequency, damping_ratio, stiffness, Estimate(mode.phase_deg, mode.phase_deg_std)
-
-
-def _bearing_estimate(calibration: Calibration | None) -> Estimate:
-    if calibration is None:
-        return UNKNOWN_ESTIMATE
-    std = calibration.bearing_stiffness_std
-    return Estimate(calibration.bearing_stiffness, np.nan if std is None else std)
+    values: dict[str, Any] = {}
+    if m.followed is not None:
+        numbers = m.followed.frequency, m.followed.damping_ratio, m.followed.stiffness
+        values = dict(zip(WATCHED_VALUES[:3], map(Estimate, numbers, m.followed.standard_error.tolist()), strict=True))
+        values["phase_deg"] = Estimate(m.followed.phase_deg, m.followed.phase_deg_std)
+    if m.calibration is not None:
+        std = m.calibration.bearing_stiffness_std
+        values["bearing_stiffness"] = Estimate(m.calibration.bearing_stiffness, np.nan if std is None else std)
+        values["static_tip_stiffness"] = m.calibration.static_stiffness_after
+        values["modal_tip_stiffness"] = m.calibration.modal_stiffness_after
+    values |= {"baseline": place.baseline, "series": place.series, "remarks": tuple(assembly.remarks)}
+    values |= {"conditions": place.entry.conditions, "operator": place.entry.operator}
+    modes = {"modes": m.modes[:MAX_STORED_MODES], "x": assembly.x or (), "y": assembly.y or ()}
+    values |= {name: _mode_values(part) for name, part in modes.items()}
+    return HistoryRow(m.tap_id, m.time, m.tool, m.direction, **values)
 
 
 def _mode_values(modes: Sequence[Mode]) -> tuple[ModeValues, ...]:
@@ -242,22 +211,21 @@ OLDER_VERSION_CODE, KEPT_ROW_CODE = "row-of-older-version", "row-kept"
 def keep_older_row(row: HistoryRow, place: TapPlace, error: Exception) -> HistoryRow:
     """Return the row of an older version if this version cannot analyse the tap test."""
     text = f"as {row.software} worked it out: this version cannot ({error})"
-    others = [remark for remark in row.remarks if remark.code != OLDER_VERSION_CODE]
-    remarks = (
-        *others,
-        Remark(OLDER_VERSION_CODE, f"tap test {row.tap_id}", text, "exclude it where it does not count"),
-    )
-    under = place.entry.conditions
-    return replace(row, baseline=place.baseline, series=place.series, conditions=under, remarks=remarks)
+    remark = Remark(OLDER_VERSION_CODE, f"tap test {row.tap_id}", text, "exclude it where it does not count")
+    row = replace(row, baseline=place.baseline, series=place.series, conditions=place.entry.conditions)
+    return _set_remark(row, remark)
+
+
+def _set_remark(row: HistoryRow, remark: Remark) -> HistoryRow:
+    """Return a row with a remark in place of those of the same code."""
+    return replace(row, remarks=(*(other for other in row.remarks if other.code != remark.code), remark))
 
 
 def keep_unusable_row(row: HistoryRow, software: str) -> HistoryRow:
     """Return the row of a tap test with an unusable file; software: default version of the row."""
-    software_then = row.software or software
-    text = f"its file cannot be used: as {software_then} worked it out, and counts for nothing"
-    others = [remark for remark in row.remarks if remark.code != KEPT_ROW_CODE]
-    remark = Remark(KEPT_ROW_CODE, f"taps/{row.tap_id}.h5", text, "put it back from a backup")
-    return replace(row, software=software_then, remarks=(*others, remark))
+    row = replace(row, software=row.software or software)
+    text = f"its file cannot be used: as {row.software} worked it out, and counts for nothing"
+    return _set_remark(row, Remark(KEPT_ROW_CODE, f"taps/{row.tap_id}.h5", text, "put it back from a backup"))
 
 
 def find_older_version_remarks(history: History | None) -> list[Remark]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import zip_longest
 from operator import is_
@@ -32,21 +32,17 @@ class HistoryCache:
         self._folder = folder
         self._rows: list[HistoryRow] = []
         self._contents: list[bytes] = []
-        self._others: dict[str, HistoryRow] = {}
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
         self._fitting: tuple[Sequence[TapPlace], int] = (), 0
         self._hashes: dict[str, str] = {}
+        self.other_rows: dict[str, HistoryRow] = {}
+        """Rows of other settings or versions by tap test."""
         self.remarks: list[Remark] = []
         """Reasons why something was not written."""
         self.reusable: ReusableRows | None = None
         """Rows that were read behind those that `read` gave; None where there are none."""
-
-    @property
-    def other_rows(self) -> Mapping[str, HistoryRow]:
-        """Rows of other settings or versions by tap test."""
-        return self._others
 
     def read(self, files: UsableTaps) -> History:
         """Read the oldest rows that are valid for these settings and this version.
@@ -54,15 +50,15 @@ class HistoryCache:
         Rows of tap tests with unusable files are kept aside.
         """
         empty, lost_ids = make_empty_history(self._folder.machine), {entry.id for entry in files.lost}
-        hashes = _hash_programs(self._folder.machine, files.cuts)
+        hashes = _hash_programs(self._folder.machine, files.contents.cuts)
         if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
             self._hashes = hashes
             self._read(_cache_header(empty))
-        stored = {row.tap_id: row for row in self._rows} | self._others if lost_ids else {}
+        stored = {row.tap_id: row for row in self._rows} | self.other_rows if lost_ids else {}
         kept = tuple(keep_unusable_row(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
         valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
-        self.reusable = ReusableRows(self._rows, files.by_id, files.baselines) if changed else None
+        self.reusable = ReusableRows(self._rows, files.by_id, files.contents.baselines) if changed else None
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def _count_fitting(self, places: Sequence[TapPlace]) -> int:
@@ -98,7 +94,7 @@ class HistoryCache:
     def _read(self, head: bytes) -> None:
         self._stamp, self._fitting = self._stamp_now, ((), 0)
         self._rows, self._contents, self._size, self._length = [], [], 0, 0
-        self._others, self._aside, hashes = {}, [], self._hashes
+        self.other_rows, self._aside, hashes = {}, [], self._hashes
         try:
             stored = read_rows(self._folder.history_path)
             is_current = stored.rows[:1] == (head,)
@@ -106,13 +102,13 @@ class HistoryCache:
             for content in stored.rows[1:]:
                 number, row = decode_row(content, hashes, software)
                 if number < 0 or not is_current:
-                    self._others[row.tap_id] = row
+                    self.other_rows[row.tap_id] = row
                     self._aside.append(content)
                 else:
                     self._rows[number : number + 1] = [row]
                     self._contents[number : number + 1] = [content]
         except (ValueError, OSError):
-            self._rows, self._contents, self._others, self._aside = [], [], {}, []
+            self._rows, self._contents, self.other_rows, self._aside = [], [], {}, []
         else:
             self._size, self._length = stored.sound_bytes if is_current else 0, stored.file_bytes
 
@@ -131,13 +127,8 @@ class HistoryCache:
         fresh = [content for content, stored in pairs if content is not stored and content != stored]
         aside = [encode_row(UNPLACED_ROW_NUMBER, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MAX_OBSOLETE_BYTES
-        if (
-            self._size
-            and aside == self._aside
-            and path.exists()
-            and self._size + sum(map(len, fresh)) < most
-            and contents[len(self._contents) - 1 :]
-        ):
+        grows = contents[len(self._contents) - 1 :] and self._size + sum(map(len, fresh)) < most
+        if self._size and aside == self._aside and path.exists() and grows:
             self._length = append_rows(path, self._size, fresh) if fresh else self._length
         else:
             self._length = write_rows(path, [_cache_header(history), *contents, *aside])

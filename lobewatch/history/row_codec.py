@@ -41,7 +41,7 @@ class RowRecord(msgspec.Struct, array_like=True, gc=False):
     operator: str = ""
 
 
-CONVERTED_FIELDS = ("number", "time", "baseline", "conditions", "verdicts", "software")
+CONVERTED_FIELDS = ("number", "time", "baseline", "conditions", "verdicts")
 """Fields with another form than in a row."""
 SHARED_FIELDS = tuple(name for name in RowRecord.__struct_fields__ if name not in CONVERTED_FIELDS)
 """Fields with the same form as in a row."""
@@ -50,17 +50,11 @@ _encode_record, _decode_record = msgspec.msgpack.Encoder().encode, msgspec.msgpa
 
 def encode_row(number: int, row: HistoryRow, hashes: Mapping[str, str]) -> bytes:
     """Encode a row with its number, -1 for one outside of the history; hashes: of the programs by name."""
-    return _encode_record(
-        RowRecord(
-            number=number,
-            time=row.time.isoformat(),
-            baseline=row.baseline.isoformat() if row.baseline else "",
-            conditions=row.conditions.specified,
-            verdicts={name: (hashes[name], verdict) for name, verdict in (row.verdicts or {}).items()},
-            software=row.software,
-            **{name: getattr(row, name) for name in SHARED_FIELDS},
-        )
-    )
+    values: dict[str, Any] = {name: getattr(row, name) for name in SHARED_FIELDS}
+    values |= {"number": number, "time": row.time.isoformat(), "conditions": row.conditions.specified}
+    values["baseline"] = row.baseline.isoformat() if row.baseline else ""
+    values["verdicts"] = {name: (hashes[name], verdict) for name, verdict in (row.verdicts or {}).items()}
+    return _encode_record(RowRecord(**values))
 
 
 def decode_row(content: bytes, hashes: Mapping[str, str], software: str = "") -> tuple[int, HistoryRow]:
@@ -69,15 +63,11 @@ def decode_row(content: bytes, hashes: Mapping[str, str], software: str = "") ->
     software: version of a row that does not state it; empty for this version.
     """
     record = _decode_record(content)
-    verdicts = {
-        name: verdict for name, (made_with, verdict) in record.verdicts.items() if hashes.get(name) == made_with
-    }
-    row = HistoryRow(
-        **{name: getattr(record, name) for name in SHARED_FIELDS},
-        time=datetime.fromisoformat(record.time),
-        baseline=datetime.fromisoformat(record.baseline) if record.baseline else None,
-        conditions=Conditions.from_mapping(record.conditions) if record.conditions else UNKNOWN_CONDITIONS,
-        verdicts=verdicts if verdicts or not hashes else None,
-        software=record.software or software,
-    )
-    return record.number, row
+    values = {name: getattr(record, name) for name in SHARED_FIELDS}
+    values |= {"time": datetime.fromisoformat(record.time), "software": record.software or software}
+    values["baseline"] = datetime.fromisoformat(record.baseline) if record.baseline else None
+    values["conditions"] = Conditions.from_mapping(record.conditions) if record.conditions else UNKNOWN_CONDITIONS
+    stored = record.verdicts.items()
+    verdicts = {name: verdict for name, (made_with, verdict) in stored if hashes.get(name) == made_with}
+    values["verdicts"] = verdicts if verdicts or not hashes else None
+    return record.number, HistoryRow(**values)

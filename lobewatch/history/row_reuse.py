@@ -11,14 +11,13 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from typing import NamedTuple
 
 from acquisition import Remark
 from lobewatch.history.history import HistoryRow, ModeValues
 from lobewatch.history.row_codec import encode_row
 from lobewatch.machine import TapEntry
 from lobewatch.tool.assembly import MAX_DIRECTION_AGE
-from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier, order_taps
+from lobewatch.tool.tap_series import FollowedMode, TapOrder, TapPlace, iterate_earlier
 
 
 class FollowedModeIndex:
@@ -31,8 +30,11 @@ class FollowedModeIndex:
 
     def before(self, place: TapPlace, rows: Sequence[HistoryRow]) -> dict[str, list[FollowedMode]]:
         """Return the earlier modes of the series of a tap test by direction; rows: at least the history before it."""
-        for number in range(self._rows, len(rows)):
-            self._add(number, rows[number])
+        for number, row in enumerate(rows[self._rows :], self._rows):
+            if math.isfinite(row.frequency.value) and not row.questions:
+                mode = FollowedMode(row.time, *row.followed)
+                self._modes.setdefault(row.series, {}).setdefault(row.direction, []).append(mode)
+                self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
         self._rows = max(self._rows, len(rows))
         numbers = self._numbers.get(place.series, {})
         earlier = {
@@ -40,13 +42,6 @@ class FollowedModeIndex:
             for direction, modes in self._modes.get(place.series, {}).items()
         }
         return {"x": [], "y": [], **earlier}
-
-    def _add(self, number: int, row: HistoryRow) -> None:
-        values = row.followed
-        if math.isfinite(values[0]) and not row.questions:
-            mode = FollowedMode(row.time, *values)
-            self._modes.setdefault(row.series, {}).setdefault(row.direction, []).append(mode)
-            self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
 
 
 def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
@@ -56,19 +51,9 @@ def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
     return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted), str(tap.by_hand))
 
 
-class _RowBasis(NamedTuple):
-    """Inputs of a result besides its own file."""
-
-    mounting_remarks: tuple[Remark, ...]
-    """Remarks on its mounting."""
-    previous_mode: ModeValues | None
-    """Followed mode before it."""
-    other_tap: str
-    """Tap test of the other direction; empty without one."""
-    cross_tap: str
-    """Cross FRF of its principal directions; empty without one."""
-    nearby_modes: tuple[FollowedMode, ...]
-    """Modes that shift an older direction."""
+_RowBasis = tuple[str, str, ModeValues | None, tuple[Remark, ...], tuple[FollowedMode, ...]]
+"""Inputs of a result besides its own file: tap test of the other direction and cross FRF (empty without one), followed
+mode before it, remarks on its mounting, and modes that shift an older direction."""
 
 
 class _RowArchive:
@@ -78,21 +63,19 @@ class _RowArchive:
         self.places, self.rows = ordered, rows
         self._followed = FollowedModeIndex()
 
-    def ground(self, place: TapPlace) -> _RowBasis:
+    def basis_of(self, place: TapPlace) -> _RowBasis:
         before = (self.rows[number] for number in iterate_earlier(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
         if place.other_direction is None:
-            return _RowBasis(place.remarks, last, "", cross, ())
+            return "", cross, last, place.remarks, ()
         other = self.places[place.other_direction].entry
-        return _RowBasis(place.remarks, last, other.id, cross, self._near(place, datetime.fromisoformat(other.time)))
-
-    def _near(self, place: TapPlace, then: datetime) -> tuple[FollowedMode, ...]:
-        if datetime.fromisoformat(place.entry.time) - then <= MAX_DIRECTION_AGE:
-            return ()
+        if place.entry.created - other.created <= MAX_DIRECTION_AGE:
+            return other.id, cross, last, place.remarks, ()
         points = self._followed.before(place, self.rows)[place.entry.direction]
-        behind = bisect_right(points, then, key=lambda point: point.time)
-        return (*points[max(behind - 1, 0) : behind + 1], *points[-1:])
+        behind = bisect_right(points, other.created, key=lambda point: point.time)
+        near = (*points[max(behind - 1, 0) : behind + 1], *points[-1:])
+        return other.id, cross, last, place.remarks, near
 
 
 class ReusableRows:
@@ -100,10 +83,9 @@ class ReusableRows:
 
     def __init__(self, rows: Sequence[HistoryRow], taps: Mapping[str, TapEntry], baselines: Sequence[datetime]) -> None:
         entries = [taps[row.tap_id] for row in rows if row.tap_id in taps]
-        then = order_taps(entries, baselines) if len(entries) == len(rows) else []
-        known = then and all(
-            (row.baseline, row.series) == (place.baseline, place.series) for row, place in zip(rows, then, strict=True)
-        )
+        then = TapOrder(baselines, entries).places if len(entries) == len(rows) else []
+        pairs = zip(rows, then, strict=True) if then else ()
+        known = then and all((row.baseline, row.series) == (place.baseline, place.series) for row, place in pairs)
         self._then = _RowArchive(then, rows)
         self._numbers = {row.tap_id: number for number, row in enumerate(rows)} if known else {}
         self._alike: set[str] = set()
@@ -122,10 +104,8 @@ class ReusableRows:
         row, then = self._then.rows[number], self._then.places[number]
         if row.software or not is_row_of(row, place):
             return None
-        ground = self._now.ground(place)
-        if ground != self._then.ground(then) or (
-            ground.other_tap and not self._is_alike(ground.other_tap, rows, place)
-        ):
+        basis = self._now.basis_of(place)
+        if basis != self._then.basis_of(then) or (basis[0] and not self._is_alike(basis[0], rows, place)):
             return None
         self._alike.add(row.tap_id)
         return replace(row, verdicts=None)
@@ -140,12 +120,8 @@ class ReusableRows:
         """Tell whether the row of an earlier tap test is unchanged."""
         if tap_id in self._alike:
             return True
-        number = self._numbers.get(tap_id)
-        return (
-            number is not None
-            and place.other_direction is not None
-            and rows[place.other_direction] is self._then.rows[number]
-        )
+        number, other = self._numbers.get(tap_id), place.other_direction
+        return number is not None and other is not None and rows[other] is self._then.rows[number]
 
 
 def _encode_content(row: HistoryRow) -> bytes:

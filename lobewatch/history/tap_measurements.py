@@ -12,10 +12,8 @@ from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
-from lobewatch.tool.assembly import Assembly, assemble
-from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.assembly import Assembly, assemble, predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier
-from modal import Mode
 
 MAX_MEASUREMENTS_IN_MEMORY = 500
 """Largest number of measurements in memory, those used last."""
@@ -38,19 +36,17 @@ class TapMeasurements:
         if measurement is None:
             before = (rows[number] for number in iterate_earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
-            measurement = self._measure(place, last)
+            fit, machine = self._fits.get(place.entry.id), self._folder.machine
+            if fit is None:
+                measurement = measure(self._folder.read(place.entry), machine, last, place.entry.by_hand)
+            else:
+                measurement = interpret_fit(fit, machine, last)
             remarks = mark_accepted((*measurement.remarks, *place.remarks), place.entry)
             measurement = replace(measurement, remarks=remarks)
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > MAX_MEASUREMENTS_IN_MEMORY:
             del self._measurements[next(iter(self._measurements))]
         return measurement
-
-    def _measure(self, place: TapPlace, last: Mode | None) -> Measurement:
-        fit = self._fits.get(place.entry.id)
-        if fit is not None:
-            return interpret_fit(fit, self._folder.machine, last)
-        return measure(self._folder.read(place.entry), self._folder.machine, last, place.entry.by_hand)
 
     def assembly_after(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Assembly:
         """Return the tool as known after one tap test."""
@@ -59,9 +55,10 @@ class TapMeasurements:
             place = self._places[place.other_direction]
         newest = self.measurement(place, rows)
         other = None if place.other_direction is None else self.measurement(self._places[place.other_direction], rows)
-        series = self._followed.before(place, rows)
-        if newest.followed is not None and not find_open_questions(newest.remarks):
-            series.setdefault(newest.direction, []).append(_to_followed_mode(newest, newest.followed))
+        series, mode = self._followed.before(place, rows), newest.followed
+        if mode is not None and not find_open_questions(newest.remarks):
+            values = mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg
+            series.setdefault(newest.direction, []).append(FollowedMode(newest.time, *values))
         return assemble(newest, other, series, cross)
 
     def assembly_of(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
@@ -97,13 +94,12 @@ class TapMeasurements:
         """
         rows = list(rows)
         for place in self._places[len(rows) :]:
-            held = behind.find(place, self._places, rows) if behind is not None else None
-            if held is not None:
-                rows.append(held)
-                continue
-            rows.append(self._row(place, rows, older_rows))
-            if behind is not None:
-                behind.note(rows[-1])
+            row = behind.find(place, self._places, rows) if behind is not None else None
+            if row is None:
+                row = self._row(place, rows, older_rows)
+                if behind is not None:
+                    behind.note(row)
+            rows.append(row)
         return tuple(rows)
 
     def _row(self, place: TapPlace, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow]) -> HistoryRow:
@@ -118,10 +114,6 @@ class TapMeasurements:
             return keep_older_row(older_rows[place.entry.id], place, error)
 
 
-def _to_followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:
-    return FollowedMode(measurement.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)
-
-
 def measure_excluded_taps(
     folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence[HistoryRow]
 ) -> list[HistoryRow]:
@@ -129,19 +121,16 @@ def measure_excluded_taps(
 
     rows: rows of the series, at least one. A tap test before its baseline is left out.
     """
-    rows_out = []
-    for entry in excluded:
-        if (entry.tool, entry.direction) != (rows[-1].tool, rows[-1].direction):
-            continue
+    rows_out, (tool, direction, baseline) = [], (rows[-1].tool, rows[-1].direction, rows[-1].baseline)
+    for entry in [entry for entry in excluded if (entry.tool, entry.direction) == (tool, direction)]:
         try:
             tap = folder.read(entry)
         except DamagedTapError:
             continue
-        time, baseline = tap.circumstances.created, rows[-1].baseline
+        time = tap.circumstances.created
         if baseline is None or time >= baseline:
             before = [row.mode for row in rows if row.time < time and row.mode is not None]
             measurement = measure(tap, folder.machine, before[-1] if before else None)
-            rows_out.append(
-                make_row(measurement, assemble(measurement, None, {}), TapPlace(0, entry, None, None, baseline))
-            )
+            place = TapPlace(0, entry, None, None, baseline)
+            rows_out.append(make_row(measurement, assemble(measurement, None, {}), place))
     return rows_out

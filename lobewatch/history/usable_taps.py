@@ -8,9 +8,7 @@ from datetime import UTC, datetime
 from acquisition import DataError, Remark
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder_contents import FolderContents
-from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
-from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.entries import MaintenanceEvent
+from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.tool.tap_series import TapOrder, TapPlace
 
@@ -32,13 +30,18 @@ class UsableTaps:
         self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
 
     @property
+    def contents(self) -> FolderContents:
+        """Contents of the folder: tap tests, events, test cuts and acknowledgements."""
+        if self._contents is None:
+            self._contents = self._folder.contents()
+        return self._contents
+
+    @property
     def places(self) -> Sequence[TapPlace]:
         """Usable tap tests, oldest first; newer ones are added to the same sequence."""
         if self._order is None:
-            self._order = TapOrder(self._all.baselines)
-            for tap in self._all.taps:
-                if tap.id not in self._left_out and not tap.excluded:
-                    self._order.add(tap)
+            usable = [tap for tap in self.contents.taps if tap.id not in self._left_out and not tap.excluded]
+            self._order = TapOrder(self.contents.baselines, usable)
         return self._order.places
 
     def place(self, tap_id: str) -> TapPlace:
@@ -74,53 +77,31 @@ class UsableTaps:
         return [*of_files, *(remark for _, remark in self._left_out.values())]
 
     @property
-    def events(self) -> Sequence[MaintenanceEvent]:
-        """Maintenance events, oldest first."""
-        return self._all.events
-
-    @property
-    def cuts(self) -> Sequence[CutEntry]:
-        """Test cuts, oldest first, excluded ones included."""
-        return self._all.cuts
-
-    @property
-    def acknowledgements(self) -> Sequence[Acknowledgement]:
-        """Acknowledgements of alarms, oldest first."""
-        return self._all.acknowledgements
-
-    @property
     def fleet_scatter(self) -> FleetScatter | None:
         """First scatter of the fleet since the baseline; None without one."""
-        since = (
-            scatter for scatter in self._all.fleet_scatters if self.baseline is None or scatter.time >= self.baseline
-        )
-        return next(since, None)
+        baseline, scatters = self.baseline, self.contents.fleet_scatters
+        return next((scatter for scatter in scatters if baseline is None or scatter.time >= baseline), None)
 
     @property
     def excluded(self) -> Sequence[TapEntry]:
         """Excluded tap tests, oldest first."""
-        return [tap for tap in self._all.taps if tap.excluded]
+        return [tap for tap in self.contents.taps if tap.excluded]
 
     @property
     def lost(self) -> Sequence[TapEntry]:
         """Tap tests with unusable files, excluded ones not included."""
-        lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        lost = [*self.contents.lost, *(entry for entry, _ in self._left_out.values())]
         return [entry for entry in lost if not entry.excluded]
 
     @property
     def by_id(self) -> dict[str, TapEntry]:
         """All tap tests of the journal by identity."""
-        return {entry.id: entry for entry in (*self._all.taps, *self._all.lost)}
-
-    @property
-    def baselines(self) -> list[datetime]:
-        """Times of new baselines, oldest first."""
-        return self._all.baselines
+        return {entry.id: entry for entry in (*self.contents.taps, *self.contents.lost)}
 
     @property
     def baseline(self) -> datetime | None:
         """Newest baseline."""
-        return max(self._all.baselines, default=None)
+        return max(self.contents.baselines, default=None)
 
     def newest(self, tool: str | None) -> TapEntry:
         """Return the newest tap test since the baseline, of a tool if named; NotTappedError without one."""
@@ -143,10 +124,10 @@ class UsableTaps:
         """Return remarks on damaged tap tests that are newer than all usable ones of their series."""
         if not self.lost:
             return ()
-        newest_usable = {_series_key(place.entry): _entry_time(place.entry) for place in self.places}
-        lost = [entry for entry in self.lost if _entry_time(entry) >= (self.baseline or EARLIEST_TIME)]
-        lost = [entry for entry in lost if tool in ("", entry.tool)]
-        newer = [entry for entry in lost if _entry_time(entry) > newest_usable.get(_series_key(entry), EARLIEST_TIME)]
+        usable = {(place.entry.tool, place.entry.direction): place.entry.created for place in self.places}
+        since = self.baseline or EARLIEST_TIME
+        lost = [entry for entry in self.lost if entry.created >= since and tool in ("", entry.tool)]
+        newer = [entry for entry in lost if entry.created > usable.get((entry.tool, entry.direction), EARLIEST_TIME)]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
 
@@ -175,17 +156,3 @@ class UsableTaps:
             raise error
         self._left_out[error.entry.id] = error.entry, error.remark
         self._order = None
-
-    @property
-    def _all(self) -> FolderContents:
-        if self._contents is None:
-            self._contents = self._folder.contents()
-        return self._contents
-
-
-def _series_key(entry: TapEntry) -> tuple[str, str]:
-    return entry.tool, entry.direction
-
-
-def _entry_time(entry: TapEntry) -> datetime:
-    return datetime.fromisoformat(entry.time)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from lobewatch.cuts.learning.verdict_at_speed import evaluate_at_speed
-from lobewatch.history.history import History, clear_newest_verdicts
+from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import NotTappedError, UsableTaps
@@ -65,7 +65,7 @@ class Analysis:
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
         """Usable test cuts, oldest first."""
-        return tuple(cut for cut in self.files.cuts if cut.is_usable)
+        return tuple(cut for cut in self.files.contents.cuts if cut.is_usable)
 
     @property
     def history(self) -> History:
@@ -86,7 +86,12 @@ class Analysis:
         history = self._cache.read(self.files)
         rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
         history = replace(history, rows=rows)
-        return clear_newest_verdicts(history) if history.rows and self.files.newest_damaged_remarks() else history
+        return self._without_doubtful_verdicts(history) if history.rows else history
+
+    def _without_doubtful_verdicts(self, history: History) -> History:
+        """Return the history without the verdicts after the newest tap test, if a newer one is damaged."""
+        is_doubtful = self.files.newest_damaged_remarks()
+        return history.with_verdicts(len(history.rows) - 1, None) if is_doubtful else history
 
     def measurement(self, tap_id: str) -> Measurement:
         """Measure one tap test.
@@ -235,7 +240,7 @@ class Analysis:
             stored |= {verdict.program.name: build_stored_verdict(verdict, drops) for verdict in new}
             stored = {table.name: stored[table.name] for table in self.machine.program}
             history = self._history = self.history.with_verdicts(number, stored)
-            self._cache.store(clear_newest_verdicts(history) if self.files.newest_damaged_remarks() else history)
+            self._cache.store(self._without_doubtful_verdicts(history))
         return stored
 
     def initial_verdict(self, now: Verdict) -> StoredVerdict | None:
@@ -248,7 +253,7 @@ class Analysis:
         now
             Present verdict on the program.
         """
-        if now.program.name not in self.machine.cut_names:
+        if now.program.name not in self.machine.cut_tables:
             return None
         tap_id = None if now.assembly is None else self._first_tap_id(now.assembly)
         return None if tap_id is None else self.stored_verdicts(tap_id)[now.program.name]
@@ -286,6 +291,6 @@ class Analysis:
             now or datetime.now(UTC),
             self.folder.path,
             files.remarks,
-            files.acknowledgements,
+            files.contents.acknowledgements,
             files.fleet_scatter,
         )

@@ -31,7 +31,6 @@ from lobewatch.tool.lobe_chart import (
     LobeChart,
     LobeMethod,
     compute_lobe_chart,
-    find_cut_table,
 )
 from lobewatch.verdicts.recommendation import find_stable_pockets
 from lobewatch.verdicts.setting_robustness import Setting
@@ -106,7 +105,7 @@ def chart_speed_pockets(logbook: Logbook, tool: str | None, cut: str) -> tuple[A
     assembly = _find_assembly(logbook, tool, cut)
     if assembly.directions or not assembly.without_stiffness or cut not in logbook.machine.cuts(assembly.tool):
         return None
-    return assembly, find_speed_pockets(find_cut_table(logbook.machine, cut), assembly, logbook.machine)
+    return assembly, find_speed_pockets(logbook.machine.cut_tables[cut], assembly, logbook.machine)
 
 
 def _find_assembly(logbook: Logbook, tool: str | None, cut: str) -> Assembly:
@@ -127,7 +126,7 @@ def _make_chart(
     frfs = _read_frfs(logbook, assembly) if source is DynamicsSource.FRF else None
     x, y = frfs or (assembly.x, assembly.y)
     lobes = compute_lobe_chart(method, x, y, cuts[cut], speed_grid(machine))
-    return LobeChart(cut, find_cut_table(machine, cut), assembly, source, x, y, cuts[cut], lobes)
+    return LobeChart(cut, machine.cut_tables[cut], assembly, source, x, y, cuts[cut], lobes)
 
 
 def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:

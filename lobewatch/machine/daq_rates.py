@@ -9,17 +9,8 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from acquisition import (
-    DataError,
-    Device,
-    DeviceError,
-    MeasuredRate,
-    Remark,
-    atomic_write,
-    check_rate,
-    measure_rate,
-    rate_remark,
-)
+import acquisition
+from acquisition import DataError, Device, DeviceError, MeasuredRate, Remark
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder import MachineFolder
 
@@ -43,11 +34,6 @@ class StoredDevice(msgspec.Struct, frozen=True):
     """CRC-32 of all other fields; 0 in the first files."""
 
     @property
-    def is_altered(self) -> bool:
-        """True if the CRC is wrong."""
-        return self.crc not in (0, self.computed_crc)
-
-    @property
     def computed_crc(self) -> int:
         """CRC-32 of all other fields."""
         return zlib.crc32(msgspec.json.encode(msgspec.structs.replace(self, crc=0)))
@@ -63,11 +49,9 @@ def check_device_rate(
     """Return the sample rate of a device, measured once per device and machine.
 
     Call it after every connect, before device.start(), with the folder locked. A rate within 0.2 % of the nominal one
-    is
-    accepted as nominal. A larger difference is an error, or with accept_measured_rate = true in [daq] the device gets
-    the
-    measured rate: make the Trigger from the returned rate. Only a certain rate is stored in daq.json; an uncertain one,
-    the best of three, adds a remark. Devices without a clock are not checked.
+    is accepted as nominal. A larger difference is an error, or with accept_measured_rate = true in [daq] the device
+    gets the measured rate: make the Trigger from the returned rate. Only a certain rate is stored in daq.json; an
+    uncertain one, the best of three, adds a remark. Devices without a clock are not checked.
 
     Parameters
     ----------
@@ -95,7 +79,7 @@ def check_device_rate(
     if not has_clock(device):
         return device.sample_rate
     measured = find_stored_rate(folder, device) or _measure_rate(device, seconds, clock)
-    doubt = rate_remark(measured)
+    doubt = acquisition.rate_remark(measured)
     if doubt is not None and remarks is not None:
         remarks.append(doubt)
     return apply_measured_rate(folder, device, measured)
@@ -103,9 +87,9 @@ def check_device_rate(
 
 def _measure_rate(device: Device, seconds: float, clock: Callable[[], float]) -> MeasuredRate:
     """Measure until a rate is certain, and return the most certain one."""
-    tries = [measure_rate(device, seconds, clock)]
+    tries = [acquisition.measure_rate(device, seconds, clock)]
     while not tries[-1].is_accurate and len(tries) < MAX_RATE_MEASUREMENTS:
-        tries.append(measure_rate(device, seconds, clock))
+        tries.append(acquisition.measure_rate(device, seconds, clock))
     return min(tries, key=lambda measured: measured.std / measured.rate)
 
 
@@ -140,10 +124,9 @@ def find_stored_rate(folder: MachineFolder, device: Device) -> MeasuredRate | No
     MeasuredRate or None
         Rate in daq.json; None without one.
     """
-    for entry in read_stored_devices(folder):
-        if _is_same_device(entry, device):
-            return MeasuredRate(entry.measured_rate_hz, entry.measured_rate_hz_std, entry.n_scans, entry.seconds)
-    return None
+    same = (entry for entry in read_stored_devices(folder) if _is_same_device(entry, device))
+    rates = (MeasuredRate(old.measured_rate_hz, old.measured_rate_hz_std, old.n_scans, old.seconds) for old in same)
+    return next(rates, None)
 
 
 def apply_measured_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:
@@ -169,7 +152,7 @@ def apply_measured_rate(folder: MachineFolder, device: Device, measured: Measure
         If the measured rate differs from the nominal one and is not accepted.
     """
     try:
-        check_rate(measured, device.sample_rate)
+        acquisition.check_rate(measured, device.sample_rate)
         rate = device.sample_rate
     except DeviceError as error:
         if not measured.is_accurate:
@@ -200,7 +183,7 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
         return []
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
-    if any(entry.is_altered for entry in entries):
+    if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
         raise DataError(f"{path}: altered since it was written; delete this file, the DAQ's rate is then measured anew")
     return entries
 
@@ -212,4 +195,4 @@ def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -
     new = StoredDevice(identity.model, identity.serial, device.sample_rate, *numbers, now)
     new = msgspec.structs.replace(new, crc=new.computed_crc)
     content = msgspec.json.format(msgspec.json.encode([*kept, new]), indent=2)
-    atomic_write(folder.path / "daq.json", content + b"\n")
+    acquisition.atomic_write(folder.path / "daq.json", content + b"\n")

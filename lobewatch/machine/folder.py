@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
@@ -17,10 +16,10 @@ from acquisition.file_io import make_folder, sync_folder
 from lobewatch.machine import folder_contents
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
-from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
+from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
-from lobewatch.machine.settings.toml_text import read_toml_text
+from lobewatch.machine.settings.toml import read_toml_text
 
 
 class MachineFolder:
@@ -41,6 +40,12 @@ class MachineFolder:
         """
         self.path = to_folder_path(path)
         """Path of the folder."""
+        self.toml = self.path / "machine.toml"
+        """Path of the machine file."""
+        self.history_path = self.path / "history.rows"
+        """Path of the cached history."""
+        self.spool = self.path / "spool"
+        """Folder of the hits of tests in progress."""
         if format_path(path) != str(path):
             raise DataError(f"{format_path(path)}: the name of the folder is no UTF-8; rename it")
         if not self.toml.exists() and folder_contents.list_tap_files(self.path):
@@ -51,24 +56,9 @@ class MachineFolder:
             raise DataError(f"{self.path}: no machine.toml in it; {cure}")
 
     @property
-    def toml(self) -> Path:
-        """Path of the machine file."""
-        return self.path / "machine.toml"
-
-    @property
     def toml_text(self) -> str:
         """Present text of the machine file."""
         return read_toml_text(self.toml)
-
-    @property
-    def history_path(self) -> Path:
-        """Path of the cached history."""
-        return self.path / "history.rows"
-
-    @property
-    def spool(self) -> Path:
-        """Folder of the hits of tests in progress."""
-        return self.path / "spool"
 
     @cached_property
     def journal(self) -> Journal:
@@ -200,4 +190,4 @@ class MachineFolder:
             Code of the question.
         """
         with self.locked():
-            self.journal.append({"kind": "accept", "tap": tap_id, "code": code, "time": datetime.now(UTC).isoformat()})
+            self.journal.append(make_entry("accept", tap=tap_id, code=code))

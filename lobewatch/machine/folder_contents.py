@@ -8,7 +8,10 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
+
+import msgspec
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
@@ -16,7 +19,7 @@ from lobewatch.machine.journal import alarm_entries
 from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
-from lobewatch.machine.journal.tap_entry import NO_MODE_EDITS, TapEntry, decode_tap_entries
+from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
@@ -48,7 +51,7 @@ class FolderContents:
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
         """Return the contents with a newly committed tap test."""
-        is_newest = not self.taps or _tap_time(self.taps[-1]) <= _tap_time(entry)
+        is_newest = not self.taps or self.taps[-1].created <= entry.created
         taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
         return replace(self, taps=taps, line_count=self.line_count + 1)
 
@@ -82,17 +85,15 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
         taps = [*_sort_by_time([*taps, *whole])]
     else:
         cure = f"{format_command('verify', folder)} says what it is and what to do"
-        remarks += [
-            unlisted_file_remark(path, "not in the journal, does not count", cure) for path in extra[:MAX_LISTED_FILES]
-        ]
+        said = "not in the journal, does not count", cure
+        remarks += [unlisted_file_remark(path, *said) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
-    cuts = read_committed_cuts(reading)
     acknowledged = alarm_entries.read_acknowledgements(reading.other_entries)
-    scatters = alarm_entries.read_fleet_scatters(reading.other_entries)
-    usable, unusable, damage, count = tuple(taps), _sort_by_time(lost), tuple(remarks), len(reading.lines)
-    return FolderContents(usable, unusable, damage, events, count, cuts, acknowledged, scatters)
+    others = read_committed_cuts(reading), acknowledged, alarm_entries.read_fleet_scatters(reading.other_entries)
+    usable, unusable = tuple(taps), _sort_by_time(lost)
+    return FolderContents(usable, unusable, tuple(remarks), events, len(reading.lines), *others)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
@@ -108,12 +109,12 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
     excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
     by_hand = journal_entries.read_mode_edits(reading.other_entries)
-    entries = {entry.id: entry for entry in decode_tap_entries(reading.tap_lines, accepted, excluded, by_hand)}
-    for line in reading.other_entries:
-        if line["kind"] == "tap":
-            name = line["id"]
-            later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
-            entries[name] = TapEntry.from_line(line, *later)
+    old = (TapEntry.from_line(line) for line in reading.other_entries if line["kind"] == "tap")
+    entries = {entry.id: entry for entry in (*decode_tap_entries(reading.tap_lines), *old)}
+    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
+        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+        changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
+        entries[name] = msgspec.structs.replace(entries[name], **changes)
     return entries
 
 
@@ -200,8 +201,4 @@ def read_given_up_ids(reading: JournalReading) -> set[str]:
 
 
 def _sort_by_time(entries: Iterable[TapEntry]) -> tuple[TapEntry, ...]:
-    return tuple(sorted(entries, key=_tap_time))
-
-
-def _tap_time(entry: TapEntry) -> datetime:
-    return datetime.fromisoformat(entry.time)
+    return tuple(sorted(entries, key=attrgetter("created")))

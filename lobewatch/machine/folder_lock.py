@@ -12,7 +12,6 @@ import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import msgspec
@@ -61,17 +60,11 @@ class LockHolder(msgspec.Struct, frozen=True):
         return f"`{self.command}` (process {self.process}, since {self.since.astimezone():%H:%M})"
 
 
-class _ThreadState(threading.local):
-    """State of a thread."""
-
-    holds = False
-
-
 class FolderLock:
     """Lock of one folder; a thread may hold it several times over."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, _ThreadState()
+        self._folder, self._holder, self._thread = folder, folder / LOCK_HOLDER_NAME, threading.local()
 
     @contextlib.contextmanager
     def hold(self, patience: float) -> Iterator[None]:
@@ -79,7 +72,7 @@ class FolderLock:
 
         Raises OSError if the folder is missing, cannot be written, or its file system has no locks.
         """
-        if self._thread.holds:
+        if getattr(self._thread, "holds", False):
             yield
             return
         with contextlib.ExitStack() as stack:
@@ -146,9 +139,7 @@ class DiskReserve:
             self._allocate()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
     def release(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
 from typing import Any, Literal
@@ -17,13 +17,12 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
 from lobewatch.machine.journal.cut_entry import CUT_LINE_KIND, CutEntry, RecordingFile
-from lobewatch.machine.journal.journal import JournalReading
+from lobewatch.machine.journal.journal import JournalReading, make_entry
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file
-from lobewatch.machine.settings.plausibility import ImplausibleSetting
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.machine.settings.setting_questions import find_all_questions, find_template_bearings
-from lobewatch.machine.settings.toml_text import TablePath, edit_toml
+from lobewatch.machine.settings.toml import TablePath, edit_toml
 from modal import ModeEdits
 
 TOOTH_FREQUENCY_TOLERANCE = 0.005
@@ -45,16 +44,19 @@ def add_event(
     with folder.locked():
         now, entries = datetime.now(UTC), folder.journal.read().entries
         event = lines.make_event(entries, folder.taps(), text, date, new_baseline, now)
-        folder.journal.append(lines.make_event_line(event, now))
+        fields = {"id": event.id, "date": event.time.isoformat(), "text": text, "new_baseline": new_baseline}
+        folder.journal.append(make_entry("event", now, **fields))
     return event
 
 
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:
     """Withdraw an event; ValueError for an unknown identity."""
     with folder.locked():
-        entries = folder.journal.read().entries
-        folder.journal.append(lines.make_withdrawal_line(entries, event_id, datetime.now(UTC)))
-    return next(event for event in lines.read_events(entries) if event.id == event_id)
+        events = {event.id: event for event in lines.read_events(folder.journal.read().entries)}
+        if event_id not in events:
+            raise ValueError(f"{event_id}: no such event; there are {', '.join(events) or 'none'}")
+        folder.journal.append(make_entry("event", withdraws=event_id))
+    return events[event_id]
 
 
 def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.ExcludableEntry:
@@ -64,7 +66,7 @@ def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.Exclud
     """
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_exclusion_line(entry, reason, datetime.now(UTC)))
+        folder.journal.append(lines.make_exclusion_line(entry, reason))
     return entry
 
 
@@ -72,7 +74,7 @@ def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
     """Include an excluded tap test or test cut again."""
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_inclusion_line(entry, datetime.now(UTC)))
+        folder.journal.append(lines.make_inclusion_line(entry))
     return entry
 
 
@@ -83,10 +85,10 @@ def _find_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
 
 def store_mode_edits(folder: MachineFolder, tap_ids: Sequence[str], edits: ModeEdits) -> None:
     """Write the mode edits of tap tests to the journal; empty edits revoke earlier ones."""
-    now = datetime.now(UTC)
-    if tap_ids:
+    entries = [make_entry("modes", tap=tap_id, **asdict(edits)) for tap_id in tap_ids]
+    if entries:
         with folder.locked():
-            folder.journal.append(*(lines.make_mode_edits_line(tap_id, edits, now) for tap_id in tap_ids))
+            folder.journal.append(*entries)
 
 
 def lobewatch_version() -> str:
@@ -156,10 +158,9 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
     tooth = setting.tooth_frequency
     times = round(frequency / tooth)
     if times and abs(frequency - times * tooth) <= TOOTH_FREQUENCY_TOLERANCE * frequency:
-        raise ValueError(
-            f"{option}: is {times} times the tooth passing frequency of {tooth:g} Hz, which every cut sounds with; "
-            "give the frequency of the chatter beside it, or leave CutEntry.chatter_frequency_hz out"
-        )
+        cure = "give the frequency of the chatter beside it, or leave CutEntry.chatter_frequency_hz out"
+        every = f"the tooth passing frequency of {tooth:g} Hz, which every cut sounds with"
+        raise ValueError(f"{option}: is {times} times {every}; {cure}")
 
 
 def find_contradicting_cuts(cut: CutEntry, earlier: Sequence[CutEntry]) -> list[CutEntry]:
@@ -207,7 +208,8 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
 
     Raises ValueError, and writes nothing, if there is no question about a key.
     """
-    questions = _find_setting_questions(folder)
+    template = find_template_bearings(folder.machine)
+    questions = [*find_all_questions(folder.machine), *([template] if template else [])]
     accepted = list[str]()
     for key in keys:
         statements = [question.statement for question in questions if key in (question.key, question.statement)]
@@ -218,9 +220,3 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
     known = [*folder.machine.machine.accepted, *dict.fromkeys(accepted)]
     write_machine_file(folder.path, edit_toml(folder.toml_text, TablePath("machine"), {"accepted": known}))
     return accepted
-
-
-def _find_setting_questions(folder: MachineFolder) -> list[ImplausibleSetting]:
-    """Return all open questions about the machine.toml of a folder."""
-    template = find_template_bearings(folder.machine)
-    return [*find_all_questions(folder.machine), *([template] if template else [])]

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, parse_cut_line
-from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command
+from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
@@ -56,7 +57,7 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
     for path in _list_unlisted_cuts(folder, contents.read_committed_cuts(journal.read())):
         cut = _read_unlisted_cut(path)
         if cut is None or cut.id in {entered.id for entered in contents.read_committed_cuts(journal.read())}:
-            yield f"cuts/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}"
+            yield _set_aside(folder, path)
             continue
         content = read_regular_file(path)
         recording = RecordingFile(cut.id, hashlib.sha256(content).hexdigest(), len(content))
@@ -68,7 +69,7 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
         if (folder / lost.file).exists():
             _move_to_damaged(folder, folder / lost.file)
         if lost.id not in contents.read_given_up_ids(reading):
-            journal.append({"kind": "lost", "tap": lost.id, "time": datetime.now(UTC).isoformat()})
+            journal.append(make_entry("lost", tap=lost.id))
             yield f"{lost.file}: lost; what was heard in it goes on to count"
 
 
@@ -132,12 +133,9 @@ def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) ->
 def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
     """Rename swapped tap files back where the right file is damaged, else set them aside."""
     by_content = {entry.sha256: entry for entry in committed.values()}
-    misplaced: dict[Path, TapEntry] = {}
-    for path in contents.list_tap_files(folder).values():
-        entry = by_content.get(contents.hash_file(path))
-        if entry is not None and path != folder / entry.file:
-            misplaced[path] = entry
-    asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced.items()}
+    owners = {path: by_content.get(contents.hash_file(path)) for path in contents.list_tap_files(folder).values()}
+    misplaced = [(path, entry) for path, entry in owners.items() if entry is not None and path != folder / entry.file]
+    asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced}
     for aside, entry in asides.items():
         if contents.find_file_fault(folder, entry):
             if (folder / entry.file).exists():
@@ -158,7 +156,7 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
         entry = read_unverified_tap(path)
         taken = entry is not None and entry.id != name and (folder / entry.file).exists()
         if entry is None or taken or entry.id in committed:
-            report.append(f"taps/{path.name}: put into {_move_to_damaged(folder, path).relative_to(folder).as_posix()}")
+            report.append(_set_aside(folder, path))
             continue
         if entry.id != name:
             path.rename(folder / entry.file)
@@ -175,7 +173,7 @@ def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
         if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
             _move_to_damaged(folder, folder / entry.file)
         if name not in contents.read_given_up_ids(reading):
-            journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
+            journal.append(make_entry("lost", tap=name))
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
 
@@ -183,10 +181,8 @@ def _is_temporarily_unreadable(path: Path) -> bool:
     """Tell whether a file cannot be read at the moment; it stays where it is."""
     try:
         read_regular_file(path)
-    except IrregularFileError:
-        return False
-    except OSError:
-        return True
+    except OSError as error:
+        return not isinstance(error, IrregularFileError)
     return False
 
 
@@ -211,14 +207,18 @@ def _repair_devices_file(folder: Path) -> Iterator[str]:
     try:
         read_stored_devices(machine)
     except DataError:
-        aside = _move_to_damaged(folder, folder / "daq.json")
-        yield f"daq.json: put into {aside.relative_to(folder).as_posix()}; the rates of DAQs are measured anew"
+        yield f"{_set_aside(folder, folder / 'daq.json')}; the rates of DAQs are measured anew"
+
+
+def _set_aside(folder: Path, path: Path) -> str:
+    """Move a file to the folder for damaged files, and say so."""
+    aside = _move_to_damaged(folder, path)
+    return f"{path.relative_to(folder).as_posix()}: put into {aside.relative_to(folder).as_posix()}"
 
 
 def _move_to_damaged(folder: Path, path: Path) -> Path:
     """Move a file to the folder for damaged files under an unused name."""
     make_folder(folder / DAMAGED_FOLDER_NAME)
-    aside, number = folder / DAMAGED_FOLDER_NAME / path.name, 1
-    while aside.exists():
-        aside, number = folder / DAMAGED_FOLDER_NAME / f"{path.name}.{number}", number + 1
-    return path.replace(aside)
+    names = chain([path.name], (f"{path.name}.{number}" for number in count(1)))
+    asides = (folder / DAMAGED_FOLDER_NAME / name for name in names)
+    return path.replace(next(aside for aside in asides if not aside.exists()))

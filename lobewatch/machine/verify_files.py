@@ -29,9 +29,8 @@ DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged"
 DERIVED_FILES = ("history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "report.html")
 """Files that are made again if they are deleted."""
 LOBEWATCH_FILES = {JOURNAL_NAME, JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml", *DERIVED_FILES}
-"""Files in a machine folder that lobewatch writes."""
-LOBEWATCH_FOLDERS = {"taps", "cuts", "spool"}
-"""Folders in a machine folder that lobewatch makes."""
+LOBEWATCH_FILES |= {"taps", "cuts", "spool"}
+"""Files and folders in a machine folder that lobewatch writes."""
 ALTERED_TEXT = "altered or cut short since it was written"
 """Fault of a file with a wrong checksum."""
 
@@ -102,16 +101,13 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
     Nothing happens if another program writes, the journal is damaged, or the folder cannot be written.
     """
     journal, entered = folder.journal, list[str]()
-    try:
-        with folder.locked(patience=0):
-            committed = set(contents.read_committed_taps(journal.read()))
-            for name, path in contents.list_tap_files(folder.path).items():
-                entry = read_unverified_tap(path) if name not in committed else None
-                if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
-                    journal.append(entry.line)
-                    entered.append(entry.file)
-    except (DataError, OSError):
-        return entered
+    with contextlib.suppress(DataError, OSError), folder.locked(patience=0):
+        committed = set(contents.read_committed_taps(journal.read()))
+        for name, path in contents.list_tap_files(folder.path).items():
+            entry = read_unverified_tap(path) if name not in committed else None
+            if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
+                journal.append(entry.line)
+                entered.append(entry.file)
     return entered
 
 
@@ -136,28 +132,23 @@ def _verify_taps(
 
 def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is_needed: bool) -> Remark:
     """Return the remark on a tap file without a line; original: committed tap test with the same content."""
-    mend = format_command("rebuild", folder)
+    mend, entry = format_command("rebuild", folder), read_unverified_tap(path) if original is None else None
     if original is not None and is_needed:
-        return contents.unlisted_file_remark(
-            path, f"it is {original.file} under another name", f"{mend} gives it its name back"
-        )
-    if original is not None:
-        return contents.unlisted_file_remark(path, f"a copy of {original.file}", f"{mend} puts it out of the way")
-    entry = read_unverified_tap(path)
-    if entry is None:
-        return contents.unlisted_file_remark(
-            path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way"
-        )
-    if entry.id != path.stem:
-        return contents.unlisted_file_remark(
-            path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in"
-        )
-    if contents.has_known_origin(folder, entry):
+        said = f"it is {original.file} under another name", f"{mend} gives it its name back"
+    elif original is not None:
+        said = f"a copy of {original.file}", f"{mend} puts it out of the way"
+    elif entry is None:
+        said = "no whole tap file, and not in the journal", f"{mend} puts it out of the way"
+    elif entry.id != path.stem:
+        said = f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in"
+    elif contents.has_known_origin(folder, entry):
         cure = f"{format_command('verify', folder)} enters it where nobody else writes"
         text = "not entered in the journal by the program that wrote it"
         return Remark("not-entered", f"taps/{path.name}", text, cure)
-    cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
-    return contents.unlisted_file_remark(path, "a whole tap file that is not in the journal", cure)
+    else:
+        cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
+        said = "a whole tap file that is not in the journal", cure
+    return contents.unlisted_file_remark(path, *said)
 
 
 def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
@@ -204,32 +195,24 @@ def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
 def _verify_names(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield _set_aside_remark(path.name, "left over or set aside", "delete it when you do not need it")
+            yield Remark("set-aside", path.name, "left over or set aside", "delete it when you do not need it")
         elif path.name == "report.html":
             cure = f"{format_command('report', folder)} writes it anew"
-            yield _not_verified_remark(path.name, "a report is not verified", cure)
+            yield Remark("not-verified", path.name, "a report is not verified", cure)
         elif path.name == "history.h5":
-            yield _not_verified_remark(
-                path.name, "no cache any more, or an export", "delete it when you do not need it"
+            yield Remark(
+                "not-verified", path.name, "no cache any more, or an export", "delete it when you do not need it"
             )
-        elif path.name not in LOBEWATCH_FILES | LOBEWATCH_FOLDERS:
-            yield _not_verified_remark(path.name, "no file of lobewatch")
+        elif path.name not in LOBEWATCH_FILES:
+            yield Remark("not-verified", path.name, "no file of lobewatch")
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
-            yield _not_verified_remark(f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
-
-
-def _not_verified_remark(about: str, text: str, cure: str = "") -> Remark:
-    return Remark("not-verified", about, text, cure)
+            yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
 
 
 def _damaged_file_remark(about: str, text: str, cure: str = "") -> Remark:
     return Remark("file-damaged", about, text, cure)
-
-
-def _set_aside_remark(about: str, text: str, cure: str) -> Remark:
-    return Remark("set-aside", about, text, cure)
 
 
 def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
@@ -242,7 +225,7 @@ def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
         if path.relative_to(spool).parts[0] in saved:
             continue
         try:
-            yield from __verify_spooled_test(folder, path) if path.is_dir() else __verify_spooled_file(folder, path)
+            yield from _verify_spooled(folder, path)
         except FileNotFoundError:
             continue
         except OSError as error:
@@ -250,25 +233,23 @@ def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
             yield _damaged_file_remark(about, format_error(error).removeprefix(f"{path}: "))
 
 
-def __verify_spooled_test(folder: Path, path: Path) -> Iterator[Remark]:
+def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
+    """Verify a file or the folder of an interrupted test."""
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
-    cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
-    yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
-
-
-def __verify_spooled_file(folder: Path, path: Path) -> Iterator[Remark]:
-    about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
-    if path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
+    if path.is_dir():
+        cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
+        yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
+    elif path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
         cure = f"{tap} sets it aside and goes on with the others{_deletion_hint(path.parent)}"
         yield _damaged_file_remark(about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_deletion_hint(path.parent)}"
         yield _damaged_file_remark(about, ALTERED_TEXT, cure)
     elif path.suffix == ".tmp":
-        yield _set_aside_remark(about, "half written", f"{tap} removes it")
+        yield Remark("set-aside", about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
         cure = "delete it when you do not need it"
-        yield _set_aside_remark(about, "a damaged file of an interrupted test", cure)
+        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
 
 
 def _deletion_hint(test: Path) -> str:

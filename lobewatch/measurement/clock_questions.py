@@ -34,14 +34,14 @@ def clock_question(code: str, time: str) -> Remark:
     """Return the question of a code about the time of a test (ISO 8601); KeyError for an unknown code."""
     when = f"{datetime.fromisoformat(time).astimezone(UTC):%Y-%m-%d %H:%M} UTC"
     cure = "put the clock of the computer right and tap again; exclude the test with the wrong time"
-    return Remark(
-        code, when, f"its time, {when}, is {CLOCK_QUESTIONS[code]}: was the clock of the computer right?", cure
-    )
+    text = f"its time, {when}, is {CLOCK_QUESTIONS[code]}: was the clock of the computer right?"
+    return Remark(code, when, text, cure)
 
 
 def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | str) -> Iterator[Remark]:
     """Yield a remark on a newest test with a date in the future; path: machine folder."""
     if is_in_future(time, now):
-        out = f"{shlex.join(['lobewatch', 'exclude', str(path), tap_id])} exclude_entry.reason 'clock was wrong'"
+        entry = shlex.join([str(path), tap_id])
+        out = f"folder_updates.exclude_entry {entry} exclude_entry.reason 'clock was wrong'"
         cure = f"Put the clock right; if it was wrong at that test, take it out and tap again: {out}"
         yield Remark("tap-in-future", f"tap test {tap_id}", f"dated {time:%Y-%m-%d}, in the future", cure)

@@ -1,7 +1,4 @@
-"""Exponential windows on responses: correct, apply and detect them.
-
-record ends; modes without them.
-"""
+"""Exponential windows on responses: correct, apply and detect them."""
 
 from __future__ import annotations
 
@@ -11,18 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from acquisition import (
-    Frf,
-    Hit,
-    Remark,
-    apply_exponential_window,
-    correct_windowed_receptance,
-    estimate_frf,
-    find_hit_time,
-    infer_window,
-    measure_time_after_hit,
-    remove_sensor_mass,
-)
+import acquisition
+from acquisition import Frf, Hit, Remark
 from modal import Mode, Trust, assess_trust, common_decay_rate, fit_modes, remove_window, widen_for_window
 
 TIME_CONSTANT_TOLERANCE = 0.02
@@ -89,12 +76,12 @@ class Window:
             seconds = "the seconds from the record's start (the pre-trigger), 0 where the window begins at the hit"
             cure = f"add Window.hit_at with {seconds}"
             raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
-        hit_at = float(np.mean([find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
+        hit_at = (
+            float(np.mean([acquisition.find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
+        )
         if not hit_at >= self.start:
-            raise ValueError(
-                f"Window.start {self.start:g}: the window begins after the hit at {hit_at:.4g} s; "
-                "both count from the record's start"
-            )
+            problem = f"the window begins after the hit at {hit_at:.4g} s; both count from the record's start"
+            raise ValueError(f"Window.start {self.start:g}: {problem}")
         return hit_at - self.start
 
 
@@ -112,14 +99,12 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     if np.isnan(window.time_constant):
         window = replace(window, time_constant=named)
     if np.isnan(window.time_constant):
-        raise ValueError(
-            "the response lies under a window, and the file does not say how that falls; give the time constant of an "
-            "exponential one with Window.time_constant, export the file anew where it is another"
-        )
+        cure = "give the time constant of an exponential one with Window.time_constant"
+        problem = "the response lies under a window, and the file does not say how that falls"
+        raise ValueError(f"{problem}; {cure}, export the file anew where it is another")
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
-        raise ValueError(
-            f"Window.time_constant {window.time_constant:g}: the file says {named:.4g} s; leave the option out"
-        )
+        option = f"Window.time_constant {window.time_constant:g}"
+        raise ValueError(f"{option}: the file says {named:.4g} s; leave the option out")
     return window
 
 
@@ -137,9 +122,9 @@ def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], floa
 
     The rest of the ringing at the end of the record acts as if cut off: K is wrong by about that share.
     """
-    tau = min(measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
-    windowed = tuple(apply_exponential_window(hit, tau) for hit in hits)
-    return correct_windowed_receptance(estimate_frf(windowed), tau), windowed, tau
+    tau = min(acquisition.measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
+    windowed = tuple(acquisition.apply_exponential_window(hit, tau) for hit in hits)
+    return acquisition.correct_windowed_receptance(acquisition.estimate_frf(windowed), tau), windowed, tau
 
 
 def own_window_remark(about: str, time_constant: float, cure: str) -> Remark:
@@ -162,23 +147,16 @@ def remove_recorded_window(
     """Remove the window of a record (s) from modes, and remark on those that it cannot contain.
 
     A mode that decays no faster than the window is none. Raises ValueError if that holds for all: then the time
-    constant
-    is wrong.
+    constant is wrong.
     """
     rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
     kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]
     wider = (widen_for_window(mode, time_constant, record) for mode in kept)
-    remarks = tuple(
-        _slow_decay_remark(mode, time_constant) for mode, is_mode in zip(modes, rings, strict=True) if not is_mode
-    )
-    return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
-
-
-def _slow_decay_remark(mode: Mode, time_constant: float) -> Remark:
     text = f"decays no faster than the window of {time_constant:.3g} s: no mode behind it, left out"
-    return Remark(
-        "slower-than-window", f"{mode.frequency:.0f} Hz", text, "a wrong Window.time_constant does that to all modes"
-    )
+    said = text, "a wrong Window.time_constant does that to all modes"
+    slow = [mode for mode, is_mode in zip(modes, rings, strict=True) if not is_mode]
+    remarks = tuple(Remark("slower-than-window", f"{mode.frequency:.0f} Hz", *said) for mode in slow)
+    return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
 
 
 def refit_ringing_modes(
@@ -191,11 +169,11 @@ def refit_ringing_modes(
     if not hits or not any(_is_ringing(mode) for mode in modes):
         return tuple(modes), ()
     frf, windowed, tau = window_ringing_hits(hits)
-    refitted = list(remove_own_window(fit_modes(remove_sensor_mass(frf, mass), band, windowed), tau))
+    refitted = list(remove_own_window(fit_modes(acquisition.remove_sensor_mass(frf, mass), band, windowed), tau))
     best, remarks = list[Mode](), list[Remark]()
     for mode in modes:
         same = _find_same_mode(mode, refitted) if _is_ringing(mode) else None
-        best.append(mode if same is None else same)
+        best.append(same or mode)
         if same is not None:
             remarks.append(own_window_remark(f"{same.frequency:.0f} Hz", tau, "a longer record needs none"))
     return tuple(best), tuple(remarks)
@@ -208,23 +186,21 @@ def _is_ringing(mode: Mode) -> bool:
 
 def _find_same_mode(mode: Mode, candidates: Sequence[Mode]) -> Mode | None:
     """Return the nearest candidate within a half-power half-width, or None."""
-
-    def distance(candidate: Mode) -> float:
-        return abs(candidate.frequency - mode.frequency)
-
-    near = [candidate for candidate in candidates if distance(candidate) < mode.damping_ratio * mode.frequency]
-    return min(near, key=distance, default=None)
+    nearest = min(candidates, key=lambda candidate: abs(candidate.frequency - mode.frequency), default=None)
+    is_near = nearest and abs(nearest.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+    return nearest if is_near else None
 
 
 def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterator[Remark]:
     """Yield a remark on an undeclared exponential window, detected in the hits or else in equal decay rates."""
     trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
     if hits:
-        tau, sign = infer_window(hits), "the noise at the end of the records is lower than before the hits"
+        tau, sign = acquisition.infer_window(hits), "the noise at the end of the records is lower than before the hits"
     else:
         rate, sign = common_decay_rate(trusted), "all modes decay alike, damping falls as 1/f"
         tau = None if rate is None else 1 / rate
     if tau is not None:
         lost = "damping is too large, and stiffness by what it had lost by the hit"
         text = f"{sign}, as under an exponential window of {tau:.2g} s: {lost}"
-        yield Remark("window-suspected", "", text, "look it up, and name it with --window, or export without")
+        cure = "look it up, and name it with Window.time_constant, or export without"
+        yield Remark("window-suspected", "", text, cure)

@@ -6,20 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition import (
-    DataError,
-    Description,
-    Fact,
-    Frf,
-    Hit,
-    HitFlags,
-    Remark,
-    check_hit,
-    estimate_frf,
-    infer_averages,
-    inspect_file,
-    read_frf,
-)
+import acquisition
+from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from modal import ConjugateError, pick_peaks
 
@@ -56,7 +44,7 @@ def read_file_frf(
     """
     accepted, averages = _parse_accepted_flags(accept), description.averages
     description = replace(description, averages=None)
-    recording = inspect_file(path, description)
+    recording = acquisition.inspect_file(path, description)
     if recording.problems:
         phase = "" if conjugate else _check_phase(path, description)
         raise DataError(f"{path}: {recording.problems}{missing_window_text(recording.window, window)}{phase}")
@@ -72,7 +60,7 @@ def read_file_frf(
 def _check_phase(path: Path, description: Description) -> str:
     """Return the fault of the phase of an FRF whose unit or response number is missing, else an empty text."""
     unit, response = description.unit or "m/N", description.response or 1
-    frf = inspect_file(path, replace(description, unit=unit, response=response)).frf
+    frf = acquisition.inspect_file(path, replace(description, unit=unit, response=response)).frf
     try:
         if frf is not None:
             pick_peaks(frf)
@@ -84,22 +72,24 @@ def _check_phase(path: Path, description: Description) -> str:
 
 
 def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
-    verdicts = [check_hit(hit) for hit in hits]
+    verdicts = [acquisition.check_hit(hit) for hit in hits]
     good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
         text = f"{refused} of {len(hits)} hits are averaged though they were refused"
-        frf = estimate_frf(good) if good[0].has_force else None
+        frf = acquisition.estimate_frf(good) if good[0].has_force else None
         return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
     if good and not good[0].has_force:
         return FileFrf(None, tuple(good))
     try:
-        return FileFrf(read_frf(path, description), tuple(good))
+        return FileFrf(acquisition.read_frf(path, description), tuple(good))
     except DataError:
         ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing or not hits[0].has_force:
             raise
-        return _average_ringing_hits(ringing)
+        frf, windowed, tau = window_ringing_hits(ringing)
+        cure = "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
+        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),))
 
 
 def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
@@ -107,34 +97,24 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            raise ValueError(
-                f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}"
-            )
+            allowed = ", ".join(flags)
+            raise ValueError(f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {allowed}")
         accepted |= flags[code]
     return accepted
-
-
-def _average_ringing_hits(hits: list[Hit]) -> FileFrf:
-    frf, windowed, tau = window_ringing_hits(hits)
-    remark = own_window_remark(
-        "", tau, "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
-    )
-    return FileFrf(frf, windowed, tau, (remark,))
 
 
 def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
     """Set the number of averages behind the coherence: as given, else as in the file, else inferred."""
     if averages is not None:
+        option = f"Description.averages {averages}"
         if averages < 1:
-            raise ValueError(f"Description.averages {averages}: give the number of hits averaged, 1 or more")
+            raise ValueError(f"{option}: give the number of hits averaged, 1 or more")
         if frf.coherence is None:
-            raise ValueError(
-                f"Description.averages {averages}: {path.name} has no coherence to use it with; leave it out"
-            )
+            raise ValueError(f"{option}: {path.name} has no coherence to use it with; leave it out")
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = infer_averages(frf), "give it with Description.averages"
+    inferred, cure = acquisition.infer_averages(frf), "give it with Description.averages"
     if inferred is None:
         text = "the coherence is not used: the number of averages is not known and cannot be inferred"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+import modal
 from acquisition import DataError, Description, Fact, Frf, Remark, correct_windowed_receptance, remove_sensor_mass
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
@@ -15,21 +16,8 @@ from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
-from lobewatch.measurement.tap_measurement import mode_edits_remark
-from modal import (
-    Extraction,
-    Mode,
-    ModeEdits,
-    common_delay,
-    edit_modes,
-    extract_modes,
-    find_peaks_above_band,
-    find_truncated_peaks,
-    match_modes,
-    modes_from_decays,
-    modes_from_extraction,
-    pick_peaks,
-)
+from lobewatch.measurement.tap_measurement import mode_edits_remarks
+from modal import Extraction, Mode, ModeEdits
 
 UNKNOWN_SENSOR = SensorLoading()
 """Accelerometer without any data."""
@@ -128,43 +116,35 @@ def fit_file_modes(
             fields = "Window.time_constant, Window.hit_at and fit_file_modes.conjugate"
             raise ValueError(f"{fields} are of hits with their force; leave them out")
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
-    frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
-    hits = () if conjugate else file_frf.hits
+    frf, hits = file_frf.frf, file_frf.hits
+    if conjugate:
+        frf, hits = replace(frf, receptance=frf.receptance.conj()), ()
     window = windows.resolve_window(file_frf.recorded_window, window)
-    delay = None if window is None else window.delay(file_frf.hits)
-    frf = frf if window is None else correct_windowed_receptance(frf, window.time_constant)
-    tau = file_frf.time_constant if window is None else window.time_constant
+    delay, tau = 0.0, file_frf.time_constant
+    if window is not None:
+        delay, tau = window.delay(file_frf.hits), window.time_constant
+        frf = correct_windowed_receptance(frf, tau)
     edits = by_hand if tau is None else by_hand.with_window(tau)
 
     def fit(bare: Frf) -> FrfFit:
-        state = edit_modes(extract_modes([bare], band), edits)
-        return FrfFit(
-            state, tuple(modes_from_extraction(state, [hits])), (mode_edits_remark(by_hand),) if by_hand else ()
-        )
+        state = modal.edit_modes(modal.extract_modes([bare], band), edits)
+        return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), mode_edits_remarks(by_hand))
 
     extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
     frf = remove_sensor_mass(frf, mass)
-    if window is not None and delay is not None:
-        fitted, windowed = windows.remove_recorded_window(modes, window.time_constant, delay, 1 / _frequency_step(frf))
-    elif file_frf.time_constant is not None:
-        fitted, windowed = tuple(windows.remove_own_window(modes, file_frf.time_constant)), ()
+    if window is not None:
+        record = 1 / float(np.mean(np.diff(frf.frequency)))
+        fitted, windowed = windows.remove_recorded_window(modes, window.time_constant, delay, record)
+    elif tau is not None:
+        fitted, windowed = tuple(windows.remove_own_window(modes, tau)), ()
     else:
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
-        if not accept:
-            fitted, ringing = windows.refit_ringing_modes(modes, hits, band, mass)
-            windowed += ringing
-    return FileModes(
-        path=path,
-        frf=frf,
-        extraction=extraction,
-        as_recorded=modes,
-        fitted=fitted,
-        picked=tuple(pick_peaks(frf, band)),
-        remarks=(*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band)),
-        facts=file_frf.facts,
-        by_hand=by_hand,
-    )
+        fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
+        windowed += ringing
+    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
+    picked = tuple(modal.pick_peaks(frf, band))
+    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
 
 
 def _fit_decay_modes(
@@ -173,20 +153,16 @@ def _fit_decay_modes(
     """Fit the modes of hits without force; DataError if a window adds damping to them."""
     if decays.recorded_window is not None:
         raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
-    state = edit_modes(extract_decay_modes(decays.hits, band), by_hand)
-    modes = tuple(modes_from_decays(state))
-    fit_remarks = (*([mode_edits_remark(by_hand)] if by_hand else []), *decay_remarks(sensor))
-    remarks = (*decays.remarks, *fit_remarks, *_fit_remarks(modes, state.frf, band))
+    state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
+    modes = tuple(modal.modes_from_decays(state))
+    fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
+    remarks = (*decays.remarks, *fit_remarks)
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
-
-
-def _frequency_step(frf: Frf) -> float:
-    return float(np.mean(np.diff(frf.frequency)))
 
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
     yield from check_modes_together(modes)
-    for edge in find_truncated_peaks(frf, modes, band):
+    for edge in modal.find_truncated_peaks(frf, modes, band):
         text = "a peak may be cut by the edge of the lines, its mode missing"
         yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
     if band is None:
@@ -197,7 +173,7 @@ def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | No
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
     """Yield a remark on peaks above the usable band."""
-    peaks = find_peaks_above_band(frf)
+    peaks = modal.find_peaks_above_band(frf)
     if frf.usable_band is None or not peaks:
         return
     where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
@@ -220,22 +196,17 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     list of Remark
         Remarks on wrong signs and on a common delay.
     """
-    return [*_check_signs(modes), *_check_delay(modes)]
-
-
-def _check_signs(modes: Sequence[Mode]) -> Iterator[Remark]:
+    remarks = []
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
         text = "every K is negative: hammer or sensor is mounted or wired the other way round"
-        yield Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")
-
-
-def _check_delay(modes: Sequence[Mode]) -> Iterator[Remark]:
-    delay = common_delay(modes)
+        remarks.append(Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign"))
+    delay = modal.common_delay(modes)
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
         text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
         cure = "measure it with sensor_checks.check_skew, or add that to skew_us of the accelerometer in machine.toml"
-        yield Remark("channel-delay", "", text, cure)
+        remarks.append(Remark("channel-delay", "", text, cure))
+    return remarks
 
 
 def list_comparison_files(
@@ -285,15 +256,11 @@ def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], other
     ValueError
         If two measurements are identical.
     """
-    for place, (text, other) in enumerate(zip(beside, others, strict=True)):
-        if any(_is_same_measurement(other, one) for one in (file_modes, *others[:place])):
-            raise ValueError(
-                f"list_comparison_files.beside {text}: the same numbers are looked at already; name another measurement"
-            )
+    numbers = [modes.extraction.frf.receptance for modes in (file_modes, *others)]
+    for place, (text, new) in enumerate(zip(beside, numbers[1:], strict=True), 1):
+        if any(np.array_equal(new, earlier) for earlier in numbers[:place]):
+            problem = "the same numbers are looked at already; name another measurement"
+            raise ValueError(f"list_comparison_files.beside {text}: {problem}")
     found = [other.fitted for other in others]
-    as_recorded, fitted = (tuple(match_modes(modes, found)) for modes in (file_modes.as_recorded, file_modes.fitted))
-    return replace(file_modes, as_recorded=as_recorded, fitted=fitted)
-
-
-def _is_same_measurement(one: FileModes, other: FileModes) -> bool:
-    return np.array_equal(one.extraction.frf.receptance, other.extraction.frf.receptance)
+    as_recorded, fitted = (modal.match_modes(modes, found) for modes in (file_modes.as_recorded, file_modes.fitted))
+    return replace(file_modes, as_recorded=tuple(as_recorded), fitted=tuple(fitted))

@@ -75,10 +75,7 @@ STIFFNESS_OFF_MODEL = RecordingQuestion(
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
 A real spindle is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
-MODE_QUESTIONS = (
-    *(FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW),
-    *(STIFFNESS_JUMP, STIFFNESS_OFF_MODEL),
-)
+MODE_QUESTIONS = (FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW, STIFFNESS_JUMP, STIFFNESS_OFF_MODEL)
 RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
@@ -158,10 +155,9 @@ def find_accepted_codes(remarks: Iterable[Remark]) -> frozenset[str]:
 def check_question_codes(codes: Iterable[str]) -> list[str]:
     """Return each code once; ValueError for an unknown one."""
     distinct = list(dict.fromkeys(codes))
-    for code in distinct:
-        if code not in RECORDING_QUESTIONS:
-            questions = ", ".join(RECORDING_QUESTIONS)
-            raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
+    for code in [code for code in distinct if code not in RECORDING_QUESTIONS]:
+        questions = ", ".join(RECORDING_QUESTIONS)
+        raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
     return distinct
 
 
@@ -206,12 +202,11 @@ def question_remarks(
     counts = Counter(question.code for questions in asked.values() for question in questions)
     for question, tap_ids in same.items():
         answer = _answer_command(path, tap_ids, question.code, all_of_them=len(tap_ids) == counts[question.code])
-        if len(tap_ids) == 1:
-            about = f"tap test {tap_ids[0]}"
-            rest, test = "it sets no reference until you say that it is", "this test is"
-        else:
+        about, rest = f"tap test {tap_ids[0]}", "it sets no reference until you say that it is"
+        if len(tap_ids) > 1:
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
-            rest, test = "they set no reference until you say that they are", "these tests are"
+            rest = "they set no reference until you say that they are"
+        test = "this test is" if len(tap_ids) == 1 else "these tests are"
         cure = f"Tap again; if {test} right, say so: {answer}"
         yield Remark(question.code, about, f"{question.text}; {rest} right: {answer}", cure)
 
@@ -227,10 +222,10 @@ def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable
     """Return the codes of the questions about the time of a test; now: time of its commit, None for a replay."""
     if now is None:
         return ()
-    newest = max((datetime.fromisoformat(tap.time) for tap in taps if not tap.excluded), default=None)
+    newest = max((tap.created for tap in taps if not tap.excluded), default=None)
     is_asked = {
         clock.CLOCK_BEHIND: newest is not None and (now < newest or created < newest - MAX_RESUME_AGE),
         clock.CLOCK_BEFORE_RELEASE: created < clock.FIRST_RELEASE,
         clock.CLOCK_AHEAD: clock.is_in_future(created, now),
     }
-    return tuple(code for code in is_asked if is_asked[code])
+    return tuple(code for code, asked in is_asked.items() if asked)

@@ -5,18 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
+import modal
 from acquisition import Frf, Hit, Remark, extract_free_decay, remove_sensor_mass
 from lobewatch.machine.settings.setup_tables import SensorLoading
-from modal import (
-    Extraction,
-    Mode,
-    Trust,
-    assess_trust,
-    decay_spectra,
-    extract_modes,
-    mass_loading,
-    with_mass_uncertainty,
-)
+from modal import Extraction, Mode, Trust
 
 TYPICAL_SENSOR_MASS = 0.010
 """Mass of a typical accelerometer (kg), assumed to decide whether an unknown mass matters."""
@@ -48,14 +40,15 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
     """
     if not sensor.mass:
         state, modes, remarks = fit(frf)
-        return FrfFit(state, modes, (*remarks, *_sensor_remarks(modes, frf, sensor)))
+        unknown = _unknown_mass_remarks(modes, frf) if sensor.mass is None else ()
+        return FrfFit(state, modes, (*remarks, *unknown, *_mounting_remarks(modes, frf, sensor)))
     bare = remove_sensor_mass(frf, sensor.mass)
     state, modes, remarks = fit(bare)
     if not _is_driving_point(modes):
         remark = _mass_not_removed_remark(sensor, "not the driving point, a K is negative")
         state, modes, remarks = fit(frf)
         return FrfFit(state, modes, (*remarks, remark))
-    modes = tuple(with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
+    modes = tuple(modal.with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
     remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} are taken off")
     return FrfFit(state, modes, (*remarks, remark, *_mounting_remarks(modes, bare, sensor)))
 
@@ -69,26 +62,19 @@ def _format_sensor_mass(sensor: SensorLoading) -> str:
     return f"{1e3 * (sensor.mass or 0.0):.3g} ± {1e3 * sensor.mass_std:.1g} g of accelerometer and cable"
 
 
-def _sensor_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) -> Iterator[Remark]:
-    if sensor.mass is None:
-        yield from _unknown_mass_remarks(modes, frf)
-    yield from _mounting_remarks(modes, frf, sensor)
-
-
 def _trusted_driving_point_modes(modes: Sequence[Mode], frf: Frf) -> list[Mode]:
     """Return the trusted modes at the driving point; empty if one has a negative K."""
-    trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
+    trusted = [mode for mode in modes if modal.assess_trust(mode) is Trust.TRUSTED]
     return trusted if frf.measured_as == "accelerance" and _is_driving_point(trusted) else []
 
 
 def _is_driving_point(modes: Sequence[Mode]) -> bool:
-    return all(mode.is_driving_point for mode in modes if assess_trust(mode) is Trust.TRUSTED)
+    return all(mode.is_driving_point for mode in modes if modal.assess_trust(mode) is Trust.TRUSTED)
 
 
 def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
-    loadings = [
-        (mode, mass_loading(mode, frf, TYPICAL_SENSOR_MASS)) for mode in _trusted_driving_point_modes(modes, frf)
-    ]
+    trusted = _trusted_driving_point_modes(modes, frf)
+    loadings = [(mode, modal.mass_loading(mode, frf, TYPICAL_SENSOR_MASS)) for mode in trusted]
     relevant = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
     if relevant:
         mode, loading = min(relevant, key=lambda pair: pair[1].frequency)
@@ -96,7 +82,7 @@ def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
         stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < MAX_FIRST_ORDER_DROP else ""
         changes = f"the frequency by {-100 * fall:.2g} %{stiffness}"
         text = f"an accelerometer of {1e3 * TYPICAL_SENSOR_MASS:g} g would change {changes}, more than its interval"
-        cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or --sensor-mass for a file"
+        cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or fit_file_modes.sensor for a file"
         yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", f"{text}: its mass is not known", cure)
 
 
@@ -106,9 +92,8 @@ def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) ->
         return
     resonance = MOUNTING_RESONANCES[sensor.mounting or "magnet"]
     biased = [(mode, (mode.frequency / resonance) ** 2) for mode in _trusted_driving_point_modes(modes, frf)]
-    worst = [
-        pair for pair in biased if pair[1] > max(MIN_REPORTED_BIAS, pair[0].interval()[2, 1] / pair[0].stiffness - 1)
-    ]
+    limits = (max(MIN_REPORTED_BIAS, mode.interval()[2, 1] / mode.stiffness - 1) for mode, _ in biased)
+    worst = [pair for pair, limit in zip(biased, limits, strict=True) if pair[1] > limit]
     if worst:
         mode, bias = max(worst, key=lambda pair: pair[1])
         text = f"resonates at about {resonance / 1e3:g} kHz: K reads about {100 * min(bias, 1.0):.0f} % low"
@@ -130,9 +115,8 @@ def extract_decay_modes(hits: Sequence[Hit], band: tuple[float, float] | None = 
     """
     rate, decays = hits[0].sample_rate, [extract_free_decay(hit) for hit in hits]
     shortest = min(map(len, decays))
-    return extract_modes(
-        decay_spectra([decay[:shortest] for decay in decays], rate), band or (0.0, MAX_DECAY_FREQUENCY_RATIO * rate)
-    )
+    spectra = modal.decay_spectra([decay[:shortest] for decay in decays], rate)
+    return modal.extract_modes(spectra, band or (0.0, MAX_DECAY_FREQUENCY_RATIO * rate))
 
 
 def decay_remarks(sensor: SensorLoading) -> list[Remark]:

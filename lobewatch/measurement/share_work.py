@@ -63,9 +63,8 @@ def _parse_scheduler_address(address: str) -> tuple[str, str]:
     try:
         from distributed.comm import get_address_host_port, parse_address
     except ImportError as error:
-        raise DataError(
-            f'Workers.scheduler {address}: needs Dask; install it: pip install "lobewatch[fleet]"'
-        ) from error
+        cure = 'install it: pip install "lobewatch[fleet]"'
+        raise DataError(f"Workers.scheduler {address}: needs Dask; {cure}") from error
     try:
         return parse_address(address)[0], get_address_host_port(address)[0]
     except ValueError as error:

@@ -7,24 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import dsm
 from acquisition import DataError, Frf
-from dsm import (
-    Calibration,
-    DampingCalibration,
-    Spindle,
-    StiffnessFit,
-    calibrate,
-    calibrate_damping,
-    couple_tool,
-    critical_speed,
-    energy_shares,
-    fit_stiffness,
-    modes_at,
-    natural_frequencies,
-    receptance,
-    spindle_side,
-    static_stiffness,
-)
+from dsm import Calibration, DampingCalibration, Spindle, StiffnessFit
 from lobewatch.machine import Machine
 from lobewatch.measurement.tap_measurement import Measurement
 
@@ -110,7 +95,7 @@ def first_critical_speed(spindle: Spindle) -> float | None:
         Speed (rpm); None if gyroscopic moments leave none.
     """
     try:
-        return critical_speed(spindle)
+        return dsm.critical_speed(spindle)
     except ArithmeticError:
         return None
 
@@ -128,11 +113,10 @@ def compute_model_frf(state: ModelState) -> Frf:
     Frf
         Receptance (m/N) at the tapped place, or at the tip of another tool.
     """
-    machine = state.machine
-    table = machine.spindle
+    machine, table = state.machine, state.machine.spindle
     if table is None:
         raise DataError("no model: add a [spindle] table")
-    first = float(natural_frequencies(state.spindle, 1)[0])
+    first = float(dsm.natural_frequencies(state.spindle, 1)[0])
     frequency = np.linspace(MODEL_FRF_BAND[0] * first, MODEL_FRF_BAND[1] * first, 2 * MODEL_FRF_POINTS)
     followed = state.measurement.followed if state.measurement else None
     loss_factor = 2 * (table.damping_ratio if followed is None else followed.damping_ratio)
@@ -140,9 +124,9 @@ def compute_model_frf(state: ModelState) -> Frf:
     if followed is not None:
         spindle, reference = _remove_dampers(spindle), _remove_dampers(reference)
     if state.tool == machine.tap.tool or table.tool_length_mm is None:
-        return Frf(frequency, receptance(spindle, frequency, tap_position(state), loss_factor))
-    side = spindle_side(reference, frequency, table.tool_length_mm / 1e3, loss_factor)
-    return Frf(frequency, couple_tool(side, machine.find_modelled_tool(state.tool).build(state.reference)))
+        return Frf(frequency, dsm.receptance(spindle, frequency, tap_position(state), loss_factor))
+    side = dsm.spindle_side(reference, frequency, table.tool_length_mm / 1e3, loss_factor)
+    return Frf(frequency, dsm.couple_tool(side, machine.find_modelled_tool(state.tool).build(state.reference)))
 
 
 def _remove_dampers(spindle: Spindle) -> Spindle:
@@ -203,20 +187,15 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
     ModelSummary
         First modes, static stiffness and critical speed.
     """
-    frequency, stiffness = modes_at(state.spindle, count)
-    shares = energy_shares(state.spindle, count)
+    frequency, stiffness = dsm.modes_at(state.spindle, count)
+    shares = dsm.energy_shares(state.spindle, count)
     parts = shares.bearings + shares.housings, shares.segments, shares.joints
     modes = tuple(
         ModelMode(float(frequency[n]), float(stiffness[n]), *(float(np.sum(part[n])) for part in parts))
         for n in range(count)
     )
-    return ModelSummary(
-        state,
-        modes,
-        static_stiffness(state.spindle),
-        first_critical_speed(state.spindle),
-        float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0]),
-    )
+    rigid = float(dsm.natural_frequencies(state.spindle, 1, rigid_bearings=True)[0])
+    return ModelSummary(state, modes, dsm.static_stiffness(state.spindle), first_critical_speed(state.spindle), rigid)
 
 
 @dataclass(frozen=True)
@@ -278,19 +257,16 @@ def calibrate_model(
     """
     spindle = machine.model(machine.tap.tool)
     stiffness: Calibration | StiffnessFit
-    if len(frequency) == 1 and _has_one_bearing_factor(spindle, group):
-        number = mode[0] if mode else machine.mode.model_mode
-        std, name = frequency_std[0] if frequency_std else None, group[0] if group else None
-        stiffness = calibrate(spindle, frequency[0], std, number, name)
+    scales_joints = not {joint.group for joint in spindle.joints}.isdisjoint(group)
+    name = group[0] if group else None
+    if len(frequency) == 1 and len(group) <= 1 and not scales_joints:
+        number, std = mode[0] if mode else machine.mode.model_mode, frequency_std[0] if frequency_std else None
+        stiffness = dsm.calibrate(spindle, frequency[0], std, number, name)
     else:
         named = frequency_std or None, mode or None, group or None
-        stiffness = fit_stiffness(spindle, frequency, *named, tolerance=machine.drawing_tolerance)
+        stiffness = dsm.fit_stiffness(spindle, frequency, *named, tolerance=machine.drawing_tolerance)
         number = int(stiffness.mode[0])
     dampers = None
     if damping_ratio is not None:
-        dampers = calibrate_damping(stiffness.spindle, damping_ratio, mode=number, group=group[0] if group else None)
+        dampers = dsm.calibrate_damping(stiffness.spindle, damping_ratio, mode=number, group=name)
     return ModelCalibration(machine.spindle.label if machine.spindle else "", stiffness, dampers)
-
-
-def _has_one_bearing_factor(spindle: Spindle, group: Sequence[str]) -> bool:
-    return len(group) <= 1 and not {joint.group for joint in spindle.joints} & set(group)

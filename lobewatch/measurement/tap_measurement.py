@@ -1,7 +1,4 @@
-"""Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip.
-
-recorded with its reason, and the next one goes on.
-"""
+"""Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
 from __future__ import annotations
 
@@ -14,25 +11,14 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+import modal
 from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
-from modal import (
-    CredibleModes,
-    Extraction,
-    Mode,
-    ModeEdits,
-    edit_modes,
-    extract_modes,
-    follow_mode,
-    modes_from_decays,
-    modes_from_extraction,
-    predominant_mode,
-    select_credible_modes,
-)
+from modal import CredibleModes, Extraction, Mode, ModeEdits
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
@@ -42,32 +28,6 @@ BEARING_STIFFNESS_RANGE = (1e5, 1e11)
 MAX_STIFFNESS_CHANGE_RATIO = 2.0
 """Ratio of K of two successive tests, or the inverse, above which nothing is calibrated. Wear of 10 % in frequency
 takes a third off K, tests scatter by a tenth, the smallest mistake of a unit is 4.4."""
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """Result of one tap test: modes, followed mode, calibrated model."""
-
-    tap_id: str
-    """Identity of the tap test."""
-    time: datetime
-    """Time of the tap test."""
-    tool: str
-    """Tool in the spindle."""
-    direction: str
-    """Direction at the tool tip, "x" or "y"."""
-    modes: Sequence[Mode] = ()
-    """All modes as measured."""
-    followed: Mode | None = None
-    """Mode of calibration and trend; None without one."""
-    calibration: Calibration | None = None
-    """Model calibrated to the followed mode; None if impossible or implausible."""
-    at_tip: Sequence[Mode] = ()
-    """Modes at the tool tip for lobes; empty without any."""
-    remarks: tuple[Remark, ...] = ()
-    """Remarks on missing and doubtful results."""
-    cross: Sequence[Mode] | None = None
-    """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +45,23 @@ class TapFit:
     modes: Sequence[Mode] = ()
     """All modes as measured."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on doubtful modes, and why there are none."""
+    """Remarks on missing and doubtful results."""
     failed: bool = False
     """True if the fit was impossible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement(TapFit):
+    """Result of one tap test: its fit, followed mode and calibrated model."""
+
+    followed: Mode | None = None
+    """Mode of calibration and trend; None without one."""
+    calibration: Calibration | None = None
+    """Model calibrated to the followed mode; None if impossible or implausible."""
+    at_tip: Sequence[Mode] = ()
+    """Modes at the tool tip for lobes; empty without any."""
+    cross: Sequence[Mode] | None = None
+    """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
 
 
 @cache
@@ -131,8 +105,9 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     with _thread_controller().limit(limits=1):
         try:
             if tap.frf is None:
-                fitted = _fit_decays(tap, machine, by_hand)
-                return TapFit(*named, fitted.modes, fitted.remarks)
+                state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
+                said = (*edited, *decay_remarks(machine.tap.sensor))
+                return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
             windows = hidden_window_remarks(tap.accepted, fitted.modes)
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
@@ -142,63 +117,56 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
 
 
 def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
-    state, remarks = _apply_edits(extract_modes([frf]), by_hand)
-    return FrfFit(state, tuple(modes_from_extraction(state, [tap.accepted])), remarks)
-
-
-def _fit_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> FrfFit:
-    state, remarks = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-    return FrfFit(state, tuple(modes_from_decays(state)), (*remarks, *decay_remarks(machine.tap.sensor)))
+    state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
+    return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
     """Apply mode edits, or return the extraction with a remark if they are impossible."""
-    if not by_hand:
-        return state, ()
     try:
-        return edit_modes(state, by_hand), (mode_edits_remark(by_hand),)
+        return modal.edit_modes(state, by_hand) if by_hand else state, mode_edits_remarks(by_hand)
     except ValueError as error:
-        cure = "say it anew with lobewatch modes MACHINE TAP, or --by-fit to take it back"
-        return state, (Remark("hand-not-applied", str(by_hand), str(error), cure),)
+        cure = "say it anew with folder_updates.store_mode_edits, or NO_MODE_EDITS to take it back"
+        return state, (Remark(EDITS_NOT_APPLIED_CODE, str(by_hand), str(error), cure),)
 
 
-def mode_edits_remark(by_hand: ModeEdits) -> Remark:
-    """Return the remark on mode edits."""
-    return Remark("modes-by-hand", str(by_hand), "modes chosen by hand")
+def mode_edits_remarks(by_hand: ModeEdits) -> tuple[Remark, ...]:
+    """Return the remark on mode edits; none without any."""
+    return (Remark("modes-by-hand", str(by_hand), "modes chosen by hand"),) if by_hand else ()
 
 
 def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
     """Follow the mode, calibrate the model and find the modes at the tip; last: followed mode of the previous test."""
     if fit.direction == CROSS_TAP:
         return _interpret_cross_tap(fit, machine, last)
-    remarks, modes = [*fit.remarks], fit.modes
-    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
     if fit.failed:
-        return Measurement(*named, remarks=fit.remarks)
+        return Measurement(**vars(fit))
+    remarks, modes = [*fit.remarks], fit.modes
     with _thread_controller().limit(limits=1):
-        trusted = select_credible_modes(_select_in_band(modes, machine))
+        trusted = modal.select_credible_modes(_select_in_band(modes, machine))
         remarks += trusted.remarks
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
-    return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
+    results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
+    return Measurement(**vars(fit) | results)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
     """Interpret a cross FRF: modes of either sign, and no calibration."""
     signed = _select_in_band(fit.modes, machine)
     plain = [replace(mode, stiffness=abs(mode.stiffness)) for mode in signed]
-    trusted = select_credible_modes(plain)
+    trusted = modal.select_credible_modes(plain)
     cross = [mode for mode, size in zip(signed, plain, strict=True) if size in trusted.modes]
-    followed = predominant_mode(trusted.modes) if last is None else follow_mode(last, trusted.modes).mode
+    followed = modal.predominant_mode(trusted.modes) if last is None else modal.follow_mode(last, trusted.modes).mode
     remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
     if machine.tap.position_mm:
         text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
         remarks.append(Remark("cross-beside-tip", "", text, "tap across at the tip"))
-    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
-    return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=(*remarks, *trusted.remarks))
+    results = {"followed": followed, "cross": at_tip, "remarks": (*remarks, *trusted.remarks)}
+    return Measurement(**vars(fit) | results)
 
 
 def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
@@ -210,7 +178,7 @@ def _follow_mode(
     trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
     """Return the credible mode that continues the last one, or the predominant one."""
-    mode = predominant_mode(trusted.modes)
+    mode = modal.predominant_mode(trusted.modes)
     if mode is None:
         remarks.append(questions.no_mode_remark(modes, machine))
     elif last is not None:
@@ -220,7 +188,7 @@ def _follow_mode(
 
 def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
     """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
-    next_mode = follow_mode(last, candidates)
+    next_mode = modal.follow_mode(last, candidates)
     jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)
@@ -270,11 +238,7 @@ def _check_calibration(calibration: Calibration, followed: Mode, last: Mode | No
 
 
 def _transfer_to_tip(
-    trusted: CredibleModes,
-    followed: Mode | None,
-    calibration: Calibration | None,
-    machine: Machine,
-    remarks: list[Remark],
+    trusted: CredibleModes, followed: Mode | None, model: Calibration | None, machine: Machine, remarks: list[Remark]
 ) -> list[Mode]:
     """Return the modes at the tip, by the model if tapped elsewhere; empty if a K is negative."""
     if not trusted.modes or not all(mode.has_stiffness for mode in trusted.modes):
@@ -287,17 +251,12 @@ def _transfer_to_tip(
         return []
     if machine.tap.position_mm == 0:
         return list(trusted.modes)
-    if calibration is None or followed is None:
+    if model is None or followed is None:
         text = "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and no model is calibrated"
         remarks.append(Remark("no-lobes-beside-tip", "", text, "tap at the tip, or add a [spindle]"))
         return []
-    return [_scale_to_tip(followed, calibration, machine.tap.position_mm / 1e3)]
-
-
-def _scale_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
-    number = calibration.mode
-    ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
-    return mode.scaled(1.0, ratio, "model to tip")
+    at_tap = modal_stiffness(model.spindle, model.mode, machine.tap.position_mm / 1e3)
+    return [followed.scaled(1.0, modal_stiffness(model.spindle, model.mode) / at_tap, "model to tip")]
 
 
 def is_fit_of(answer: object, entry: TapEntry) -> bool:

@@ -34,7 +34,7 @@ from lobewatch.screen.live_feed import (
     encode_tap_state,
     stream_states,
 )
-from lobewatch.show.terminal.tap_printer import RunningTest
+from lobewatch.show.terminal.terminal_screen import RunningTest
 from lobewatch.tap.cut_recording import CutState
 from lobewatch.tap.state import StatePublisher, TapState
 

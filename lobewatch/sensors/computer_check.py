@@ -9,6 +9,7 @@ import shutil
 import time
 import webbrowser
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -171,11 +172,9 @@ def _check_extras(machine: MachineFolder | None) -> Iterator[Finding]:
 
 
 def _is_installed(package: str) -> bool:
-    try:
-        version(package)
-    except PackageNotFoundError:
-        return False
-    return True
+    with suppress(PackageNotFoundError):
+        return bool(version(package))
+    return False
 
 
 def _check_browser() -> Finding:
@@ -183,12 +182,8 @@ def _check_browser() -> Finding:
     try:
         name = webbrowser.get().__class__.__name__
     except webbrowser.Error:
-        return Finding(
-            "browser",
-            "note",
-            "none here",
-            "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0",
-        )
+        cure = "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0"
+        return Finding("browser", "note", "none here", cure)
     return Finding("browser", "fine", f"there is one ({name})")
 
 

@@ -6,30 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-import numpy as np
-
-from acquisition import (
-    Channel,
-    DataError,
-    Device,
-    DeviceError,
-    DeviceIdentity,
-    Hit,
-    MassCalibration,
-    MeasuredRate,
-    MeasuredSkew,
-    Remark,
-    SensorDataLocation,
-    calibrate_by_mass,
-    capture_hits,
-    evaluate_hit,
-    measure_rate,
-    measure_skew,
-    rate_remark,
-)
+import acquisition
+from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
 from lobewatch.machine.daq_rates import apply_measured_rate, check_device_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LiveSignal, find_sensor_data
+from lobewatch.tap.device_connection import LiveSignal, collect_codes, find_sensor_data
 from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor_remarks
 from lobewatch.tap.trial_hits import TrialHits
 
@@ -41,13 +22,13 @@ RATE_MEASUREMENT_SECONDS = 5.0
 class SensorList:
     """Device, its channels, and what is wrong with them."""
 
-    identity: DeviceIdentity
+    identity: acquisition.DeviceIdentity
     """Model and serial number of the device."""
     channels: tuple[Channel, ...]
     """Channels of the device, one sensor each."""
     nominal_rate: float
     """Sample rate that the device reports (Hz)."""
-    measured_rate: MeasuredRate | None
+    measured_rate: acquisition.MeasuredRate | None
     """Measured sample rate, None if the device has no clock or the measurement failed."""
     replaces_nominal: bool
     """True if the measured rate is used."""
@@ -84,10 +65,10 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
     if has_clock(device):
         tell(f"measuring the rate for {RATE_MEASUREMENT_SECONDS:g} s")
         try:
-            measured = measure_rate(device, RATE_MEASUREMENT_SECONDS)
+            measured = acquisition.measure_rate(device, RATE_MEASUREMENT_SECONDS)
             apply_measured_rate(folder, device, measured)
-            remarks += filter(None, [rate_remark(measured)])
-        except DeviceError as error:
+            remarks += filter(None, [acquisition.rate_remark(measured)])
+        except acquisition.DeviceError as error:
             remarks.append(Remark("sample-rate-wrong", "", error.text, error.cure))
     replaced = device.sample_rate != nominal
     return SensorList(device.identity, device.channels, nominal, measured, replaced, tuple(remarks))
@@ -97,10 +78,8 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
     """Return the remark on a missing anti-alias filter. declared: whether there is one, None if not stated."""
     if declared:
         return []
-    filter_text = "nobody says that a filter keeps" if declared is None else "no filter keeps"
-    text = (
-        f"{filter_text} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
-    )
+    kept = "nobody says that a filter keeps" if declared is None else "no filter keeps"
+    text = f"{kept} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
     cure = "enter [daq] anti_alias = true where the device or an amplifier has one, else choose a higher rate"
     return [Remark("no-anti-alias", "", text, cure)]
 
@@ -113,7 +92,7 @@ MASS_CHECK_BASELINE_SECONDS = 0.5
 class MassCheck:
     """Result of the check with a hung mass, and where to correct a sensitivity."""
 
-    calibration: MassCalibration
+    calibration: acquisition.MassCalibration
     """Ratio of force to mass times acceleration, and what follows from it."""
     place: SensorDataLocation | None
     """Location of the sensitivities in the device, None if machine.toml has them."""
@@ -141,7 +120,7 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
         Calibration, and where to correct a sensitivity.
     """
     hits = _capture_good_hits(folder, device, tell)
-    return MassCheck(calibrate_by_mass(hits, mass), find_sensor_data(folder.machine.daq, port))
+    return MassCheck(acquisition.calibrate_by_mass(hits, mass), find_sensor_data(folder.machine.daq, port))
 
 
 def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> list[Hit]:
@@ -152,8 +131,8 @@ def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[st
     good: list[Hit] = []
     device.start()
     baseline = find_quiet_part(LiveSignal(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
-    for hit in capture_hits(device, TrialHits(folder.machine.tap, baseline).trigger):
-        verdict = evaluate_hit(hit)
+    for hit in acquisition.capture_hits(device, TrialHits(folder.machine.tap, baseline).trigger):
+        verdict = acquisition.evaluate_hit(hit)
         if not verdict.flags:
             good.append(hit)
         text = f"✗ {verdict.flags.words.upper()}  {verdict.text}" if verdict.flags else "✓ GOOD"
@@ -172,7 +151,7 @@ SKEW_RECORDING_SECONDS = 2.0
 class SkewCheck:
     """Measured skew of a device, and where to enter it."""
 
-    measured: MeasuredSkew
+    measured: acquisition.MeasuredSkew
     """Skew of channel 1 against channel 0."""
     sample_rate: float
     """Sample rate of the measurement (Hz)."""
@@ -207,18 +186,12 @@ def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[
         The device does not have exactly two channels.
     """
     if len(device.channels) != 2:
-        raise DataError(
-            f"a skew is that of two inputs; the DAQ has {len(device.channels)}: name two in [[daq.channel]]"
-        )
+        n = len(device.channels)
+        raise acquisition.DataError(f"a skew is that of two inputs; the DAQ has {n}: name two in [[daq.channel]]")
     rate = check_device_rate(folder, device)
     tell(f"recording {SKEW_RECORDING_SECONDS:g} s: both inputs joined with a T-piece, noise or taps on them")
-    blocks = []
     device.start()
-    for block in device.blocks():
-        blocks.append(block.codes)
-        if sum(codes.shape[1] for codes in blocks) >= SKEW_RECORDING_SECONDS * rate:
-            break
+    (first, second), _ = collect_codes(device.blocks(), SKEW_RECORDING_SECONDS * rate)
     device.stop()
-    first, second = np.concatenate(blocks, axis=1)
     place = find_sensor_data(folder.machine.daq, port)
-    return SkewCheck(measure_skew(first, second, rate), rate, device.channels[1], place)
+    return SkewCheck(acquisition.measure_skew(first, second, rate), rate, device.channels[1], place)

@@ -6,79 +6,64 @@ from collections.abc import Sequence
 from dataclasses import astuple
 from datetime import datetime
 from pathlib import Path
-from typing import Any
-
-from rich.table import Table
 
 from lobewatch.monitoring.trend import date_of_days
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 from lobewatch.show.trend import reach_text
-from lobewatch.tap.demo import DemoTap, LevelForecast, SpindleState
+from lobewatch.tap.demo import DemoTap, LevelForecast
 
-STATE_KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
-"""JSON keys of the values of a SpindleState."""
 STATE_NAMES = ("f_1", "zeta", "K", "bearing stiffness")
 """Names of the values of a SpindleState for people."""
 DEMO_COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
 """Heading, size of the unit and decimals of each value."""
 
 
-def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
+STATE_FIELDS = json_fields("""
+    frequency_hz=frequency damping_ratio stiffness_n_per_m=stiffness bearing_stiffness_n_per_m=bearing_stiffness
+""")
+TAP_FIELDS = json_fields(
+    "date=plan.date direction=plan.direction truth=plan.truth found=result",
+    {"date": datetime.isoformat, "truth": STATE_FIELDS, "found": STATE_FIELDS},
+)
+
+
+def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> JsonObject:
     """Return all tap tests of the demo, and the forecast with the true dates."""
-    levels = {
-        forecast.level: {**forecast.reached.to_row(), "truth": _date_text(forecast.truth)} for forecast in forecasts
-    }
-    return {"taps": [_demo_tap_json(tap) for tap in taps], "forecast": levels, "report": str(report)}
+    levels = {item.level: {**item.reached.to_row(), "truth": _date_text(item.truth)} for item in forecasts}
+    return {"taps": list(map(TAP_FIELDS, taps)), "forecast": levels, "report": str(report)}
 
 
 def _date_text(days: float | None) -> str | None:
     return None if days is None else f"{date_of_days(days):%Y-%m-%d}"
 
 
-def _demo_tap_json(tap: DemoTap) -> dict[str, Any]:
-    about = {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
-    return about | {"truth": _state_json(tap.plan.truth), "found": _state_json(tap.result)}
-
-
-def _state_json(state: SpindleState) -> dict[str, float]:
-    return dict(zip(STATE_KEYS, astuple(state), strict=True))
-
-
-def demo_texts(
-    taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path
-) -> list[str | Table]:
+def demo_texts(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path) -> Texts:
     """Return the true and the measured values, their errors, and the forecast with the truth."""
     in_x = [tap for tap in taps if tap.plan.direction == "x"]
     first, last = in_x[0], in_x[-1]
     measured = last.result.relative_to(first.result).stiffness
     true = last.plan.truth.relative_to(first.plan.truth).stiffness
+    headings = [word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")]
+    errors = zip(*(astuple(tap.result.relative_to(tap.plan.truth)) for tap in taps), strict=True)
+    worst = (f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(STATE_NAMES, errors, strict=True))
     heading = "Foretold after the last test, and what the emulated spindle does if it goes on so:"
     return [
         "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
         f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
-        new_table("<test", *DEMO_HEADINGS, rows=map(_demo_cells, taps)),
-        "worst error: " + ", ".join(_worst_errors(taps)),
+        new_table("<test", *headings, rows=map(_demo_cells, taps)),
+        f"worst error: {', '.join(worst)}",
         f"K over the whole demo, in x: {100 * measured:+z.2f} % found, {100 * true:+z.2f} % true",
         *([heading] if forecasts else []),
-        *(_forecast_text(forecast, taps[-1].plan.date) for forecast in forecasts),
+        *(
+            f"{item.level}: {reach_text(item.reached, taps[-1].plan.date)}; "
+            f"true {_date_text(item.truth) or 'never, or not for years'}"
+            for item in forecasts
+        ),
         f"report: {report}",
     ]
-
-
-def _forecast_text(forecast: LevelForecast, last: datetime) -> str:
-    true = _date_text(forecast.truth) or "never, or not for years"
-    return f"{forecast.level}: {reach_text(forecast.reached, last)}; true {true}"
-
-
-DEMO_HEADINGS = [word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")]
 
 
 def _demo_cells(tap: DemoTap) -> list[str]:
     pairs = zip(astuple(tap.plan.truth), astuple(tap.result), DEMO_COLUMNS, strict=True)
     values = (f"{value / scale:.{digits}f}" for *pair, (_, scale, digits) in pairs for value in pair)
     return [f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *values]
-
-
-def _worst_errors(taps: Sequence[DemoTap]) -> list[str]:
-    errors = zip(*(astuple(tap.result.relative_to(tap.plan.truth)) for tap in taps), strict=True)
-    return [f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(STATE_NAMES, errors, strict=True)]

@@ -7,20 +7,18 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
+from operator import attrgetter
 from typing import Any
 
 from acquisition import Conditions, Remark
 from dsm import format_rounded
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
-from lobewatch.machine import TapEntry
 from lobewatch.machine.folder_updates import find_contradicting_cuts
-from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import MaintenanceEvent
 from lobewatch.show.programs.materials import power_text
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import align_columns, blank_nonfinite, format_csv
+from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, json_fields
 
 
 def cut_text(cut: CutEntry) -> str:
@@ -44,16 +42,36 @@ def cut_result_text(cut: CutEntry) -> str:
     return heard + (f" ({cut.reason})" if cut.reason else "")
 
 
-CUT_FIELDS = json_fields("""
+def _utc_text(time: datetime | str) -> str:
+    """Return a time as text of one form, which sorts by time."""
+    moment = datetime.fromisoformat(time) if isinstance(time, str) else time
+    return moment.astimezone(UTC).isoformat(timespec="microseconds")
+
+
+cut_json = json_fields(
+    """
     id time=at program tool feed speed_rpm commanded_rpm depth_mm=depth*1e3 word chatter_frequency_hz
     chatter_frequency_hz_std=chatter_frequency_std_hz by power_kw=power.watts/1e3
     tangential_by_power_n_per_mm2=power.tangential/1e6 reason recording=recording.file excluded
-""")
-
-
-def cut_json(cut: CutEntry) -> dict[str, Any]:
-    """Return one test cut as a JSON object."""
-    return CUT_FIELDS(cut) | {"time": _utc_text(cut.at)}
+    """,
+    {"time": _utc_text},
+)
+"""Function that returns one test cut as a JSON object."""
+event_json = json_fields("id time text new_baseline", {"time": _utc_text})
+"""Function that returns one event as a JSON object."""
+acknowledgement_json = json_fields("id=alarm_id time operator until note", {"time": _utc_text, "until": _utc_text})
+"""Function that returns one acknowledged alarm as a JSON object."""
+TAP_FIELDS = json_fields(
+    """
+    id=tap_id time tool direction frequency_hz=frequency.value frequency_hz_std=frequency.std
+    damping_ratio=damping_ratio.value damping_ratio_std=damping_ratio.std stiffness_n_per_m=stiffness.value
+    stiffness_n_per_m_std=stiffness.std baseline series conditions=conditions.specified software questions
+    """,
+    {"time": _utc_text, "baseline": _utc_text, "questions": attrgetter("code")},
+)
+EXCLUDED_FIELDS = json_fields(
+    "id time tool direction conditions=conditions.specified reason=excluded", {"time": _utc_text}
+)
 
 
 def saved_cut_remarks(logbook: Logbook, cut: CutEntry, earlier: Sequence[CutEntry]) -> list[Remark]:
@@ -77,8 +95,8 @@ def contradiction_remark(cut: CutEntry) -> Remark:
     return Remark("cuts-contradict", cut.id, text, cure)
 
 
-ROW_FIELDS = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
-"""Field of a row for each JSON key and CSV column."""
+VALUE_SCALES = {"frequency_hz": 1.0, "damping_ratio": 0.01, "stiffness_n_per_m": 1e6}
+"""Size of the unit shown for each JSON key and CSV column of a value."""
 HISTORY_HEADINGS = (
     ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
@@ -107,43 +125,22 @@ def event_text(event: MaintenanceEvent) -> str:
     return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
 
 
-EVENT_FIELDS = json_fields("id time text new_baseline")
-ACKNOWLEDGEMENT_FIELDS = json_fields("id=alarm_id time operator until note")
-TAP_FIELDS = json_fields("""
-    id=tap_id time tool direction frequency_hz=frequency.value frequency_hz_std=frequency.std
-    damping_ratio=damping_ratio.value damping_ratio_std=damping_ratio.std stiffness_n_per_m=stiffness.value
-    stiffness_n_per_m_std=stiffness.std baseline series conditions=conditions.specified software
-""")
-EXCLUDED_FIELDS = json_fields("id time tool direction conditions=conditions.specified reason=excluded")
-
-
-def event_json(event: MaintenanceEvent) -> dict[str, Any]:
-    """Return one event as a JSON object."""
-    return EVENT_FIELDS(event) | {"time": _utc_text(event.time)}
-
-
-def acknowledgement_json(acknowledgement: Acknowledgement) -> dict[str, Any]:
-    """Return one acknowledged alarm as a JSON object."""
-    until = acknowledgement.until and _utc_text(acknowledgement.until)
-    return ACKNOWLEDGEMENT_FIELDS(acknowledgement) | {"time": _utc_text(acknowledgement.time), "until": until}
-
-
-def history_json(logbook: Logbook) -> dict[str, Any]:
+def history_json(logbook: Logbook) -> JsonObject:
     """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
-        "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
-        "events": [event_json(event) for event in logbook.files.events],
-        "acknowledged": [acknowledgement_json(word) for word in logbook.files.acknowledgements],
-        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.cuts],
+        "excluded": list(map(EXCLUDED_FIELDS, logbook.files.excluded)),
+        "events": list(map(event_json, logbook.files.contents.events)),
+        "acknowledged": list(map(acknowledgement_json, logbook.files.contents.acknowledgements)),
+        "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.contents.cuts],
     }
 
 
 def history_csv(logbook: Logbook) -> str:
     """Return a CSV line for each tap test, cut, event and acknowledgement, oldest first, below the headings."""
-    values = [heading for name in ROW_FIELDS for heading in (name, f"{name}_std")]
+    values = [heading for name in VALUE_SCALES for heading in (name, f"{name}_std")]
     verdicts = {program.name: f"verdict: {program.name}" for program in logbook.machine.program}
     headings = [*HISTORY_COLUMNS, *values, *CONDITION_NAMES, "questions", *verdicts.values(), "reason", "text"]
     rows: list[list[Any]] = [headings]
@@ -159,8 +156,9 @@ def history_lines(logbook: Logbook) -> list[str]:
     """Return the history in local time: a line for each entry below the headings, its notes in a line below it."""
     entries = _history_entries(logbook)
     taps = [entry["id"] for entry in entries if "direction" in entry]
-    names = dict(zip(taps, shorten_ids(taps), strict=True))
-    cells = ((*_history_cells(entry), names.get(entry["id"], entry.get("name", ""))) for entry in entries)
+    names: dict[str, str] = {entry["id"]: entry.get("name", "") for entry in entries}
+    names |= zip(taps, shorten_ids(taps), strict=True)
+    cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
     lines = align_columns([*HISTORY_HEADINGS, *cells], NUMBER_COLUMNS)
     texts = ["", "", *map(_note_text, entries)]
     return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
@@ -186,55 +184,36 @@ def shorten_ids(ids: Sequence[str]) -> list[str]:
 
 def _history_cells(line: Mapping[str, Any]) -> list[str]:
     when = f"{datetime.fromisoformat(line['time']).astimezone():%Y-%m-%d %H:%M}"
-    numbers = [_value_text(line, name, scale) for name, scale in zip(ROW_FIELDS, (1.0, 0.01, 1e6), strict=True)]
+    values = ((line.get(name, math.nan), line.get(f"{name}_std"), scale) for name, scale in VALUE_SCALES.items())
+    numbers = [format_rounded(*value) if math.isfinite(value[0]) else "" for value in values]
     return [when, line["kind"].removeprefix("new "), line.get("tool", ""), line.get("direction", ""), *numbers]
 
 
-def _history_entries(logbook: Logbook) -> list[dict[str, Any]]:
+def _history_entries(logbook: Logbook) -> list[JsonObject]:
     """Return tap tests, excluded ones, events, acknowledgements and test cuts as JSON objects, oldest first."""
     history = history_json(logbook)
-    entries = [{**tap, "kind": kind} for kind in ("taps", "kept", "excluded") for tap in history[kind]]
-    for entry in entries:
-        entry["kind"] = entry["kind"].removesuffix("s")
-    entries += [
-        {**event, "kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]}
-        for event in history["events"]
-    ]
+    groups = ("tap", history["taps"]), ("kept", history["kept"]), ("excluded", history["excluded"])
+    entries = [{**tap, "kind": kind} for kind, taps in groups for tap in taps]
+    for event in history["events"]:
+        kind = "new baseline" if event["new_baseline"] else "event"
+        entries.append({**event, "kind": kind, "name": event["id"]})
     for cut in history["cuts"]:
         shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
         kind = "excluded" if cut["excluded"] else "cut"
         entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
-    for acknowledgement in logbook.files.acknowledgements:
-        text = f"{acknowledgement.alarm_id}: {acknowledgement}"
-        time = _utc_text(acknowledgement.time)
-        entries.append({"kind": "ack", "id": acknowledgement.alarm_id, "time": time, "text": text})
+    for ack in logbook.files.contents.acknowledgements:
+        text, time = f"{ack.alarm_id}: {ack}", _utc_text(ack.time)
+        entries.append({"kind": "ack", "id": ack.alarm_id, "time": time, "text": text})
     return sorted(entries, key=lambda entry: entry["time"])
 
 
-def _tap_json(row: HistoryRow, logbook: Logbook) -> dict[str, Any]:
+def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
     verdicts = row.verdicts or {}
     names = [program.name for program in logbook.machine.program if program.name in verdicts]
     return TAP_FIELDS(row) | {
-        "time": _utc_text(row.time),
-        "baseline": row.baseline and _utc_text(row.baseline),
         "software": row.software or logbook.history.software,
-        "questions": [question.code for question in row.questions],
         "verdicts": {name: verdicts[name].stability.value for name in names},
     }
-
-
-def _excluded_json(tap: TapEntry) -> dict[str, Any]:
-    return EXCLUDED_FIELDS(tap) | {"time": _utc_text(datetime.fromisoformat(tap.time))}
-
-
-def _utc_text(time: datetime) -> str:
-    """Return a time as text of one form, which sorts by time."""
-    return time.astimezone(UTC).isoformat(timespec="microseconds")
-
-
-def _value_text(line: Mapping[str, Any], name: str, scale: float) -> str:
-    value = line.get(name, math.nan)
-    return format_rounded(value, line[f"{name}_std"], scale) if math.isfinite(value) else ""
 
 
 def _note_text(line: Mapping[str, Any]) -> str:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from datetime import datetime
 
-from rich.table import Table
-
-from acquisition import Conditions, Remark
+from acquisition import Conditions
 from dsm import RemainingPreload
 from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
@@ -17,37 +15,35 @@ from lobewatch.monitoring.series_history import build_series_history, estimate_p
 from lobewatch.show.history import condition_texts
 from lobewatch.show.models import CALIBRATION_FIELDS
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
-from lobewatch.show.programs.lobes import lobes_json
+from lobewatch.show.programs.advice import lobes_json
 from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
-from lobewatch.show.terminal.output import emit, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, notes, remark_lines
 from lobewatch.show.terminal.status_labels import status_label
 from lobewatch.tap.session import TapSession
 from lobewatch.tool import compute_lobes
 
+MEASUREMENT_FIELDS = json_fields(
+    "tap_id time tool direction conditions=self modes followed calibration",
+    {"time": datetime.isoformat, "modes": mode_json, "followed": mode_json, "calibration": CALIBRATION_FIELDS},
+)
 
-def measurement_json(measurement: Measurement, logbook: Logbook) -> dict[str, Any]:
+
+def measurement_json(measurement: Measurement, logbook: Logbook) -> JsonObject:
     """Return a measurement, the diagrams of its tool as it was known then, and the remarks on it."""
-    assembly, calibration = logbook.assembly(until=measurement.tap_id), measurement.calibration
+    assembly = logbook.assembly(until=measurement.tap_id)
     lobes = compute_lobes(assembly, logbook.machine)
-    return {
-        "tap_id": measurement.tap_id,
-        "time": measurement.time.isoformat(),
-        "tool": measurement.tool,
-        "direction": measurement.direction,
+    return MEASUREMENT_FIELDS(measurement) | {
         "conditions": _tap_conditions(measurement, logbook).specified,
-        "modes": [mode_json(mode) for mode in measurement.modes],
-        "followed": measurement.followed and mode_json(measurement.followed),
-        "calibration": calibration and CALIBRATION_FIELDS(calibration),
         "preload_left": _remaining_preload(measurement, logbook),
         "lobes": [lobes_json(name, diagram) for name, diagram in lobes.items()],
         "remarks": assembly.remarks,
     }
 
 
-def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
+def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
     """Return a measurement in words."""
     named = [f"tool {m.tool}", f"direction {m.direction}", *condition_texts(_tap_conditions(m, logbook))]
-    texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
+    texts: Texts = [f"{m.tap_id}  ({', '.join(named)})"]
     if m.modes:
         shown = sort_modes(m.modes, rejected=False)
         texts += [mode_table(shown), *grouped_remark_lines(shown, check_modes_together(m.modes))]
@@ -62,7 +58,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
     asked = [remark for remark in logbook.status().remarks if remark.about == f"tap test {m.tap_id}"]
     further = [remark for remark in assembly.remarks if remark.code not in RECORDING_QUESTIONS]
-    return [*texts, *remark_lines(further), *map(_question_text, asked)]
+    return [*texts, *remark_lines(further), *(f"question ({remark.code}): {remark.text}" for remark in asked)]
 
 
 def _remaining_preload(measurement: Measurement, logbook: Logbook) -> RemainingPreload | None:
@@ -78,10 +74,6 @@ def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
     return logbook.files.place(m.tap_id).entry.conditions
 
 
-def _question_text(question: Remark) -> str:
-    return f"question ({question.code}): {question.text}"
-
-
 def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: bool, details: bool) -> None:
     """Print what was stored and what it says; as JSON the last test. details: modes, model and doubt, too."""
     for session in finished:
@@ -91,16 +83,15 @@ def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: 
         if session.unasked:
             notes.print(format_not_asked(session.unasked, session.saved, logbook.questions), markup=False)
     last = finished[-1]
-    payload = measurement_json(last.measurement, logbook) | {
-        "programs": [verdict_json(verdict) for verdict in logbook.verdicts()]
-    }
+    payload = measurement_json(last.measurement, logbook)
+    payload["programs"] = list(map(verdict_json, logbook.verdicts()))
     if last.across is not None:
         payload["across"] = {"tap_id": last.across.tap_id}
     emit(payload, as_json, *_result_texts(logbook, finished, details))
 
 
-def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> list[str | Table]:
-    texts: list[str | Table] = []
+def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: bool) -> Texts:
+    texts: Texts = []
     for session in finished:
         outcome = session.state.outcome
         texts += measurement_texts(session.measurement, logbook) if details else []

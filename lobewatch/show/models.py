@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 
 NODE_STIFFNESS_RATIO = 1e4
 """Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
@@ -32,34 +29,36 @@ STIFFNESS_FIT_FIELDS = json_fields("""
 DAMPING_FIELDS = json_fields("""
     damping_ratio bearing_damping_n_s_per_m=bearing_damping bearing_damping_sensitivity=sensitivity
 """)
-MODEL_FIELDS = json_fields("""
-    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
-    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
-    first_frequency_with_rigid_bearings_hz=rigid_frequency
-""")
 MODEL_MODE_FIELDS = json_fields("""
     frequency_hz=frequency modal_tip_stiffness_n_per_m=tip_stiffness bearing_energy_share=bearing_share
     segment_energy_share=segment_share joint_energy_share=joint_share
 """)
+model_json = json_fields(
+    """
+    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
+    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
+    first_frequency_with_rigid_bearings_hz=rigid_frequency
+    """,
+    {"modes": MODEL_MODE_FIELDS},
+)
+"""Function that returns a spindle model with its modes."""
 
 
-def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
+def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
     """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for those that the modes leave open."""
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
-    return STIFFNESS_FIT_FIELDS(fit) | {
-        "stiffness_n_per_m": np.where(is_fitted, fit.stiffness, np.nan),
-        "stiffness_n_per_m_std": None if std is None else np.where(is_fitted, std, np.nan),
-    }
+    errors = None if std is None else np.where(is_fitted, std, np.nan)
+    values = np.where(is_fitted, fit.stiffness, np.nan)
+    return STIFFNESS_FIT_FIELDS(fit) | {"stiffness_n_per_m": values, "stiffness_n_per_m_std": errors}
 
 
-def model_calibration_json(calibration: ModelCalibration) -> dict[str, Any]:
+def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
     """Return the stiffnesses and dampers that make a model fit."""
     stiffness, dampers = calibration.stiffness, calibration.dampers
+    damping = {} if dampers is None else DAMPING_FIELDS(dampers)
     if isinstance(stiffness, Calibration):
-        fitted = CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload}
-    else:
-        fitted = stiffness_fit_json(stiffness)
-    return fitted | ({} if dampers is None else DAMPING_FIELDS(dampers))
+        return CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload} | damping
+    return stiffness_fit_json(stiffness) | damping
 
 
 def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
@@ -67,45 +66,35 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
     stiffness = calibration.stiffness
     preload = stiffness.remaining_preload if isinstance(stiffness, Calibration) else None
     parts = (stiffness, preload, calibration.dampers)
-    return [*_label_lines(calibration.label), *(str(part) for part in parts if part is not None)]
+    label = [f"model: {calibration.label}"] if calibration.label else []
+    return [*label, *(str(part) for part in parts if part is not None)]
 
 
-def _label_lines(label: str) -> list[str]:
-    return [f"model: {label}"] if label else []
-
-
-def model_json(model: ModelSummary) -> dict[str, Any]:
-    """Return a spindle model with its modes."""
-    return MODEL_FIELDS(model) | {"modes": [MODEL_MODE_FIELDS(mode) for mode in model.modes]}
-
-
-def model_texts(model: ModelSummary) -> list[str | Table]:
+def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
     headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
+    table = new_table(*headings)
+    for number, mode in enumerate(model.modes, 1):
+        is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
+        stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
+        shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
+        table.add_row(str(number), f"{mode.frequency:.2f}", stiffness, *shares)
     return [
         f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
         f"bearings of {model.state.origin}",
-        new_table(*headings, rows=(_mode_cells(model, number) for number in range(len(model.modes)))),
+        table,
         f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",
         f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
         f"with rigid bearings          {model.rigid_frequency:.1f} Hz in mode 1",
     ]
 
 
-def _mode_cells(model: ModelSummary, number: int) -> list[str]:
-    mode = model.modes[number]
-    is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
-    stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
-    shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
-    return [str(number + 1), f"{mode.frequency:.2f}", stiffness, *shares]
-
-
 MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
 UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written into machine.toml"
 
 
-def tools_json(calibration: JointCalibration) -> dict[str, Any]:
+def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
     return stiffness_fit_json(fit) | {
@@ -119,54 +108,36 @@ def tools_json(calibration: JointCalibration) -> dict[str, Any]:
     }
 
 
-def tools_texts(calibration: JointCalibration) -> list[str | Table]:
+def tools_texts(calibration: JointCalibration) -> Texts:
     """Return the fit to several tools in words, what it rests on, and tools that it predicts."""
-    for_people: list[str | Table] = [
-        *_label_lines(calibration.label),
-        *(
-            f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed"
-            for number, tap in enumerate(calibration.taps, 1)
-        ),
-        str(calibration.fit),
-        *(
-            f"not counted: {', '.join(f'{f:.1f}' for f in frequencies)} Hz of tool {tool}, nothing of the model is near"
-            for tool, frequencies in calibration.unmatched.items()
-        ),
-        *(f"warning: {remark}" for remark in calibration.remarks),
-        *_joint_entry_lines(calibration),
-    ]
-    return [*for_people, *_prediction_tables(calibration)]
-
-
-def _joint_entry_lines(calibration: JointCalibration) -> list[str]:
+    lines = [f"model: {calibration.label}"] if calibration.label else []
+    for number, tap in enumerate(calibration.taps, 1):
+        lines.append(f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed")
+    lines.append(str(calibration.fit))
+    for tool, frequencies in calibration.unmatched.items():
+        left_out = ", ".join(f"{frequency:.1f}" for frequency in frequencies)
+        lines.append(f"not counted: {left_out} Hz of tool {tool}, nothing of the model is near")
+    lines += [f"warning: {remark}" for remark in calibration.remarks]
     if calibration.joints:
         unsure = ", ".join(sorted(calibration.fit.open_groups))
         caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
-        return [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
-    return [MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT]
+        lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
+    else:
+        lines.append(MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT)
+    if not calibration.predicted or calibration.fit.has_misfit:
+        return [*lines]
+    table = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
+    for name, mode in calibration.predicted.items():
+        stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
+        table.add_row(name, format_with_error(mode.frequency, mode.frequency_std), stiffness)
+    return [*lines, table]
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
     """Return joints as lines of machine.toml."""
-    if not joints:
-        return []
     lines = [
         f"    {{ position_mm = {joint.position * 1e3:.6g}, stiffness_n_per_um = {joint.stiffness / 1e6:.4g}, "
         f"rotational_stiffness_n_m_per_rad = {joint.rotational_stiffness:.4g}, group = {json.dumps(joint.group)} }},"
         for joint in joints
     ]
-    return ["joints = [", *lines, "]"]
-
-
-def _prediction_tables(calibration: JointCalibration) -> list[Table]:
-    if not calibration.predicted or calibration.fit.has_misfit:
-        return []
-    rows = (
-        (
-            name,
-            format_with_error(mode.frequency, mode.frequency_std),
-            format_with_error(mode.stiffness, mode.stiffness_std, 1e6),
-        )
-        for name, mode in calibration.predicted.items()
-    )
-    return [new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)", rows=rows)]
+    return ["joints = [", *lines, "]"] if joints else []

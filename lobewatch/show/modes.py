@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from rich.table import Table
 
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import Texts, json_fields, new_table
 from modal import Mode, Trust, assess_trust, trust_rules
 
 TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
@@ -32,27 +30,17 @@ NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
 
-MODE_FIELDS = json_fields("""
-    frequency_hz=frequency frequency_hz_std=frequency frequency_hz_std_of_fit=frequency
-    damping_ratio damping_ratio_std=damping_ratio damping_ratio_std_of_fit=damping_ratio
-    stiffness_n_per_m=stiffness stiffness_n_per_m_std=stiffness stiffness_n_per_m_std_of_fit=stiffness
-    interval_95=interval correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
-    misfit_share trust=method found_again=match_count half_power_damping_ratio=half_power_damping remarks method
-""")
-FILE_MODES_FIELDS = json_fields("""
-    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
-    remarks
-""")
-
-
-def mode_json(mode: Mode) -> dict[str, Any]:
-    """Return one mode with its standard errors over the hits and of the fit."""
-    errors = {
-        f"{name}_{source}": value
-        for source, values in (("std", mode.standard_error), ("std_of_fit", mode.fit_error))
-        for name, value in zip(("frequency_hz", "damping_ratio", "stiffness_n_per_m"), values, strict=True)
-    }
-    return MODE_FIELDS(mode) | errors | {"interval_95": mode.interval(), "trust": assess_trust(mode)}
+mode_json = json_fields(
+    """
+    frequency_hz=frequency frequency_hz_std=standard_error.0 frequency_hz_std_of_fit=fit_error.0
+    damping_ratio damping_ratio_std=standard_error.1 damping_ratio_std_of_fit=fit_error.1
+    stiffness_n_per_m=stiffness stiffness_n_per_m_std=standard_error.2 stiffness_n_per_m_std_of_fit=fit_error.2
+    interval_95=self correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
+    misfit_share trust=self found_again=match_count half_power_damping_ratio=half_power_damping remarks method
+    """,
+    {"interval_95": Mode.interval, "trust": assess_trust},
+)
+"""Function that returns one mode with its standard errors over the hits and of the fit."""
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
@@ -73,18 +61,18 @@ def mode_table(modes: Sequence[Mode]) -> Table:
     with_matches = any(mode.match_count for mode in modes)
     headings = [*(["phase (deg)"] if with_phase else []), *(["again"] if with_matches else [])]
     table = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
+    percents = False, False, not with_phase
     for mode in modes:
-        values = zip((mode.frequency, mode.damping_ratio, mode.stiffness), mode.standard_error, strict=True)
-        cells = [
+        values = (mode.frequency, mode.damping_ratio, mode.stiffness), mode.standard_error, (1.0, 0.01, 1e6), percents
+        texts = [
             "not known" if math.isnan(value) else format_with_error(value, std, scale, percent=percent)
-            for (value, std), scale, percent in zip(
-                values, (1.0, 0.01, 1e6), (False, False, not with_phase), strict=True
-            )
+            for value, std, scale, percent in zip(*values, strict=True)
         ]
         phase = format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
+        texts += [phase] if with_phase else []
         matches = "" if mode.match_count is None else "{} of {}".format(*mode.match_count)
-        optional = [*([phase] if with_phase else []), *([matches] if with_matches else [])]
-        table.add_row(*cells, *optional, TRUST_SYMBOLS[assess_trust(mode)])
+        texts += [matches] if with_matches else []
+        table.add_row(*texts, TRUST_SYMBOLS[assess_trust(mode)])
     return table
 
 
@@ -104,27 +92,20 @@ def mode_notes(modes: Sequence[Mode]) -> list[str]:
 
 def mode_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
     """Return a line for each remark on modes and for each further one, the same remark of several modes as one."""
-    return [str(remark) for remark in merge_remarks(_all_remarks(modes, remarks))]
-
-
-def _all_remarks(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[Remark]:
-    return [*(remark for mode in modes for remark in mode.remarks), *remarks]
+    return [str(remark) for remark in merge_remarks([*(remark for mode in modes for remark in mode.remarks), *remarks])]
 
 
 def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
     """Return a line for each code of a remark: that of the first mode, and which other modes have one alike."""
     by_code: dict[str, list[Remark]] = {}
-    for remark in _all_remarks(modes, remarks):
+    for remark in (*(remark for mode in modes for remark in mode.remarks), *remarks):
         by_code.setdefault(remark.code, []).append(remark)
-    return [line for same in by_code.values() for line in _grouped_lines(merge_remarks(same))]
-
-
-def _grouped_lines(remarks: list[Remark]) -> list[str]:
-    first, *others = remarks
-    about = ", ".join(remark.about for remark in others)
-    if others and not about:
-        return [str(remark) for remark in remarks]
-    return [f"{first}{f' (the like of {about})' if about else ''}"]
+    lines = list[str]()
+    for same in by_code.values():
+        first, *others = map(str, merged := merge_remarks(same))
+        about = ", ".join(remark.about for remark in merged[1:])
+        lines += [f"{first} (the like of {about})"] if about else [first, *others]
+    return lines
 
 
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
@@ -142,52 +123,42 @@ def trust_reasons(modes: Sequence[Mode]) -> list[str]:
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in TRUST_ORDER[1:]:
-        texts = [
-            f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})"
-            for mode in modes
-            if assess_trust(mode) is trust
-        ]
+        alike = (mode for mode in modes if assess_trust(mode) is trust)
+        texts = [f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})" for mode in alike]
         lines += [f"{TRUST_SYMBOLS[trust]} {trust}: {', '.join(texts)}"] if texts else []
     return lines
 
 
 def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
     """Return a table of modes by peak picking, and how far each is from the nearest fitted mode."""
-    rows = (
-        (
-            f"{mode.frequency:.5g}",
-            f"{100 * mode.damping_ratio:.5g}",
-            format_rounded(mode.stiffness, scale=1e6, digits=5),
-            _difference_text(mode, fitted),
-        )
-        for mode in picked
-    )
-    return new_table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit", rows=rows)
+    table = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    for mode in picked:
+        fit, difference = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None), "not fitted"
+        if fit is not None and abs(fit.frequency - mode.frequency) < mode.damping_ratio * mode.frequency:
+            zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
+            off = mode.frequency - fit.frequency
+            difference = f"f_n {off:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+        stiffness = format_rounded(mode.stiffness, scale=1e6, digits=5)
+        table.add_row(f"{mode.frequency:.5g}", f"{100 * mode.damping_ratio:.5g}", stiffness, difference)
+    return table
 
 
-def _difference_text(mode: Mode, fitted: Sequence[Mode]) -> str:
-    fit = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None)
-    if fit is None or abs(fit.frequency - mode.frequency) >= mode.damping_ratio * mode.frequency:
-        return "not fitted"
-    zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
-    return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+file_modes_json = json_fields(
+    """
+    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
+    remarks
+    """,
+    {"file": str, "modes": mode_json, "peak_picking": mode_json},
+)
+"""Function that returns the modes of one file, fitted and by peak picking."""
 
 
-def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
-    """Return the modes of one file, fitted and by peak picking."""
-    return FILE_MODES_FIELDS(file_modes) | {
-        "file": str(file_modes.path),
-        "modes": [mode_json(mode) for mode in file_modes.fitted],
-        "peak_picking": [mode_json(mode) for mode in file_modes.picked],
-    }
-
-
-def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:
+def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Texts:
     """Return the modes of one file in words; everything: rejected modes and each single remark, too."""
     shown = sort_modes(file_modes.fitted, rejected=everything)
     trusted = [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]
     remarks = mode_remark_lines if everything else grouped_remark_lines
-    texts: list[str | Table] = [
+    texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
         mode_table(shown),
@@ -197,8 +168,8 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list
         *remarks(shown, file_modes.remarks),
     ]
     if file_modes.frf is not None:
-        picked = peak_picking_table(file_modes.picked, file_modes.as_recorded)
-        texts += ["peak picking (eqs. 28, 29), for comparison:", picked]
+        heading = "peak picking (eqs. 28, 29), for comparison:"
+        texts += [heading, peak_picking_table(file_modes.picked, file_modes.as_recorded)]
     return texts
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import datetime
 from itertools import chain
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -22,8 +24,7 @@ from lobewatch.measurement.recording_questions import find_open_questions, quest
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import emit, new_table, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
@@ -70,47 +71,41 @@ MAX_PREVIEWS_IN_FULL = 6
 
 def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
     """Print what would become of files; passed: other files of the folders. Raise DataError for unusable files."""
-    files = [preview_json(preview) for preview in previews]
-    payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
+    payload = {"dry_run": True, "files": [*map(preview_json, previews)], "passed_over": [*map(str, passed)]}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     if refused := sum(bool(preview.rejection) for preview in previews):
         raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
 
 
-PREVIEW_FIELDS = json_fields("""
+STATUS_FIELDS = json_fields("file known=stored_tap_id refused=rejection", {"file": str})
+QUESTION_FIELDS = json_fields("code text")
+PREVIEW_FIELDS = json_fields(
+    """
     format=recording.title facts=recording.facts time=measurement.time tool=measurement.tool
     direction=measurement.direction hits=tap.flags lines=tap.frf.frequency.size averages=tap.frf.n_averages
     modes=measurement.modes followed=measurement.followed questions=measurement.remarks
-""")
-QUESTION_FIELDS = json_fields("code text")
+    """,
+    {"time": datetime.isoformat, "hits": attrgetter("words"), "modes": mode_json, "followed": mode_json},
+)
 
 
-def preview_json(preview: ReplayPreview) -> dict[str, Any]:
+def preview_json(preview: ReplayPreview) -> JsonObject:
     """Return what would become of one file."""
-    measurement, tap = preview.measurement, preview.tap
-    status: dict[str, Any] = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
-    if measurement is None or tap is None or preview.recording is None:
-        return status
-    return (
-        status
-        | PREVIEW_FIELDS(preview)
-        | {
-            "time": measurement.time.isoformat(),
-            "hits": [flags.words for flags in tap.flags],
-            "modes": [mode_json(mode) for mode in measurement.modes],
-            "followed": measurement.followed and mode_json(measurement.followed),
-            "questions": list(map(QUESTION_FIELDS, find_open_questions(measurement.remarks))),
-        }
-    )
+    if preview.measurement is None or preview.tap is None or preview.recording is None:
+        return STATUS_FIELDS(preview)
+    asked = find_open_questions(preview.measurement.remarks)
+    return STATUS_FIELDS(preview) | PREVIEW_FIELDS(preview) | {"questions": list(map(QUESTION_FIELDS, asked))}
 
 
-def preview_texts(previews: Sequence[ReplayPreview]) -> list[str | Table]:
+def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
     """Return a few files in full, many in a table with what is asked and refused below it."""
+    rejected = ((str(item.file), f"cannot be used: {item.rejection}") for item in previews if item.rejection)
+    refused = group_by_message(rejected)
     if len(previews) <= MAX_PREVIEWS_IN_FULL:
         usable = (preview for preview in previews if not preview.rejection)
-        return [*chain.from_iterable(map(_preview_lines, usable)), *_refused_lines(previews)]
-    headings = "<date", "<series", "hits", "frequency (Hz)", "<", "~file"
-    return [new_table(*headings, rows=map(_preview_row, previews)), *_preview_notes(previews)]
+        return [*chain.from_iterable(map(_preview_lines, usable)), *refused]
+    table = new_table("<date", "<series", "hits", "frequency (Hz)", "<", "~file", rows=map(_preview_row, previews))
+    return [table, *_preview_notes(previews), *refused]
 
 
 def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
@@ -131,13 +126,13 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         return []
     modes = sort_modes(measurement.modes, rejected=False)[:8]
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
-    details = [
-        *fact_lines(recording.facts),
-        f"modes: {', '.join(map(_mode_text, modes)) or 'none'}",
-        f"followed: {f'{measurement.followed.frequency:.2f} Hz' if measurement.followed else 'none'}",
-        *(questions or ["plausible for this machine: nothing would be asked"]),
-    ]
-    return [f"{preview.file}: {recording.title}, {_hits_text(preview)}", *(f"  {line}" for line in details)]
+    followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
+    details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
+    details += [f"followed: {followed}", *(questions or ["plausible for this machine: nothing would be asked"])]
+    words = Counter(flags.words for flags in preview.tap.flags)
+    hits = f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
+    kind = hits if preview.tap.hits else "an FRF"
+    return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 
 def _mode_text(mode: Mode) -> str:
@@ -145,14 +140,6 @@ def _mode_text(mode: Mode) -> str:
     frequency, damping = format_rounded(mode.frequency, f_std), format_rounded(mode.damping_ratio, zeta_std, 0.01)
     stiffness = f", {format_rounded(mode.stiffness, k_std, 1e6)} N/um" if mode.has_stiffness else ""
     return f"{frequency} Hz ({damping} %{stiffness})"
-
-
-def _hits_text(preview: ReplayPreview) -> str:
-    """Return the number of hits by verdict."""
-    if preview.tap is None or not preview.tap.hits:
-        return "an FRF"
-    words = Counter(flags.words for flags in preview.tap.flags)
-    return f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
 
 
 def _preview_row(preview: ReplayPreview) -> list[str]:
@@ -167,7 +154,7 @@ def _preview_row(preview: ReplayPreview) -> list[str]:
 
 
 def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
-    """Return assumed facts, questions and rejections, each once."""
+    """Return assumed facts and questions, each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
     asked = (
         (preview.file.name, f"question ({question.code}): {question.text}")
@@ -175,13 +162,7 @@ def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
         if preview.measurement is not None
         for question in find_open_questions(preview.measurement.remarks)
     )
-    return [*fact_lines(_merge_facts(facts), NON_FILE_ORIGINS), *group_by_message(asked), *_refused_lines(previews)]
-
-
-def _refused_lines(previews: Sequence[ReplayPreview]) -> list[str]:
-    return group_by_message(
-        (str(preview.file), f"cannot be used: {preview.rejection}") for preview in previews if preview.rejection
-    )
+    return [*fact_lines(_merge_facts(facts), NON_FILE_ORIGINS), *group_by_message(asked)]
 
 
 def _merge_facts(facts: Iterable[Fact]) -> Iterator[Fact]:
@@ -212,40 +193,34 @@ def emit_replay(
     as_json: bool,
 ) -> None:
     """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
-    _print_known(outcome.already_stored, n_files)
-    if passed:
-        notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
-    payload, texts = dict[str, Any](), list[str | Table]()
+    known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
+    if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
+        known = [f"{len(known)} of {n_files} files are stored already"]
+    known += [f"passed over: {len(passed)} other files, such as {passed[0].name}"] if passed else []
+    for line in known:
+        notes.print(line, markup=False)
     if as_json:
-        payload = replay_json(outcome, logbook) | {"accepted": list(accepted), "questions": logbook.questions}
-    else:
-        texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
-    emit(payload, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
-
-
-def _print_known(stored: Mapping[Path, str], n_files: int) -> None:
-    if n_files > MIN_FILES_TO_COUNT and len(stored) > MAX_KNOWN_LISTED:
-        notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
+        emit(replay_json(outcome, logbook) | {"accepted": accepted, "questions": logbook.questions}, as_json)
         return
-    for file, tap_id in stored.items():
-        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
+    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 
-def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
+def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
     """Return all tap tests that were stored, and the files that were known already or rejected."""
     stored = outcome.new_tap_ids
     return {
         "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored],
-        "programs": [verdict_json(verdict) for verdict in logbook.verdicts()] if stored else [],
+        "programs": list(map(verdict_json, logbook.verdicts())) if stored else [],
         "known": {str(file): tap_id for file, tap_id in outcome.already_stored.items()},
         "refused": {str(file): reason for file, reason in outcome.rejected.items()},
         "taken": outcome.assumed_facts,
     }
 
 
-def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
+def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
     """Return a few tap tests in full, many as their series, and the verdicts on the programs."""
-    stored, texts = outcome.new_tap_ids, list[str | Table]()
+    stored, texts = outcome.new_tap_ids, Texts()
     if len(set(stored)) <= MAX_TAPS_IN_FULL:
         for tap_id in stored:
             texts += measurement_texts(logbook.measurement(tap_id), logbook)
@@ -266,20 +241,16 @@ def _series_table(rows: Sequence[HistoryRow]) -> Table:
     for row in rows:
         series.setdefault((row.tool, row.direction), []).append(row)
     headings = "<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)"
-    return new_table(*headings, rows=map(_series_cells, series.values()))
-
-
-def _series_cells(tests: Sequence[HistoryRow]) -> list[str]:
-    first, last = tests[0], tests[-1]
-    modes = [row.mode for row in tests if row.mode is not None]
-    ends = (modes[0], modes[-1]) if modes else ()
-    values = (
-        (f"{mode.frequency:.1f}" for mode in ends),
-        (f"{100 * mode.damping_ratio:.2f}" for mode in ends),
-        (f"{mode.stiffness / 1e6:.1f}" for mode in ends if mode.has_stiffness),
-    )
-    days = f"{first.time:%Y-%m-%d}", f"{last.time:%Y-%m-%d}"
-    return [first.tool, first.direction, str(len(tests)), *days, *map(" .. ".join, values)]
+    table = new_table(*headings)
+    for (tool, direction), tests in series.items():
+        modes = [row.mode for row in tests if row.mode is not None]
+        ends = (modes[0], modes[-1]) if modes else ()
+        frequency = " .. ".join(f"{mode.frequency:.1f}" for mode in ends)
+        damping = " .. ".join(f"{100 * mode.damping_ratio:.2f}" for mode in ends)
+        stiffness = " .. ".join(f"{mode.stiffness / 1e6:.1f}" for mode in ends if mode.has_stiffness)
+        days = (f"{test.time:%Y-%m-%d}" for test in (tests[0], tests[-1]))
+        table.add_row(tool, direction, str(len(tests)), *days, frequency, damping, stiffness)
+    return table
 
 
 class MachineRebuild(NamedTuple):
@@ -295,21 +266,19 @@ class MachineRebuild(NamedTuple):
     """Remarks on the machine after the rebuild."""
 
 
-def rebuild_json(rebuild: MachineRebuild) -> dict[str, Any]:
-    """Return the outcome of rebuilding one machine."""
-    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": rebuild.remarks}
+rebuild_json = json_fields("done=repairs tap_tests=n_taps remarks")
+"""Function that returns the outcome of rebuilding one machine."""
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
-    if rebuild.is_saved:
-        history = f"history.rows: made anew from {rebuild.n_taps} tap test(s)"
-    else:
-        history = "history.rows: not made anew (see above); the next command that can write makes it"
+    made = f"made anew from {rebuild.n_taps} tap test(s)"
+    missing = "not made anew (see above); the next command that can write makes it"
+    history = f"history.rows: {made if rebuild.is_saved else missing}"
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
 
 
-def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> dict[str, Any]:
+def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> JsonObject:
     """Return the outcomes of rebuilding the machines of a folder, by name."""
     return {"machines": {name: rebuild_json(rebuild) for name, rebuild in rebuilds.items()}}
 

@@ -7,7 +7,6 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from dsm import RemainingPreload, format_with_error
 from lobewatch.arrays import Floats, Indices
@@ -18,7 +17,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
 from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import blank_nonfinite, format_csv, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, json_fields, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
@@ -32,22 +31,27 @@ CHART_WIDTH, CHART_HEIGHT = 60, 12
 CHART_POINT, CHART_LINE = "o", "."
 
 
-def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> dict[str, Any]:
+ALARM_FIELDS = json_fields(
+    "kind=open_drop.change.kind since=drop_since size_percent=open_drop.change.size", {"since": datetime.isoformat}
+)
+RATE_FIELDS = json_fields("value low high")
+SERIES_FIELDS = json_fields(
+    """
+    tool direction points=self score=trend.detection.scores.-1 alarm=trend alarms=self light=self
+    fall_percent=drop.value fall_std_percent=drop.std preload_left=self rate_percent_per_month=trend.rate
+    """,
+    {"alarm": lambda trend: trend.open_drop and ALARM_FIELDS(trend), "rate_percent_per_month": RATE_FIELDS},
+)
+
+
+def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> JsonObject:
     """Return points, score, alarm, status and forecast; percents are 100 ln of the frequency over that of the first."""
-    trend, status = series.trend, outlook.status
-    points, rate = (trend.points, trend.rate) if trend else ((), None)
-    return {
-        "tool": series.tool,
-        "direction": series.direction,
+    status, points = outlook.status, series.trend.points if series.trend else ()
+    return SERIES_FIELDS(series) | {
         "points": [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points],
-        "score": trend and trend.detection.scores[-1],
-        "alarm": trend and _alarm_json(trend),
         "alarms": [alarm.to_row(status.time) for alarm in status.alarms],
         "light": status.status,
-        "fall_percent": series.drop.value,
-        "fall_std_percent": series.drop.std,
         "preload_left": preload,
-        "rate_percent_per_month": rate and rate._asdict(),
         "forecast": build_forecast_rows(outlook.programs, outlook.limits),
     }
 
@@ -62,21 +66,17 @@ def trend_csv(series: SeriesStatus) -> str:
     return format_csv(rows)
 
 
-def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> list[str | Table]:
+def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> Texts:
     """Return chart, sentence and forecast dates, and the change of the other series."""
-    trend = series.trend
-    if trend is None:
+    if series.trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
-    why_none = no_dates_text(outlook)
+    texts: Texts = [*chart_lines(series.trend), trend_sentence(series)]
+    texts += [] if preload is None else [str(preload)]
     dates = new_table("~what", "~becomes doubtful", "~is not stable", rows=forecast_date_rows(outlook))
+    why_none = no_dates_text(outlook)
+    texts += [why_none] if why_none else [dates, FORECAST_ASSUMPTIONS]
     others = (other for other in outlook.status.series if other is not series)
-    return [
-        *chart_lines(trend),
-        trend_sentence(series),
-        *([] if preload is None else [str(preload)]),
-        *([why_none] if why_none else [dates, FORECAST_ASSUMPTIONS]),
-        *(f"{other.name}: {change_since_start_text(other)}" for other in others),
-    ]
+    return [*texts, *(f"{other.name}: {change_since_start_text(other)}" for other in others)]
 
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
@@ -113,7 +113,10 @@ def trend_sentence(series: SeriesStatus) -> str:
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
         fits = "; ± of the fits alone, remounting is not in it" if n > 1 else ""
         return f"{text}{fits}; an alarm can ring from {least}"
-    return f"{text}; {trend_text(trend)}; scatter {trend.spread:.2f} %, score {_score_text(trend)}; {rate_text(trend)}"
+    score = f"from {MIN_MONITORED_POINTS} points on"
+    if math.isfinite(trend.detection.scores[-1]):
+        score = f"{trend.detection.scores[-1]:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
+    return f"{text}; {trend_text(trend)}; scatter {trend.spread:.2f} %, score {score}; {rate_text(trend)}"
 
 
 def rate_text(trend: Trend) -> str:
@@ -168,20 +171,6 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
     return words.get(shape.kind, f"{goes}, {'faster and faster' if shape.accelerates else 'ever more slowly'}")
 
 
-def _score_text(trend: Trend) -> str:
-    score = trend.detection.scores[-1]
-    if not math.isfinite(score):
-        return f"from {MIN_MONITORED_POINTS} points on"
-    return f"{score:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
-
-
-def _alarm_json(trend: Trend) -> dict[str, Any] | None:
-    if trend.open_drop is None or trend.drop_since is None:
-        return None
-    fall, since = trend.open_drop.change, trend.drop_since
-    return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
-
-
 def reach_text(reach: ThresholdDates, now: datetime) -> str:
     """Return when a limit is reached in words."""
     if reach.is_measured:
@@ -195,9 +184,8 @@ def reach_text(reach: ThresholdDates, now: datetime) -> str:
         return f"not before {_day_or_now(reach.earliest, today)}"
     if reach.latest <= today:
         return f"by now, at this rate (probably {date_of_days(reach.probable or today):%Y-%m-%d})"
-    earliest, probable, latest = (
-        _day_or_now(days, today) for days in (reach.earliest, reach.probable or today, reach.latest)
-    )
+    days = reach.earliest, reach.probable or today, reach.latest
+    earliest, probable, latest = (_day_or_now(day, today) for day in days)
     return f"between {earliest} and {latest} (80 %), probably {probable}"
 
 

@@ -6,25 +6,25 @@ import contextlib
 import enum
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Block, Channel, DataError, Description, Device, DeviceError
+from acquisition.arrays import Codes
 from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
 from lobewatch.arrays import Floats
-from lobewatch.cuts.chatter_detection.cut_detection import CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_detection import find_cuts
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, open_device
+from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, open_device
 from lobewatch.tap.live_curves import find_extremes
 from lobewatch.tap.state import StatePublisher
 
@@ -133,18 +133,15 @@ class _SignalBuffer:
     channel: Channel
     row: int
     rate: float
-
-    def __post_init__(self) -> None:
-        self.codes: list[NDArray[np.int32]] = []
-        self.marks: list[tuple[int, int]] = []
-        self.count = 0
-        self.received = 0
+    codes: list[Codes] = field(default_factory=list)
+    marks: list[tuple[int, int]] = field(default_factory=list)
+    count: int = 0
+    received: int = 0
 
     def add(self, block: Block) -> None:
         """Keep a block and drop what is too old."""
         codes = block.codes[self.row]
-        overloaded = bool(block.overload >> self.row & 1)
-        if block.lost_before or overloaded:
+        if block.lost_before or block.overload >> self.row & 1:
             self.marks.append((self.received, block.lost_before or -1))
         self.codes.append(codes)
         self.received, self.count = self.received + codes.size, self.count + codes.size
@@ -157,23 +154,21 @@ class _SignalBuffer:
         codes, first = np.concatenate(self.codes), self.received - self.count
         marks = [mark for place, mark in self.marks if place > first]
         lost = sum(mark for mark in marks if mark > 0)
-        return CutSignal(
-            np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
-        )
+        values = np.asarray(codes * self.channel.scale, np.float64)
+        return CutSignal(values, self.rate, codes, self.channel, lost, -1 in marks)
 
     @property
     def level(self) -> float:
         """RMS about the mean over the newest LEVEL_WINDOW (m/s^2)."""
-        wanted, newest = round(LEVEL_WINDOW * self.rate), list[NDArray[np.int32]]()
-        for codes in reversed(self.codes):
-            newest.insert(0, codes)
-            if sum(part.size for part in newest) >= wanted:
-                break
-        return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
+        return float(np.std(get_newest_codes(self.codes, self.rate)) * abs(self.channel.scale))
 
     def forget(self) -> None:
         """Drop the signal so far."""
         self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
+
+
+Publish = Callable[..., None]
+"""Function called with changed fields of CutState."""
 
 
 def _ignore_state(**_: Any) -> None:
@@ -181,11 +176,7 @@ def _ignore_state(**_: Any) -> None:
 
 
 def record_cut(
-    device: Device,
-    turn: float,
-    time_limit: float,
-    show: Callable[[str], None],
-    publish: Callable[..., None] = _ignore_state,
+    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = _ignore_state
 ) -> CutSignal:
     """Record the next whole cut of a started device, from the air before it to the air after it.
 
@@ -193,37 +184,31 @@ def record_cut(
     is awaited. publish: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
     detected in time, DeviceError if the sensor is dead.
     """
-    buffer, waiting = _make_buffer(device), {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+    row = next((i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"), None)
+    if row is None:
+        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
+    buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
+    waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
     show(BEGIN_CUT_TEXT)
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
-        if _has_ended(parts, signal) and parts.reason:
+        has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT
+        if has_ended and parts.reason:
             buffer.forget()
             show(CUT_TOO_SHORT_TEXT)
             waiting = {"word": CutStep.AGAIN, "reason": f"{CUT_TOO_SHORT_TEXT.capitalize()}."}
             publish(**waiting, cut_seconds=None)
-        elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > MAX_CUT_SECONDS):
+        elif not parts.reason and (has_ended or parts.end - parts.begin > MAX_CUT_SECONDS):
             return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
         elif np.isfinite(parts.begin):
             publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
         elif buffer.received >= SENSOR_CHECK_DELAY * buffer.rate:
             publish(**waiting, cut_seconds=None)
-    raise DataError(
-        f"no cut was heard in {time_limit:g} s; begin to listen with the spindle turning in air, then cut, or give "
-        "more record_cut.time_limit"
-    )
+    cure = "begin to listen with the spindle turning in air, then cut, or give more record_cut.time_limit"
+    raise DataError(f"no cut was heard in {time_limit:g} s; {cure}")
 
 
-def _make_buffer(device: Device) -> _SignalBuffer:
-    rows = [i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"]
-    if not rows:
-        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
-    return _SignalBuffer(device.channels[rows[0]], rows[0], device.sample_rate)
-
-
-def _iterate_signals(
-    device: Device, buffer: _SignalBuffer, time_limit: float, publish: Callable[..., None]
-) -> Iterator[CutSignal]:
+def _iterate_signals(device: Device, buffer: _SignalBuffer, time_limit: float, publish: Publish) -> Iterator[CutSignal]:
     """Yield the signal so far, again and again."""
     next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
     for block in device.blocks():
@@ -248,13 +233,8 @@ def _check_sensor_signal(buffer: _SignalBuffer) -> None:
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
         raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
     if np.ptp(codes) == 0:
-        raise DeviceError(
-            "the accelerometer hears nothing at all", "is it plugged in, on the housing, and the spindle turning?"
-        )
-
-
-def _has_ended(parts: CutParts, signal: CutSignal) -> bool:
-    return bool(np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT)
+        cure = "is it plugged in, on the housing, and the spindle turning?"
+        raise DeviceError("the accelerometer hears nothing at all", cure)
 
 
 def acquire_cut(
@@ -265,7 +245,7 @@ def acquire_cut(
     time_limit: float,
     description: Description,
     show: Callable[[str], None],
-    publish: Callable[..., None],
+    publish: Publish,
 ) -> CutSignal:
     """Read a cut from a file, or record one with the device of machine.toml.
 
@@ -279,9 +259,8 @@ def acquire_cut(
     if not port:
         raise ValueError(f"no port: give acquire_cut.port, acquire_cut.file, or port in [daq] of {folder.toml}")
     if port.startswith(REPLAY_PREFIX):
-        raise ValueError(
-            f"acquire_cut.port {port}: a recording of hits; give the recording of a cut with acquire_cut.file"
-        )
+        text = "a recording of hits; give the recording of a cut with acquire_cut.file"
+        raise ValueError(f"acquire_cut.port {port}: {text}")
     show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
     show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
     with open_device(folder.machine.daq, port) as device:
@@ -317,11 +296,9 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
     publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
     try:
         yield publisher
-    except KeyboardInterrupt:
-        publisher.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
-        raise
-    except (OSError, RuntimeError, ValueError) as error:
-        publisher.show(word=CutStep.FAILED, reason=format_error(error), level=None, left=None)
+    except (KeyboardInterrupt, OSError, RuntimeError, ValueError) as error:
+        reason = "Stopped at the terminal." if isinstance(error, KeyboardInterrupt) else format_error(error)
+        publisher.show(word=CutStep.FAILED, reason=reason, level=None, left=None)
         raise
 
 

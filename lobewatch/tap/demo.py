@@ -24,7 +24,7 @@ from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.tap.device_connection import DeviceConnector
 from lobewatch.tap.emulated_spindle import build_structure, open_synchronized_device
 from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases
+from lobewatch.tap.hit_loop import OperatorRequests, TapPhases
 from lobewatch.tap.state import TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
@@ -176,10 +176,8 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
         folder.locked(),
     ):
         hits = EvaluatedHits(begin_tap(folder, about, resume=False), machine)
-        loop = HitLoop(hits, publisher, OperatorRequests(), guided=False)
-        TapPhases(folder, hits, loop, publisher, guided=False).run(
-            DeviceConnector(folder, open_device, publisher, time.sleep)
-        )
+        connector = DeviceConnector(folder, open_device, publisher, time.sleep)
+        TapPhases(folder, hits, publisher, OperatorRequests(), guided=False).run(connector)
         folder.commit(hits.tap.finish())
     return hits.tap.id
 
@@ -221,16 +219,15 @@ def forecast_levels(logbook: Logbook, wear: SpindleWear) -> list[LevelForecast]:
         reached = prospect.programs[name].not_stable
         if 0 < critical.not_stable < math.inf and reached.is_known:
             percent = x.trend.points[-1].percent + 100 * math.log1p(-critical.not_stable)
-            forecasts.append(
-                _forecast_level(f"{name} not stable", x.trend, percent, wear, last)._replace(reached=reached)
-            )
+            forecast = _forecast_level(f"{name} not stable", x.trend, percent, wear, last)
+            forecasts.append(forecast._replace(reached=reached))
     return forecasts
 
 
 def _forecast_level(level: str, trend: Trend, percent: float, wear: SpindleWear, last: datetime) -> LevelForecast:
     """Return forecast and true date of a level of a series. percent: 100 ln(f/f_first) there."""
     month = wear.find_month(trend.first_value * math.exp(percent / 100))
-    truth = (
-        None if month is None else days_since_epoch(last + timedelta(days=DAYS_PER_MONTH * (month - wear.months + 1)))
-    )
-    return LevelForecast(level, trend.forecast_level(percent), truth)
+    if month is None:
+        return LevelForecast(level, trend.forecast_level(percent), None)
+    date = last + timedelta(days=DAYS_PER_MONTH * (month - wear.months + 1))
+    return LevelForecast(level, trend.forecast_level(percent), days_since_epoch(date))

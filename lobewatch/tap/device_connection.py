@@ -3,27 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition import (
-    Block,
-    Channel,
-    Device,
-    DeviceError,
-    Event,
-    EventKind,
-    FileSource,
-    Hit,
-    Remark,
-    SensorDataLocation,
-    Source,
-    find_driver,
-    find_usb_identity,
-    find_usb_port,
-)
+import acquisition
+from acquisition import Block, Device, DeviceError, Hit, find_driver, find_usb_identity
+from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
 from acquisition.devices import convert_driver_errors
 from acquisition.hit import TapInputs
@@ -52,8 +38,7 @@ class DeviceOpener:
     def open(self) -> Device:
         """Open as `open_device` does. DeviceError while the USB device is absent: no other at its port is touched."""
         if self._identity is not None and find_usb_identity(self._port) != self._identity:
-            port = find_usb_port(*self._identity)
-            if port is None:
+            if (port := acquisition.find_usb_port(*self._identity)) is None:
                 number = self._identity[1]
                 raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in", "plug it in")
             self._port = port
@@ -68,12 +53,12 @@ def open_device(daq: DaqTable, port: str) -> Device:
     Raises DeviceError if there is no device, DataError for a file without hits.
     """
     if port.startswith(REPLAY_PREFIX):
-        return FileSource(port.removeprefix(REPLAY_PREFIX))
+        return acquisition.FileSource(port.removeprefix(REPLAY_PREFIX))
     with convert_driver_errors(daq.driver, f"opening {port}"):
         return find_driver(daq.driver).open(port, daq.settings)
 
 
-def find_sensor_data(daq: DaqTable, port: str) -> SensorDataLocation | None:
+def find_sensor_data(daq: DaqTable, port: str) -> acquisition.SensorDataLocation | None:
     """Return the location of the sensor data in the device on a port, None if machine.toml has them."""
     return None if port.startswith(REPLAY_PREFIX) else find_driver(daq.driver).sensor_data
 
@@ -85,34 +70,44 @@ LEVEL_WINDOW = 0.05
 def describe_device(device: Device) -> str:
     """Describe model, serial number, firmware and loss detection, as far as known."""
     identity = device.identity
-    details = {
-        "serial number ": identity.serial,
-        "firmware ": identity.firmware,
-        "loss detection: ": device.loss_detection,
-    }
-    return ", ".join([identity.model, *(name + value for name, value in details.items() if value)])
+    texts = identity.serial, identity.firmware, device.loss_detection
+    details = zip(("serial number ", "firmware ", "loss detection: "), texts, strict=True)
+    return ", ".join([identity.model, *(name + value for name, value in details if value)])
+
+
+def get_newest_codes(pieces: Sequence[Codes], rate: float) -> Codes:
+    """Return the newest codes of at least one piece, at most LEVEL_WINDOW, at a sample rate (Hz)."""
+    wanted, newest = round(LEVEL_WINDOW * rate), [pieces[-1]]
+    while sum(part.shape[-1] for part in newest) < wanted and len(newest) < len(pieces):
+        newest.insert(0, pieces[-1 - len(newest)])
+    return np.concatenate(newest, axis=-1)[..., -wanted:]
+
+
+def collect_codes(blocks: Iterable[Block], count: float) -> tuple[Codes, int]:
+    """Return the codes of the next blocks with this many scans, shape (n_channels, n), and the scans lost in them."""
+    codes, lost = list[Codes](), 0
+    for block in blocks:
+        codes.append(block.codes)
+        lost += block.lost_before
+        if sum(part.shape[1] for part in codes) >= count:
+            break
+    return np.concatenate(codes, axis=1), lost
 
 
 class LiveSignal:
     """Newest samples of force and acceleration, or of the acceleration only."""
 
-    def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+    def __init__(self, source: acquisition.Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
         """Select the inputs. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
         self.inputs = TapInputs.select(source.channels, quantity, direction)
         """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
         self._rate = source.sample_rate
-        self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
+        self._recent: deque[Codes] = deque(maxlen=64)
 
     @property
     def levels(self) -> tuple[float | None, float]:
         """RMS about the mean of force (N, None if not measured) and acceleration (m/s^2) over LEVEL_WINDOW."""
-        wanted = round(LEVEL_WINDOW * self._rate)
-        newest: list[NDArray[np.int32]] = []
-        for codes in reversed(self._recent):
-            newest.insert(0, codes[list(self.inputs.rows)])
-            if sum(part.shape[1] for part in newest) >= wanted:
-                break
-        steps = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
+        steps = np.std(get_newest_codes(self._recent, self._rate)[list(self.inputs.rows)], axis=1)
         rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
         return rms[0] if len(rms) > 1 else None, rms[-1]
 
@@ -121,13 +116,8 @@ class LiveSignal:
 
     def record(self, blocks: Iterable[Block], duration: float) -> Hit:
         """Return the next blocks of this duration (s) as one record."""
-        codes, lost = [], 0
-        for block in blocks:
-            codes.append(block.codes[list(self.inputs.rows)])
-            lost += block.lost_before
-            if sum(part.shape[1] for part in codes) >= duration * self._rate:
-                break
-        return self.inputs.make_hit(np.concatenate(codes, axis=1), self._rate, lost_scans=lost)
+        codes, lost = collect_codes(blocks, duration * self._rate)
+        return self.inputs.make_hit(codes[list(self.inputs.rows)], self._rate, lost_scans=lost)
 
 
 def estimate_resting_rms(baseline: Hit, width: int) -> float:
@@ -153,12 +143,12 @@ class Button:
         self._bounce = BUTTON_BOUNCE_TIME * sample_rate
         self._moved: int | None = None
 
-    def count_presses(self, events: deque[Event]) -> int:
+    def count_presses(self, events: deque[acquisition.Event]) -> int:
         """Take all waiting events and count the presses in them."""
         count = 0
         while events:
             event = events.popleft()
-            if event.kind == EventKind.BUTTON:
+            if event.kind == acquisition.EventKind.BUTTON:
                 count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
                 self._moved = event.scan
         return count
@@ -174,18 +164,9 @@ class DeviceConnection:
         """Direction that is tapped. It selects one of several accelerations."""
         self.signal = LiveSignal(device, quantity, direction)
         """Newest samples."""
-        self._button = Button(device.sample_rate)
-        self._fault = ""
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """All channels of the device."""
-        return self._device.channels
-
-    @property
-    def sample_rate(self) -> float:
-        """Sample rate (Hz)."""
-        return self._device.sample_rate
+        self.channels, self.sample_rate = device.channels, device.sample_rate
+        """All channels of the device, and its sample rate (Hz)."""
+        self._button, self._fault = Button(device.sample_rate), ""
 
     def start(self) -> None:
         """Start the stream. Earlier button presses do not count."""
@@ -205,9 +186,7 @@ class DeviceConnection:
     def poll_fault_text(self) -> str:
         """Return a sentence when a sensor fault appears or disappears, once. Empty if nothing changed."""
         before, self._fault = self._fault, self._device.fault
-        if self._fault == before:
-            return ""
-        return self._fault or "The sensor is connected again."
+        return "" if self._fault == before else self._fault or "The sensor is connected again."
 
     def close(self) -> None:
         self._device.close()
@@ -261,7 +240,7 @@ class DeviceConnector:
         """Measure the sample rate of a device that this machine does not know yet."""
         if has_clock(device) and find_stored_rate(self._folder, device) is None:
             self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
-        remarks = list[Remark]()
+        remarks = list[acquisition.Remark]()
         check_device_rate(self._folder, device, remarks=remarks)
         if remarks:
             self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))

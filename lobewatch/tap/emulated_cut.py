@@ -11,16 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import Driver, EmulatorThread, SensorInput, Structure
-from acquisition.emulation import (
-    Housing,
-    HousingSignal,
-    MillingCut,
-    Passage,
-    SignalFunction,
-    make_random_housing,
-    simulate_cut,
-)
+from acquisition import Driver, EmulatorThread, SensorInput, Structure, emulation
+from acquisition.emulation import MillingCut, Passage, SignalFunction
 from dsm import Spindle
 from lobes import Cut, Program, program_limit
 from lobewatch.cuts.learning.prior_samples import ROTATING_FORCE_PRIOR
@@ -68,11 +60,8 @@ class ModeFactors(NamedTuple):
 
     def apply_to(self, at_rest: Structure) -> Structure:
         """Return the structure at speed from that at rest."""
-        return Structure(
-            at_rest.frequency * self.frequency,
-            at_rest.damping_ratio * self.damping_ratio,
-            at_rest.stiffness * self.stiffness,
-        )
+        frequency, zeta, stiffness = at_rest.frequency, at_rest.damping_ratio, at_rest.stiffness
+        return Structure(frequency * self.frequency, zeta * self.damping_ratio, stiffness * self.stiffness)
 
 
 class HiddenTruth(NamedTuple):
@@ -129,10 +118,11 @@ def emulate_cut(
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
-    motion, housing = simulate_cut(cut, passage), _normalize_gain(make_random_housing(random, cut.speed_rpm))
+    motion = emulation.simulate_cut(cut, passage)
+    housing = _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm))
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
-        return map_signal_to_inputs(inputs, HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
+        return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
 
     device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
     return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
@@ -143,14 +133,13 @@ def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spind
     damping_ratio = get_spindle_table(folder).damping_ratio
     structure = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
     softest = int(np.argmin(structure.stiffness))
-    is_moved = (structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]) & (
-        structure.frequency < MAX_EMULATED_MODE_FREQUENCY
-    )
+    is_moved = structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]
+    is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY
     is_moved[softest] = True
     return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
 
 
-def _normalize_gain(housing: Housing) -> Housing:
+def _normalize_gain(housing: emulation.Housing) -> emulation.Housing:
     """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
     largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
     return replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
@@ -159,37 +148,34 @@ def _normalize_gain(housing: Housing) -> Housing:
 def _build_true_cut(
     folder: MachineFolder, setting: CutSetting, at_rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
 ) -> MillingCut:
-    coefficients = folder.machine.coefficients(setting.table)
+    coefficients, cut = folder.machine.coefficients(setting.table), setting.cut
     edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
-    edges = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS)
+    tangential_edge, radial_edge = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS).tolist()
     feed = setting.table.feed_per_tooth_mm or DEFAULT_FEED_SHARE * setting.table.tool_diameter_mm
     return MillingCut(
-        teeth=setting.cut.teeth,
-        entry_angle=setting.cut.entry_angle,
-        exit_angle=setting.cut.exit_angle,
-        tangential=setting.cut.tangential * truth.tangential,
-        radial=setting.cut.radial * truth.tangential,
-        tangential_edge=float(edges[0]),
-        radial_edge=float(edges[1]),
+        teeth=cut.teeth,
+        entry_angle=cut.entry_angle,
+        exit_angle=cut.exit_angle,
+        tangential=cut.tangential * truth.tangential,
+        radial=cut.radial * truth.tangential,
+        tangential_edge=tangential_edge,
+        radial_edge=radial_edge,
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
         speed_rpm=setting.speed_rpm * truth.speed,
         x=truth.x.apply_to(at_rest),
         y=truth.y.apply_to(at_rest),
         runout=runout,
-        helix_lag=setting.cut.helix_lag,
-        pitch=setting.cut.pitch,
+        helix_lag=cut.helix_lag,
+        pitch=cut.pitch,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )
 
 
 def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
     """Return the stable depth limit by semi-discretization (m)."""
-    x, y = (
-        [Mode(*values) for values in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
-        for side in (cut.x, cut.y)
-        if side is not None
-    )
+    sides = [side for side in (cut.x, cut.y) if side is not None]
+    x, y = ([*map(Mode, side.frequency, side.damping_ratio, side.stiffness)] for side in sides)
     true_cut = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
     return program_limit(Program(true_cut, cut.speed_rpm, cut.depth), x, y).limit
 
@@ -197,18 +183,10 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
-    x, y = (
-        ModeFactors(
-            *(
-                _draw_factor(random, *prior)
-                for prior in (ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR)
-            )
-        )
-        for _ in range(2)
-    )
-    return HiddenTruth(
-        x, y, _draw_factor(random, *ROTATING_FORCE_PRIOR), 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION)
-    )
+    priors = ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR
+    x, y = (ModeFactors(*(_draw_factor(random, *prior) for prior in priors)) for _ in range(2))
+    tangential = _draw_factor(random, *ROTATING_FORCE_PRIOR)
+    return HiddenTruth(x, y, tangential, 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION))
 
 
 def draw_runout(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:

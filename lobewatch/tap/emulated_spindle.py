@@ -7,26 +7,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from acquisition import (
-    CROSS_TAP,
-    Block,
-    Channel,
-    DataError,
-    Driver,
-    EmulationSetup,
-    EmulatorThread,
-    HammeredStructure,
-    Hammering,
-    SensorInput,
-    Structure,
-    TapDirection,
-    TapsEmulator,
-    TapsSource,
-)
+import acquisition
+from acquisition import CROSS_TAP, Driver, HammeredStructure, SensorInput, Structure, TapDirection, TapsEmulator
 from acquisition.emulation import SignalFunction
 from dsm import Spindle, modes_at, static_stiffness
 from lobewatch.arrays import Floats
@@ -38,8 +25,8 @@ EMULATED_MODES = 8
 EMULATED_SAMPLE_RATE = 25600.0
 """Sample rate of the device (Hz)."""
 EMULATED_CHANNELS = (
-    Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
-    Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
+    acquisition.Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
+    acquisition.Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
 )
 """Channels of a 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
 SECOND_AXIS_FREQUENCY_SHIFT = 0.05
@@ -54,7 +41,7 @@ HOST_WAIT_TIME = 0.2
 class EmulatedMachine:
     """Emulated device and the true values of its first mode."""
 
-    device: EmulatorThread
+    device: acquisition.EmulatorThread
     """Emulator that serves while its context lasts."""
     frequency: float
     """True natural frequency of the first mode (Hz)."""
@@ -65,12 +52,8 @@ class EmulatedMachine:
 def build_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
     """Build the structure at a position (m from the tool tip): modes and static residual of the model."""
     frequency, stiffness = modes_at(spindle, EMULATED_MODES, position)
-    return Structure(
-        frequency=frequency,
-        damping_ratio=np.full(EMULATED_MODES, damping_ratio),
-        stiffness=stiffness,
-        residual=1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness)),
-    )
+    residual = 1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness))
+    return Structure(frequency, np.full(EMULATED_MODES, damping_ratio), stiffness, residual)
 
 
 def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection) -> Structure:
@@ -85,18 +68,14 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
     c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
-        raise ValueError(
-            f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: "
-            "modes along x and y show nothing across; give another angle"
-        )
+        text = "modes along x and y show nothing across; give another angle"
+        raise ValueError(f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: {text}")
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
-    return Structure(
-        frequency=np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible]),
-        damping_ratio=np.tile(spindle.damping_ratio, len(visible)),
-        stiffness=np.concatenate([spindle.stiffness * stiff / share for share, stiff in visible]),
-        residual=sum(spindle.residual * share / stiff for share, stiff in visible),
-    )
+    frequency = np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible])
+    stiffness = np.concatenate([spindle.stiffness * stiff / share for share, stiff in visible])
+    residual = sum(spindle.residual * share / stiff for share, stiff in visible)
+    return Structure(frequency, np.tile(spindle.damping_ratio, len(visible)), stiffness, residual)
 
 
 def set_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
@@ -108,20 +87,20 @@ def make_emulator(
     structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False
 ) -> TapsEmulator:
     """Make a TAPS/1 device on a structure that is tapped again and again."""
-    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering())
+    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random)
     return TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=realtime, tcp=tcp)
 
 
 @contextmanager
 def open_synchronized_device(
     structure: Structure, random: np.random.Generator, *, tcp: bool = False
-) -> Iterator[Callable[[], TapsSource]]:
+) -> Iterator[Callable[[], acquisition.TapsSource]]:
     """Serve a tapped structure on a TAPS/1 device that waits for its host. Yields the function that opens it.
 
     Device and host work in turns: two threads that work at once switch the interpreter at each step, and the reader of
     a port would collect data during the evaluation of a hit, most of which would be discarded.
     """
-    hammered, requested = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random, Hammering()), threading.Semaphore()
+    hammered, requested = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random), threading.Semaphore()
 
     def signal(first_scan: int, n_scans: int) -> Floats:
         requested.acquire(timeout=HOST_WAIT_TIME)
@@ -131,7 +110,7 @@ def open_synchronized_device(
         yield lambda: _SynchronizedSource(device.port, requested)
 
 
-class _SynchronizedSource(TapsSource):
+class _SynchronizedSource(acquisition.TapsSource):
     """Source that requests a block when the previous one is processed. Its frames are longer than usual."""
 
     _frame_time = 0.06
@@ -140,7 +119,7 @@ class _SynchronizedSource(TapsSource):
         super().__init__(port)
         self._wanted = requested
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[acquisition.Block]:
         for block in super().blocks():
             yield block
             self._wanted.release()
@@ -167,61 +146,52 @@ def emulate_machine(
     directions as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no
     spindle, or lacks the sensors of a device that does not describe them itself.
     """
-    built, random = _build_tapped_structure(folder, spindle), np.random.default_rng(seed)
+    table, random = get_spindle_table(folder), np.random.default_rng(seed)
+    position = folder.machine.tap.position_mm / 1e3
+    built = build_structure(spindle or table.build(), table.damping_ratio, position)
     structure = _select_direction(built, axes_angle, direction)
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
         cross = [_select_cross_direction(built, axes_angle, direction)] if is_crossed else []
-        return map_signal_to_inputs(inputs, HammeredStructure(structure, rate, random, Hammering(), cross), direction)
+        hammered = HammeredStructure(structure, rate, random, cross_structures=cross)
+        return map_signal_to_inputs(inputs, hammered, direction)
 
     device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
+InputsSignal = Callable[[Sequence[SensorInput], float], SignalFunction]
+"""Function that returns the signal function of sensors at a sample rate (Hz)."""
+
+
 def emulate_device(
-    folder: MachineFolder,
-    driver: Driver,
-    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
-    *,
-    realtime: bool,
-    tcp: bool,
-) -> EmulatorThread:
+    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, *, realtime: bool, tcp: bool
+) -> acquisition.EmulatorThread:
     """Make an emulated device of this kind. signal_of: function of its sensors and sample rate (Hz).
 
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
-        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
+        raise acquisition.DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     inputs = get_emulated_inputs(folder, driver)
     has_clock = folder.machine.daq.digital_clock
-    return driver.emulate(
-        EmulationSetup(lambda rate: signal_of(inputs, rate), inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock)
-    )
+    signal_at = partial(signal_of, inputs)
+    return driver.emulate(acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock))
 
 
 def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
     """Return [spindle] of machine.toml. DataError if there is none."""
     if folder.machine.spindle is None:
-        raise DataError(
-            f"{folder.toml}: no model to {purpose}: "
-            "add a [spindle] table (or use folder_files.make_machine_folder.template)"
-        )
+        cure = "add a [spindle] table (or use folder_files.make_machine_folder.template)"
+        raise acquisition.DataError(f"{folder.toml}: no model to {purpose}: {cure}")
     return folder.machine.spindle
-
-
-def _build_tapped_structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
-    table = get_spindle_table(folder)
-    return build_structure(replacement or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
 def _select_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
     """Return the structure between hammer and sensor in a direction."""
-    return (
-        built
-        if axes_angle is None and direction != CROSS_TAP
-        else rotate_structure(built, axes_angle or 0.0, direction)
-    )
+    is_round = axes_angle is None and direction != CROSS_TAP
+    return built if is_round else rotate_structure(built, axes_angle or 0.0, direction)
 
 
 def _select_cross_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
@@ -257,8 +227,6 @@ def get_emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorIn
         return tuple(SensorInput(number, channel) for number, channel in enumerate(channels))
     inputs = folder.machine.daq.settings.inputs
     if not inputs:
-        raise DataError(
-            f'{folder.toml}: no sensors to emulate: give driver = "{driver.name}" in [daq] and two [[daq.channel]] '
-            "(docs/devices.md shows them)"
-        )
+        cure = f'give driver = "{driver.name}" in [daq] and two [[daq.channel]] (docs/devices.md shows them)'
+        raise acquisition.DataError(f"{folder.toml}: no sensors to emulate: {cure}")
     return inputs

@@ -45,10 +45,6 @@ class EvaluatedHits:
         """Evaluate a hit, also against the mean if that has enough hits. A good one is then part of the mean."""
         return evaluate_safely(lambda: self._evaluate(hit))
 
-    def add(self, hit: Hit, verdict: HitVerdict) -> None:
-        """Store a hit. It is on the disk when this returns."""
-        self.tap.add(hit, verdict.flags, verdict.text)
-
     def undo(self) -> int | None:
         """Take back the last good hit and return its index. None if there is none."""
         good = [i for i, flags in enumerate(self.tap.flags) if not flags]
@@ -93,11 +89,6 @@ class TapPublisher(StatePublisher[TapState]):
 
     def show_hits(self, hits: EvaluatedHits, **changes: Any) -> None:
         """Publish the list of hits, what follows from it, and other fields."""
-        mean = hits.mean
-        self.show(
-            hits=hits.tap.taken,
-            good=hits.tap.good,
-            mean_change=mean.relative_change,
-            settled=mean.has_converged,
-            **changes,
-        )
+        tap, mean = hits.tap, hits.mean
+        changes |= {"mean_change": mean.relative_change, "settled": mean.has_converged}
+        self.show(hits=tap.taken, good=tap.good, **changes)

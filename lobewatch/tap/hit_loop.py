@@ -6,7 +6,7 @@ import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from acquisition import Block, DataError, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Trigger
 from lobewatch.machine.folder import MachineFolder
@@ -20,6 +20,7 @@ from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s). The trigger may be armed before."""
+EARLY_HIT_TEXT = "That hit came while the tool still moved and does not count: wait for TAP."
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -28,27 +29,14 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
     """Raised when the operator ends the test early. The hits stay stored, and the next test resumes with them."""
 
 
+@dataclass(frozen=True)
 class OperatorRequests:
     """Requests to undo or stop, made by any thread and handled by that of the test."""
 
-    def __init__(self) -> None:
-        self._undos, self._stopping = threading.Semaphore(0), threading.Event()
-
-    def undo(self) -> None:
-        """Request to take back the last good hit. Again: the one before."""
-        self._undos.release()
-
-    def stop(self) -> None:
-        self._stopping.set()
-
-    @property
-    def stopping(self) -> bool:
-        """True if the test is to end."""
-        return self._stopping.is_set()
-
-    def take_undo(self) -> bool:
-        """Return whether one more hit is to be taken back. Each request counts once."""
-        return self._undos.acquire(blocking=False)
+    undos: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
+    """Number of times that the last good hit is to be taken back."""
+    stopping: threading.Event = field(default_factory=threading.Event)
+    """Event that is set when the test is to end."""
 
 
 class HitLoop:
@@ -59,8 +47,7 @@ class HitLoop:
     ) -> None:
         """Set up the loop. guided False omits the curves and the time to take back the last hit."""
         self._hits, self._publisher, self._requests, self._guided = hits, publisher, requests, guided
-        self._verdict = TapStep.TAP
-        self._scan_count = 0
+        self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
 
     def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
@@ -80,9 +67,9 @@ class HitLoop:
 
     def handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
-        if self._requests.stopping:
+        if self._requests.stopping.is_set():
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
-        while self._requests.take_undo():
+        while self._requests.undos.acquire(blocking=False):
             self._undo()
 
     def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
@@ -94,9 +81,7 @@ class HitLoop:
             yield None
             if search.too_early > n_early:
                 n_early = search.too_early
-                self._publisher.show(
-                    reason="That hit came while the tool still moved and does not count: wait for TAP."
-                )
+                self._publisher.show(reason=EARLY_HIT_TEXT)
             self._show_trigger_step(search, connection.sample_rate)
 
     def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
@@ -140,18 +125,16 @@ class HitLoop:
         """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
         verdict = self._hits.evaluate(hit)
         self.show_verdict(verdict.flags, verdict.text)
-        self._hits.add(hit, verdict)
+        self._hits.tap.add(hit, verdict.flags, verdict.text)
         self._publisher.show_hits(self._hits)
         self.show_curves(hit)
-        outlier = None if verdict.flags else self._hits.recheck_first_hits()
-        if outlier is not None:
-            number, verdict_now = outlier
-            reason = f"Hit {number + 1} does not fit the others and counts no more. {verdict_now.text}"
-            self._show_taken_out(verdict_now.flags, reason)
+        if not verdict.flags and (outlier := self._hits.recheck_first_hits()) is not None:
+            number, now = outlier
+            reason = f"Hit {number + 1} does not fit the others and counts no more. {now.text}"
+            self._show_taken_out(now.flags, reason)
 
     def _undo(self, means: str = "") -> None:
-        number = self._hits.undo()
-        if number is not None:
+        if (number := self._hits.undo()) is not None:
             self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
@@ -171,11 +154,11 @@ class TapPhases:
     """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away."""
 
     def __init__(
-        self, folder: MachineFolder, hits: EvaluatedHits, loop: HitLoop, publisher: TapPublisher, *, guided: bool
+        self, folder: MachineFolder, hits: EvaluatedHits, publisher: TapPublisher, asked: OperatorRequests, guided: bool
     ) -> None:
         """Set up the phases. guided False omits re-arming by decay, and the self-check if no trial hits need it."""
-        self._folder, self._hits, self._loop, self._publisher = folder, hits, loop, publisher
-        self._tap, self._guided = hits.tap, guided
+        self._folder, self._hits, self._publisher, self._tap, self._guided = folder, hits, publisher, hits.tap, guided
+        self._loop = HitLoop(hits, publisher, asked, guided=guided)
         self._trial: TrialHits | None = None
 
     def run(self, connector: DeviceConnector) -> None:
@@ -200,25 +183,16 @@ class TapPhases:
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
         self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
-        self._tap.baseline = find_quiet_part(
-            connection.signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION)
-        )
-        free = shutil.disk_usage(self._folder.path).free
-        calibration = check_calibration(connection.signal.inputs.channels, machine.daq.calibration_interval_months)
-        checks = (
-            *self._publisher.state.checks,
-            *_run_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),
-            calibration,
-            *self._hearing(self._tap.baseline),
-        )
+        signal, months = connection.signal, machine.daq.calibration_interval_months
+        baseline = find_quiet_part(signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION))
+        self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
+        checks = [*self._publisher.state.checks]
+        checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
+        checks.append(check_calibration(signal.inputs.channels, months))
+        if not baseline.has_force:
+            checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
-        self._publisher.show(checks=checks, reason=" ".join(failed))
-
-    def _hearing(self, baseline: Hit) -> tuple[Check, ...]:
-        """Check the detectable band if there is no force sensor."""
-        if baseline.has_force:
-            return ()
-        return (check_detectable_band(baseline, self._folder.machine, self._tap.circumstances.tool),)
+        self._publisher.show(checks=tuple(checks), reason=" ".join(failed))
 
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
@@ -226,28 +200,23 @@ class TapPhases:
         tap.trigger = tap.trigger or trigger_from_setup(setup, connection.sample_rate)
         if tap.trigger is not None or tap.baseline is None:
             return
-        self._trial = self._trial or TrialHits(setup, tap.baseline)
-        self._take_trial_hits(connection, self._trial)
-        tap.trigger = self._trial.trigger
-        check = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
-        self._publisher.show(checks=(*self._publisher.state.checks, check))
-
-    def _take_trial_hits(self, connection: DeviceConnection, trial: TrialHits) -> None:
+        self._trial = trial = self._trial or TrialHits(setup, tap.baseline)
         asked = False
         while not trial.is_done:
             if not asked:
                 self._publisher.show(reason=f"{self._publisher.state.reason} {trial.text}".strip())
             asked = self._take_trial_hit(connection, trial)
+        tap.trigger = trial.trigger
+        check = Check("trial hits", not trial.remarks, trial.text.removesuffix("."))
+        self._publisher.show(checks=(*self._publisher.state.checks, check))
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
-        hits = self._loop.hits(connection, self._at_rest(trial.trigger))
-        hit = next(hit for hit in hits if hit is not None)
+        hit = next(filter(None, self._loop.hits(connection, self._at_rest(trial.trigger))))
         verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
-        flags = verdict.flags
-        self._loop.show_verdict(flags, verdict.text or flags.cure or trial.text, trial=True)
+        self._loop.show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
         self._loop.show_curves(hit)
-        return not flags
+        return not verdict.flags
 
     def _take(self, connection: DeviceConnection) -> None:
         trigger = self._tap.trigger
@@ -267,6 +236,5 @@ def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> 
     try:
         return run_self_check(baseline, level, free_bytes)
     except Exception as error:  # noqa: BLE001 - a check warns and ends no test
-        return (
-            Check("self-check", False, f"it failed ({type(error).__name__}: {error}); the test goes on without it"),
-        )
+        text = f"it failed ({type(error).__name__}: {error}); the test goes on without it"
+        return (Check("self-check", False, text),)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf, Hit, RunningMean, compute_cross_spectra, extract_free_decay
+from acquisition import Hit, RunningMean, compute_cross_spectra, extract_free_decay
 from acquisition.estimation.estimate_frf import estimate_frf_from_spectra
 from acquisition.hits.pulse import find_pulse
-from lobewatch.arrays import Floats, Integers
+from lobewatch.arrays import Integers
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import LiveCurves
 from modal import decay_spectra
@@ -37,25 +37,17 @@ def build_curves(hit: Hit, mean: RunningMean) -> LiveCurves:
     last = None if spectra is None else estimate_frf_from_spectra(spectra, [hit])
     band = next((frf.usable_band for frf in (mean.frf, last) if frf is not None), None)
     frequency = np.arange(1, hit.force.size // 2 + 1) * hit.sample_rate / hit.force.size
-    spectrum = None if spectra is None else _to_decibels(spectra[0][1:])
+    spectrum = None if spectra is None else 10 * np.log10(np.maximum(spectra[0][1:] / np.max(spectra[0][1:]), 1e-10))
     sizes = [None if frf is None else np.abs(frf.receptance) for frf in (mean.frf, last)]
-    end = (
-        frequency.size
-        if band is None
-        else int(np.searchsorted(frequency, SPECTRUM_BAND_FACTOR * band[1], side="right"))
-    )
+    highest = frequency[-1] if band is None else SPECTRUM_BAND_FACTOR * band[1]
+    end = int(np.searchsorted(frequency, highest, side="right"))
     lines = find_extremes([curve for curve in (*sizes, spectrum) if curve is not None], end)
-    return LiveCurves(
-        time=hit.time[shown],
-        force=hit.force[shown],
-        acceleration=hit.acceleration[shown],
-        frequency=frequency[lines],
-        mean=_pick_lines(sizes[0], lines),
-        last=_pick_lines(sizes[1], lines),
-        coherence=_pick_lines(_get_coherence(mean.frf), lines),
-        force_spectrum=_pick_lines(spectrum, lines),
-        usable_band=band,
-    )
+    frf = mean.frf
+    coherence = None if frf is None or frf.n_averages < MIN_HITS_FOR_COHERENCE else frf.coherence
+    curves = (None if curve is None else curve[lines] for curve in (*sizes, coherence, spectrum))
+    mean_size, last_size, coherence, spectrum = curves
+    signals = hit.time[shown], hit.force[shown], hit.acceleration[shown]
+    return LiveCurves(*signals, frequency[lines], mean_size, last_size, coherence, spectrum, band)
 
 
 def _build_decay_curves(hit: Hit) -> LiveCurves:
@@ -63,31 +55,12 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
     shown = find_extremes([hit.acceleration], hit.acceleration.size)
     (spectrum,) = decay_spectra(extract_free_decay(hit), hit.sample_rate)
     size = np.abs(spectrum.receptance)
-    low, high = np.searchsorted(
-        spectrum.frequency, [MIN_DECAY_CURVE_FREQUENCY, MAX_DECAY_FREQUENCY_RATIO * hit.sample_rate]
-    )
+    limits = [MIN_DECAY_CURVE_FREQUENCY, MAX_DECAY_FREQUENCY_RATIO * hit.sample_rate]
+    low, high = np.searchsorted(spectrum.frequency, limits)
     size *= DECAY_PEAK_RECEPTANCE / np.max(size[low:high])
     lines = low + find_extremes([size[low:]], int(high - low))
-    return LiveCurves(
-        time=hit.time[shown],
-        force=None,
-        acceleration=hit.acceleration[shown],
-        frequency=spectrum.frequency[lines],
-        last=size[lines],
-    )
-
-
-def _get_coherence(frf: Frf | None) -> Floats | None:
-    return None if frf is None or frf.n_averages < MIN_HITS_FOR_COHERENCE else frf.coherence
-
-
-def _pick_lines(curve: Floats | None, lines: Integers) -> Floats | None:
-    return None if curve is None else curve[lines]
-
-
-def _to_decibels(power: Floats) -> Floats:
-    """Return dB below the largest value, at most 100."""
-    return np.asarray(10 * np.log10(np.maximum(power / np.max(power), 1e-10)))
+    frequency = spectrum.frequency[lines]
+    return LiveCurves(hit.time[shown], None, hit.acceleration[shown], frequency, last=size[lines])
 
 
 def _select_samples(hit: Hit) -> Integers:

@@ -16,6 +16,7 @@ from lobewatch.machine import Machine
 from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
+from lobewatch.tap.trial_hits import CHANNEL_UNITS
 
 QUIET_PIECE_TIME = 0.01
 """Length of the pieces by which a quiet part is found (s)."""
@@ -27,7 +28,7 @@ MIN_TRIGGER_NOISE_RATIO = 6.0
 """Smallest trigger level over the rms of the force at rest."""
 MAX_RESPONSE_NOISE_SHARE = 0.02
 """Largest noise of the response as a share of its range."""
-CHECKED_MAINS_FREQUENCIES = (50.0, 60.0)
+MAINS = (50.0, 60.0)
 """Mains frequencies (Hz)."""
 CHECKED_MAINS_HARMONICS = 6
 """Number of mains harmonics checked."""
@@ -88,10 +89,7 @@ def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: fl
     """Return remarks on implausible sensitivities and ranges and on old, unknown or impossible calibrations."""
     remarks: list[Remark] = []
     for channel in channels:
-        remarks += channel_remarks(channel)
-        calibration = calibration_remark(channel, today, interval_months)
-        if calibration is not None:
-            remarks.append(calibration)
+        remarks += [*channel_remarks(channel), *filter(None, [calibration_remark(channel, today, interval_months)])]
     return remarks
 
 
@@ -125,9 +123,8 @@ def _check_force_noise(rms: float, level: float | None) -> Check:
         return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
     amplitude = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
     cure = f"set trigger_n above {amplitude}, or find the source of the noise"
-    return Check(
-        "force noise", False, f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N: {cure}"
-    )
+    text = f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N"
+    return Check("force noise", False, f"{text}: {cure}")
 
 
 def _check_response_noise(rms: float, channel: Channel) -> Check:
@@ -146,15 +143,13 @@ def _power_spectrum(signal: Floats, rate: float) -> tuple[Floats, Floats]:
     return np.arange(power.size) * rate / signal.size, 2 * power / (signal.size * np.sum(window**2))
 
 
-def _select_line(frequency: Floats, line: float) -> Flags:
-    """Select the lines over which a Hann window spreads one frequency."""
-    return np.asarray(np.abs(frequency - line) <= 2 * frequency[1])
+def _select_lines(frequency: Floats, *lines: float) -> Flags:
+    """Select the lines over which a Hann window spreads these frequencies."""
+    return np.asarray(np.any([np.abs(frequency - line) <= 2 * frequency[1] for line in lines], axis=0))
 
 
-def _select_mains_lines(frequency: Floats, mains: float) -> Flags:
-    return np.asarray(
-        np.any([_select_line(frequency, mains * k) for k in range(1, CHECKED_MAINS_HARMONICS + 1)], axis=0)
-    )
+def _list_harmonics(mains: float) -> list[float]:
+    return [mains * k for k in range(1, CHECKED_MAINS_HARMONICS + 1)]
 
 
 def _check_hum(baseline: Hit) -> Check:
@@ -162,10 +157,8 @@ def _check_hum(baseline: Hit) -> Check:
     texts = []
     for channel, signal, unit in _list_signals(baseline):
         frequency, power = _power_spectrum(signal, baseline.sample_rate)
-        worst = max(
-            CHECKED_MAINS_FREQUENCIES, key=lambda mains: float(np.sum(power[_select_mains_lines(frequency, mains)]))
-        )
-        hum = float(np.sum(power[_select_mains_lines(frequency, worst)]))
+        sums = [float(np.sum(power[_select_lines(frequency, *lines)])) for lines in map(_list_harmonics, MAINS)]
+        hum, worst = max(sums), MAINS[int(np.argmax(sums))]
         if hum > MIN_HUM_POWER_SHARE * np.sum(power) and np.sqrt(hum) > MIN_LINE_CODES * abs(channel.scale):
             texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and its multiples in the {channel.quantity}")
     if texts:
@@ -177,11 +170,10 @@ def _check_spindle(baseline: Hit) -> Check:
     """Check for one strong line in the response that is not mains hum."""
     channel, signal, unit = _list_signals(baseline)[-1]
     frequency, power = _power_spectrum(signal, baseline.sample_rate)
-    off_mains = np.where(
-        np.any([_select_mains_lines(frequency, mains) for mains in CHECKED_MAINS_FREQUENCIES], axis=0), 0.0, power
-    )
+    mains = [line for mains in MAINS for line in _list_harmonics(mains)]
+    off_mains = np.where(_select_lines(frequency, *mains), 0.0, power)
     line = float(frequency[int(np.argmax(off_mains))])
-    rms = float(np.sqrt(np.sum(off_mains[_select_line(frequency, line)])))
+    rms = float(np.sqrt(np.sum(off_mains[_select_lines(frequency, line)])))
     if rms**2 > MIN_SPINDLE_POWER_SHARE * np.sum(power) and rms > MIN_LINE_CODES * abs(channel.scale):
         vibration = f"{format_rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
         return Check("spindle", False, f"a steady vibration of {vibration}: stop the spindle and what runs beside it")
@@ -189,11 +181,8 @@ def _check_spindle(baseline: Hit) -> Check:
 
 
 def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:
-    if baseline.channels is None:
-        return []
-    units = {"force": "N", "acceleration": "m/s^2"}
-    pairs = zip(baseline.channels, baseline.signals, strict=True)
-    return [(channel, signal, units[channel.quantity]) for channel, signal in pairs]
+    pairs = zip(baseline.channels or (), baseline.signals, strict=True)
+    return [(channel, signal, CHANNEL_UNITS[channel.quantity]) for channel, signal in pairs]
 
 
 def _check_disk(free: int) -> Check:
@@ -204,10 +193,8 @@ def _check_disk(free: int) -> Check:
 def _slice_record(record: Hit, start: int, end: int) -> Hit:
     if record.codes is None or record.channels is None:
         return Hit(record.force[start:end], record.acceleration[start:end], record.sample_rate)
-    part, beside = (
-        record.codes[:, start:end],
-        None if record.cross_hit is None else _slice_record(record.cross_hit, start, end),
-    )
+    part = record.codes[:, start:end]
+    beside = None if record.cross_hit is None else _slice_record(record.cross_hit, start, end)
     return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, cross_hit=beside)
 
 
@@ -230,14 +217,14 @@ def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
     highest, noise = min(MAX_DECAY_FREQUENCY_RATIO * rate, band), float(np.std(baseline.acceleration))
     detectable = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
     frequency, where = _find_expected_frequency(machine, tool)
+    damping_ratio = float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO
     if frequency is None:
-        return Check(
-            "band", True, f"{detectable}; whether the mode of this machine lies there nobody says", is_notable=True
-        )
+        text = f"{detectable}; whether the mode of this machine lies there nobody says"
+        return Check("band", True, text, is_notable=True)
     if frequency > highest:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
         return Check("band", False, f"{detectable}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
-    amplitude = min_decay_amplitude(frequency, _get_damping_ratio(machine), noise / math.sqrt(min(rate / 2, band)))
+    amplitude = min_decay_amplitude(frequency, damping_ratio, noise / math.sqrt(min(rate / 2, band)))
     needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(amplitude, digits=2)} m/s^2"
     error = f"{needed} tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
     return Check("band", True, f"{detectable}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
@@ -264,7 +251,3 @@ def _find_expected_frequency(machine: Machine, tool: str) -> tuple[float | None,
         band = machine.mode.band_hz
         return (None, "") if band is None else (band[1], "the end of [mode] band_hz")
     return float(natural_frequencies(spindle, machine.mode.model_mode)[-1]), "by the model"
-
-
-def _get_damping_ratio(machine: Machine) -> float:
-    return float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO

@@ -7,19 +7,8 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
 
-from acquisition import (
-    CROSS_TAP,
-    UNKNOWN_CONDITIONS,
-    Circumstances,
-    Conditions,
-    DataError,
-    Device,
-    DeviceError,
-    Remark,
-    TapTest,
-    merge_remarks,
-    parse_direction,
-)
+import acquisition
+from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, TapTest
 from acquisition.errors import PERMISSION_ERRNOS, format_os_error
 from dsm import format_with_error
 from lobewatch.logbook import Logbook
@@ -31,7 +20,7 @@ from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceConnector, DeviceOpener
 from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import HitLoop, OperatorRequests, TapPhases, TapStopped
+from lobewatch.tap.hit_loop import OperatorRequests, TapPhases, TapStopped
 from lobewatch.tap.state import Outcome, ProgramVerdict, TapState, TapStep
 from lobewatch.tap.tap_in_progress import CrossTapResult, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
@@ -85,6 +74,8 @@ class TapSession:
         self._publisher, self._requests = TapPublisher(first, clock), OperatorRequests()
         self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
+        self.wakes = self._publisher.wakes
+        """Functions called after every change by the thread of the test. None may take time."""
         self.unasked: Sequence[str] = ()
         """Codes of `accept` that the finished test does not ask."""
         self.saved: Sequence[str] = ()
@@ -98,11 +89,6 @@ class TapSession:
         return self._publisher.state
 
     @property
-    def wakes(self) -> set[Callable[[], None]]:
-        """Functions called after every change by the thread of the test. None may take time."""
-        return self._publisher.wakes
-
-    @property
     def measurement(self) -> Measurement:
         """Measurement of the finished test. ValueError before the end."""
         if self._measurement is None:
@@ -111,11 +97,11 @@ class TapSession:
 
     def undo(self) -> None:
         """Take back the last good hit. Again: the one before."""
-        self._requests.undo()
+        self._requests.undos.release()
 
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
-        self._requests.stop()
+        self._requests.stopping.set()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Reject a choice: nothing comes after a single test.
@@ -153,8 +139,8 @@ class TapSession:
                 hits = self._begin()
                 hits.tap.reserve = reserve
                 if hits.missing:
-                    loop = HitLoop(hits, self._publisher, self._requests, guided=self._guided)
-                    TapPhases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
+                    phases = TapPhases(self._folder, hits, self._publisher, self._requests, guided=self._guided)
+                    phases.run(self._connector)
                 reserve.release()
                 return self._finish(hits)
         except TapStopped:
@@ -194,17 +180,12 @@ class TapSession:
             self._measurement = logbook.measurement(tap.id)
             outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            why = _explain_no_result(error, [remark for remark in logbook.remarks if tap.id in remark.about])
+            why = "; ".join(str(remark) for remark in logbook.remarks if tap.id in remark.about) or str(error)
+            if isinstance(error, OSError) and error.errno:
+                why = format_os_error(error)
             raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
-
-
-def _explain_no_result(error: Exception, remarks: Sequence[Remark]) -> str:
-    """Explain why a saved tap test has no result. remarks: on its file."""
-    if isinstance(error, OSError) and error.errno:
-        return format_os_error(error)
-    return "; ".join(map(str, remarks)) or str(error)
 
 
 def _to_operator_error(error: Exception) -> Exception:
@@ -226,15 +207,16 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     standing = logbook.status(measurement.time)
     series = standing.series_of(measurement.tool, measurement.direction)
     questions = find_open_questions(measurement.remarks)
-    remarks = [*(remark for remark in measurement.remarks if remark not in questions), *merge_remarks(standing.remarks)]
+    remarks = [remark for remark in measurement.remarks if remark not in questions]
+    remarks += acquisition.merge_remarks(standing.remarks)
     remarks += [remark for remark in logbook.remarks if remark.code not in STATUS_BY_CODE]
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
     texts += [f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
-        ProgramVerdict(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.stability.value)
+        ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)
         for verdict in verdicts
-        if (program := verdict.program)
+        if (cut := verdict.program)
     ]
     of_tool = [verdict.remarks for verdict in verdicts if verdict.program.tool == measurement.tool]
     asks_across = any(remark.code == CROSS_NOT_TAPPED_CODE for remarks in of_tool for remark in remarks)
@@ -242,8 +224,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
 
 
 def _format_values(measurement: Measurement, series: SeriesStatus | None) -> list[str]:
-    mode = measurement.followed
-    if mode is None:
+    if (mode := measurement.followed) is None:
         return []
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "first test of this tool and direction"
@@ -268,7 +249,7 @@ def plan_session(
     operator: str = "",
     resume: bool = True,
     accept: Sequence[str] = (),
-    conditions: Conditions = UNKNOWN_CONDITIONS,
+    conditions: Conditions = acquisition.UNKNOWN_CONDITIONS,
 ) -> TapSession:
     """Plan a session of today. machine.toml supplies what is left empty.
 
@@ -305,16 +286,10 @@ def plan_session(
     port = port or machine.daq.port
     if not port:
         raise ValueError(f"no port: give plan_session.port, or port in [daq] of {folder.toml}")
-    tool, wanted = tool or machine.tap.tool, parse_direction(direction)
+    tool, wanted = tool or machine.tap.tool, acquisition.parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
-    about = Circumstances(
-        machine.machine.name,
-        datetime.now(UTC),
-        tool,
-        wanted,
-        operator,
-        folder.toml_text,
-        conditions=conditions.with_defaults(machine.tap.conditions(tool)),
-    )
+    conditions = conditions.with_defaults(machine.tap.conditions(tool))
+    what = machine.machine.name, datetime.now(UTC), tool, wanted, operator
+    about = Circumstances(*what, folder.toml_text, conditions=conditions)
     return TapSession(folder, DeviceOpener(machine.daq, port).open, about, resume=resume, accept=accept)

@@ -113,9 +113,8 @@ def _compute_crc(fields: object) -> int:
 def _read_spooled_hit(path: Path) -> SpooledHit | None:
     """Read a hit. None if its file is damaged."""
     try:
-        if not has_valid_checksum(read_regular_file(path)) and not has_readable_hits(path):
-            return None
-        if read_hit_name(path) not in ("", path.name):
+        is_sound = has_valid_checksum(read_regular_file(path)) or has_readable_hits(path)
+        if not is_sound or read_hit_name(path) not in ("", path.name):
             return None
         (hit,), about, (flags,) = read_tap_hits(path)
         return SpooledHit(int(path.stem), hit, flags, about)

@@ -204,15 +204,11 @@ class StatePublisher(Generic[State]):
 
     def __init__(self, first: State, clock: Callable[[], float]) -> None:
         """Publish the first state. clock: monotonic time (s)."""
-        self._state: State = first
+        self.state: State = first
+        """Newest state."""
         self._clock, self._shown_at = clock, clock()
         self.wakes: set[Callable[[], None]] = set()
         """Functions called after every change by the thread of the test. None may take time."""
-
-    @property
-    def state(self) -> State:
-        """Newest state."""
-        return self._state
 
     @property
     def age(self) -> float:
@@ -221,7 +217,7 @@ class StatePublisher(Generic[State]):
 
     def show(self, **changes: Any) -> None:
         """Replace the state by one with these changed fields."""
-        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
+        self.state = replace(self.state, revision=self.state.revision + 1, **changes)
         self._shown_at = self._clock()
         for wake in tuple(self.wakes):
             wake()

@@ -11,33 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import (
-    CROSS_TAP,
-    Channel,
-    Circumstances,
-    Hit,
-    HitFlags,
-    HitVerdict,
-    TapTest,
-    Trigger,
-    estimate_frf,
-    evaluate_hit,
-    new_tap_id,
-    write_hit,
-)
+import acquisition
+from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, TapTest, evaluate_hit, write_hit
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
-from lobewatch.tap.spool import (
-    MAX_RESUME_AGE,
-    SpooledHit,
-    clean_spool,
-    read_spooled_hits,
-    read_spooled_trigger,
-    write_setup,
-)
+from lobewatch.tap import spool
+from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
 
 
@@ -74,7 +56,7 @@ class TapInProgress:
     """Number of each hit in the name of its file."""
     n_resumed: int = 0
     """Number of hits that an interrupted test already had."""
-    trigger: Trigger | None = None
+    trigger: acquisition.Trigger | None = None
     """Trigger settings of its hits, None until chosen."""
     baseline: Hit | None = None
     """Record at rest, None before the self-check."""
@@ -99,7 +81,7 @@ class TapInProgress:
             for i, (hit, flags, reason) in hits
         )
 
-    def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
+    def accept_device(self, sample_rate: float, channels: tuple[acquisition.Channel, ...], description: str) -> None:
         """Note the set-up of the coming hits. ValueError if earlier hits have another one."""
         earlier = self.hits[-1] if self.hits else self.baseline
         if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
@@ -109,10 +91,8 @@ class TapInProgress:
 
     def make_setup_error(self) -> ValueError:
         """Return the error that rejects mixing hits of two set-ups."""
-        return ValueError(
-            f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
-            "begin anew with plan_session.resume=False"
-        )
+        text = f"the interrupted test {self.id} was recorded with another length, sample rate or sensor"
+        return ValueError(f"{text}; begin anew with plan_session.resume=False")
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Store a hit. It is on the disk when this returns."""
@@ -154,14 +134,14 @@ class TapInProgress:
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
         make_folder(self.folder)
         if not self.hits and self.trigger is not None:
-            write_setup(self.folder, self.trigger)
+            spool.write_setup(self.folder, self.trigger)
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
 def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
     """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
     good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
-    frf = estimate_frf(good) if good[0].has_force else None
+    frf = acquisition.estimate_frf(good) if good[0].has_force else None
     return TapTest(tap_id, about, frf, tuple(replace(hit, cross_hit=None) for hit in hits), tuple(flags))
 
 
@@ -178,11 +158,11 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     DataError if the journal is damaged.
     """
     folder.refuse_damage()
-    clean_spool(folder)
+    spool.clean_spool(folder)
     _remove_committed(folder)
     damaged, not_resumed = list[Path](), list[str]()
     interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
-    tap_id = new_tap_id(circumstances)
+    tap_id = acquisition.new_tap_id(circumstances)
     tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
     tap.damaged, tap.not_resumed = damaged, not_resumed
     return tap
@@ -191,11 +171,10 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 def _remove_committed(folder: MachineFolder) -> None:
     """Remove hits left behind though their tap test is committed. Keep them if its file is damaged."""
     begun = [path for path in folder.spool.iterdir() if path.is_dir()] if folder.spool.is_dir() else []
-    if begun:
-        stored = {entry.id for entry in folder.taps()}
-        for path in begun:
-            if path.name in stored:
-                shutil.rmtree(path, ignore_errors=True)
+    stored = {entry.id for entry in folder.taps()} if begun else set[str]()
+    for path in begun:
+        if path.name in stored:
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _find_interrupted(
@@ -206,23 +185,21 @@ def _find_interrupted(
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
             continue
-        hits = read_spooled_hits(path, damaged)
-        first = next(hits, None)
-        if first is None:
+        hits = spool.read_spooled_hits(path, damaged)
+        if (first := next(hits, None)) is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if resume and newest is None and same and circumstances.created - about.created < MAX_RESUME_AGE:
-            newest = TapInProgress(path.name, about, path, trigger=read_spooled_trigger(path, damaged))
+        if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
+            newest = TapInProgress(path.name, about, path, trigger=spool.read_spooled_trigger(path, damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            not_resumed.append(
-                f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed"
-            )
+            text = f"an interrupted test of {when} is still in {path}"
+            not_resumed.append(f"{text}; delete that folder if it is not needed")
     return newest
 
 
@@ -246,9 +223,8 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
     affect the other test.
     """
-    cross_hits = [
-        (hit.cross_hit, flags) for hit, flags in zip(tap.hits, tap.flags, strict=True) if hit.cross_hit is not None
-    ]
+    listed = zip(tap.hits, tap.flags, strict=True)
+    cross_hits = [(hit.cross_hit, flags) for hit, flags in listed if hit.cross_hit is not None]
     if not cross_hits:
         return None
     hits, driving_point_flags = [hit for hit, _ in cross_hits], [flags for _, flags in cross_hits]
@@ -256,19 +232,16 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     good, wanted = verdicts.count(HitFlags.OK), driving_point_flags.count(HitFlags.OK)
     faults = {flags.words for flags, first in zip(verdicts, driving_point_flags, strict=True) if flags and not first}
     used = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
-    if good < MIN_CROSS_TAP_HITS:
-        return _make_unsaved_result(f"of use are {used}; check the sensor along y")
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
-        test = average_hits(new_tap_id(about), about, hits, verdicts)
+        if good < MIN_CROSS_TAP_HITS:
+            raise ValueError(f"of use are {used}; check the sensor along y")
+        test = average_hits(acquisition.new_tap_id(about), about, hits, verdicts)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
-        return _make_unsaved_result(format_os_error(error) if isinstance(error, OSError) else str(error))
+        why = format_os_error(error) if isinstance(error, OSError) else str(error)
+        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
     return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {used}.")
-
-
-def _make_unsaved_result(why: str) -> CrossTapResult:
-    return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
 
 
 def _evaluate_cross_hit(hit: Hit) -> HitVerdict:

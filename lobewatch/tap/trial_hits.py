@@ -52,6 +52,8 @@ class TrialHits:
         """Begin without hits. baseline: a record at rest."""
         self._setup, self._baseline = setup, baseline
         self._hits: list[Hit] = []
+        self._offset = float(np.mean(baseline.acceleration)) if setup.quantity == "acceleration" else 0.0
+        """Value at rest from which the trigger level counts. The acceleration may include gravity."""
         self._record = setup.record_s or MIN_RECORD_TIME
 
     @property
@@ -60,7 +62,7 @@ class TrialHits:
         rate = self._baseline.sample_rate
         samples = round(self._record * rate)
         before, quantity = round(self._setup.pre_trigger_s * rate), self._setup.quantity
-        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset())
+        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset)
 
     @property
     def is_done(self) -> bool:
@@ -90,10 +92,11 @@ class TrialHits:
         flags = check_hit(hit) & ~_USABLE_FLAGS
         if flags:
             return flags
-        needed = _choose_record_time(estimate_decay_time(hit), self._setup.pre_trigger_s)
+        needed = self._setup.pre_trigger_s + RECORD_TIME_CONSTANTS * estimate_decay_time(hit)
+        steps = math.ceil(min(needed, MAX_RECORD_TIME) / RECORD_TIME_STEP - 1e-9)
         self._hits.append(hit)
         if self._setup.record_s is None:
-            self._record = max(self._record, needed)
+            self._record = max(self._record, MIN_RECORD_TIME, RECORD_TIME_STEP * steps)
         return flags
 
     def _level(self) -> float:
@@ -101,25 +104,12 @@ class TrialHits:
             return self._setup.trigger_n
         noise = TRIGGER_NOISE_RATIO * float(np.std(self._baseline.signals[0]))
         if not self._hits:
-            return max(noise, FIRST_TRIGGER_RANGE_SHARE * _get_trigger_range(self._baseline))
-        peaks = [_find_trigger_peak(hit, self._offset()) for hit in self._hits]
+            channels = self._baseline.channels
+            return max(noise, FIRST_TRIGGER_RANGE_SHARE * (_get_full_scale(channels[0]) if channels else math.inf))
+        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset) for hit in self._hits]
+        peaks = [float(np.max(signal)) for signal in signals]
         level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
         return float(f"{level:.2g}")
-
-    def _offset(self) -> float:
-        """Return the value at rest from which the trigger level counts. The acceleration may include gravity."""
-        return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
-
-
-def _find_trigger_peak(hit: Hit, offset: float) -> float:
-    """Return the largest value of the triggering signal."""
-    return float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - offset)))
-
-
-def _choose_record_time(time_constant: float, before: float) -> float:
-    """Return a record length (s) with enough time constants after its pre-trigger part."""
-    needed = min(before + RECORD_TIME_CONSTANTS * time_constant, MAX_RECORD_TIME)
-    return max(MIN_RECORD_TIME, RECORD_TIME_STEP * math.ceil(needed / RECORD_TIME_STEP - 1e-9))
 
 
 def _format_time_constants(record: float, time_constant: float) -> str:
@@ -128,11 +118,6 @@ def _format_time_constants(record: float, time_constant: float) -> str:
     count = record / max(time_constant, 1e-6)
     short = "" if count >= RECORD_TIME_CONSTANTS else f", fewer than {RECORD_TIME_CONSTANTS}"
     return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
-
-
-def _get_trigger_range(hit: Hit) -> float:
-    """Return the largest value of the triggering channel (N or m/s^2)."""
-    return _get_full_scale(hit.channels[0]) if hit.channels else float("inf")
 
 
 def _get_full_scale(channel: Channel) -> float:
@@ -148,9 +133,8 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
         return None
     too_large, percent = share < MIN_RANGE_SHARE, float(f"{100 * share:.2g}")
     wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
-    return Remark(
-        "range-too-large" if too_large else "range-too-small",
-        name,
-        f"the hits reach {percent:g} % of the range of {full:.3g} {unit}",
-        f"choose a range or a sensor of about {wanted:.2g} {unit}{'' if too_large else ', or hit softer'}",
-    )
+    text = f"the hits reach {percent:g} % of the range of {full:.3g} {unit}"
+    cure = f"choose a range or a sensor of about {wanted:.2g} {unit}"
+    if too_large:
+        return Remark("range-too-large", name, text, cure)
+    return Remark("range-too-small", name, text, f"{cure}, or hit softer")

@@ -101,18 +101,15 @@ class TapVisit:
     def _wait(self, tapped: set[TapDirection]) -> tuple[str, str]:
         """Show the result, or that the sensor must be moved first, and wait for a choice."""
         state, cross_tap = self._session.state, self._session.across
-        missing = [direction for direction in DIRECTION_CHOICES if direction not in tapped]
-        if missing:
-            tap = DIRECTION_CHOICES[missing[0]]
-            instruction = (
-                "Turn hammer and accelerometer to"
-                if cross_tap is None
-                else f"{cross_tap.text} The sensor stays: hit in"
-            )
-            reason = f"{self._direction} is saved. {instruction} {missing[0]}, then: {tap.text}."
+        missing = next((direction for direction in DIRECTION_CHOICES if direction not in tapped), None)
+        if missing is not None:
+            tap = DIRECTION_CHOICES[missing]
+            turn = "Turn hammer and accelerometer to"
+            instruction = f"{cross_tap.text} The sensor stays: hit in" if cross_tap else turn
+            reason = f"{self._direction} is saved. {instruction} {missing}, then: {tap.text}."
             choices: Sequence[Choice] = (tap, DONE_CHOICE)
-            moved = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)
-            state = replace(moved, sensor_stays=cross_tap is not None)
+            state = replace(state, word=TapStep.MOVE, direction=missing, reason=reason, outcome=None)
+            state = replace(state, sensor_stays=cross_tap is not None)
         else:
             across = (CROSS_TAP_CHOICE,) if state.outcome is not None and state.outcome.needs_cross_tap else ()
             choices = (TAP_X_CHOICE, TAP_Y_CHOICE, *across, NEXT_TOOL_CHOICE, DONE_CHOICE)

@@ -69,11 +69,8 @@ class SpindleWear:
     @property
     def replaced_at(self) -> int | None:
         """Month before whose tests the bearings are replaced, None if they are not."""
-        return (
-            math.ceil(REPLACEMENT_SHARE * self.months)
-            if self.scenario is WearScenario.REPLACED and self.months > 1
-            else None
-        )
+        is_replaced = self.scenario is WearScenario.REPLACED and self.months > 1
+        return math.ceil(REPLACEMENT_SHARE * self.months) if is_replaced else None
 
     def spindle(self, month: float) -> Spindle:
         """Return the spindle in a month."""
@@ -85,12 +82,9 @@ class SpindleWear:
 
     def bearing_stiffness(self, month: float) -> float:
         """Return the stiffness of each bearing in a month (N/m)."""
-        fall = self.frequency_drop(month)
-        return (
-            float(calibrate(self.new, (1 - fall) * self._first).bearing_stiffness)
-            if fall
-            else self.new_bearing_stiffness
-        )
+        if not (drop := self.frequency_drop(month)):
+            return self.new_bearing_stiffness
+        return float(calibrate(self.new, (1 - drop) * self._first).bearing_stiffness)
 
     def frequency_drop(self, month: float) -> float:
         """Return the relative drop of f1 since the spindle was new."""
@@ -114,9 +108,8 @@ class SpindleWear:
     def find_month(self, frequency: float) -> float | None:
         """Return the month after the last test in which f1 drops to a frequency (Hz). None if not for years."""
         last = self.months - 1
-        below = next(
-            (month for month in range(last, last + MAX_FORECAST_MONTHS) if self.frequency(month) <= frequency), None
-        )
+        months = range(last, last + MAX_FORECAST_MONTHS)
+        below = next((month for month in months if self.frequency(month) <= frequency), None)
         if below is None or below == last:
             return below
         low, high = float(below - 1), float(below)
@@ -146,35 +139,30 @@ class MountingVariation(NamedTuple):
 
     def check(self) -> None:
         """Raise ValueError for impossible values."""
-        if not 0 <= self.scatter <= 0.05:
-            raise ValueError(f"MountingVariation.scatter {100 * self.scatter:g} is not between 0 and 5 %")
-        if not 0 <= self.bad_share <= 0.5:
-            raise ValueError(f"MountingVariation.bad_share {100 * self.bad_share:g} is not between 0 and 50 %")
-        if self.temperature_swing is not None and not 0 <= self.temperature_swing <= 30:
-            raise ValueError(
-                f"MountingVariation.temperature_swing {self.temperature_swing:g} is not between 0 and 30 K"
-            )
+        checks = (
+            ("scatter", 100 * self.scatter, 5, "%"),
+            ("bad_share", 100 * self.bad_share, 50, "%"),
+            ("temperature_swing", self.temperature_swing or 0.0, 30, "K"),
+        )
+        for name, value, most, unit in checks:
+            if not 0 <= value <= most:
+                raise ValueError(f"MountingVariation.{name} {value:g} is not between 0 and {most} {unit}")
 
     def temperatures(self, months: int) -> Floats | None:
         """Return the spindle temperature in each month, the first in winter (degC), shape (months,)."""
         if self.temperature_swing is None:
             return None
-        return np.asarray(
-            MEAN_SPINDLE_TEMPERATURE
-            - self.temperature_swing * np.cos(2 * math.pi * np.arange(months) / MONTHS_PER_YEAR)
-        )
+        season = np.cos(2 * math.pi * np.arange(months) / MONTHS_PER_YEAR)
+        return np.asarray(MEAN_SPINDLE_TEMPERATURE - self.temperature_swing * season)
 
     def shifts(self, months: int, tests: int, random: np.random.Generator) -> Floats:
         """Draw the relative shifts of f1, shape (months, tests)."""
         shifts = random.normal(scale=self.scatter, size=(months, tests))
         if self.bad_share:
             shifts -= BAD_CLAMPING_DROP * (random.random((months, tests)) < self.bad_share)
-        warmth = self.temperatures(months)
-        return (
-            shifts
-            if warmth is None
-            else shifts + STEEL_FREQUENCY_PER_KELVIN / 100 * (warmth - MEAN_SPINDLE_TEMPERATURE)[:, np.newaxis]
-        )
+        if (warmth := self.temperatures(months)) is None:
+            return shifts
+        return shifts + STEEL_FREQUENCY_PER_KELVIN / 100 * (warmth - MEAN_SPINDLE_TEMPERATURE)[:, np.newaxis]
 
 
 def remount_spindle(spindle: Spindle, shift: float) -> Spindle:

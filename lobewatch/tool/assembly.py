@@ -1,21 +1,22 @@
-"""Tool in the spindle: modes in x and y from tap tests, cross FRF and lobes."""
+"""Tool in the spindle: modes in x and y from tap tests or predicted by the model, cross FRF and lobes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 
 import numpy as np
 
 from acquisition import CROSS_TAP, DataError, Remark
-from dsm import Calibration
+from dsm import Calibration, calibrate, modes_at
 from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
+from lobewatch.measurement.spindle_model import build_model_state
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool.principal_directions import (
     PrincipalDirections,
@@ -170,43 +171,41 @@ def assemble(
     """Assemble a tool from its newest tap test and the newest one in the other direction.
 
     series: tap tests of both directions up to the newest; cross: newest cross FRF. The frequencies of an older
-    direction
-    are shifted by the change of the newest one since.
+    direction are shifted by the change of the newest one since.
     """
     taps = [newest, *([across] if across is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
-    moved = None if across is None else _frequency_change_since(across.time, series.get(newest.direction, ()))
+    points = series.get(newest.direction, ())
+    then = None if across is None else interpolate_frequency(points, across.time)
+    moved = None if then is None else points[-1].frequency / then
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
-    directions = tuple(name for name in ("x", "y") if modes.get(name))
     signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
-    return Assembly(
-        tool=newest.tool,
-        time=newest.time,
-        tap_id=newest.tap_id,
-        x=modes.get("x") or modes.get("y"),
-        y=modes.get("y") or modes.get("x"),
-        directions=directions,
-        calibration=next((tap.calibration for tap in taps if tap.calibration is not None), None),
+    calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
+    direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
+    followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
+    open_questions = [(tap.tap_id, question) for tap in taps for question in find_open_questions(tap.remarks)]
+    assembly = _make_assembly(newest.tool, newest.time, newest.tap_id, modes, calibration)
+    return replace(
+        assembly,
         taps={tap.direction: tap.tap_id for tap in taps},
         predicted=False,
-        remarks=(*newest.remarks, *_direction_remarks(newest, across, directions, moved), *about_cross),
+        remarks=(*newest.remarks, *_direction_remarks(newest, across, assembly.directions, moved), *about_cross),
         cross=signed,
-        series={direction: modes for direction, modes in series.items() if direction != CROSS_TAP},
-        unusable={
-            tap.direction: _unusable_reason(tap) for tap in taps if not tap.at_tip and tap.direction != CROSS_TAP
-        },
-        without_stiffness={
-            tap.direction: mode for tap in taps if (mode := tap.followed) and _lacks_stiffness(tap, mode)
-        },
-        questions=tuple(
-            label_question(tap.tap_id, asked) for tap in taps for asked in find_open_questions(tap.remarks)
-        ),
+        series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
+        unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
+        without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
+        questions=tuple(label_question(*question) for question in open_questions),
     )
 
 
-def _lacks_stiffness(tap: Measurement, mode: Mode) -> bool:
-    return tap.direction != CROSS_TAP and not mode.has_stiffness
+def _make_assembly(
+    tool: str, time: datetime, tap_id: str, modes: Mapping[str, TipModes], calibration: Calibration | None
+) -> Assembly:
+    """Make the assembly of a predicted tool from its modes at the tip by direction."""
+    x, y = modes.get("x"), modes.get("y")
+    directions = tuple(name for name in ("x", "y") if modes.get(name))
+    return Assembly(tool, time, tap_id, x or y, y or x, directions, calibration, {}, True, ())
 
 
 def _unusable_reason(tap: Measurement) -> tuple[str, str]:
@@ -215,7 +214,7 @@ def _unusable_reason(tap: Measurement) -> tuple[str, str]:
     return why, cure.format(tap.direction)
 
 
-def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
+def _untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
     """Return the remark on a missing direction; unusable: reason and remedy of its tap test."""
     missing = "y" if tapped == "x" else "x"
     text = f"modes in the {tapped} direction alone, {missing} taken like {tapped}"
@@ -224,18 +223,12 @@ def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = N
     return Remark("one-direction", tool, f"{text}; {missing} is tapped, not usable: {unusable[0]}", unusable[1])
 
 
-def _frequency_change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
-    """Return the frequency of the newest test of a series over that at a time, or None."""
-    frequency = interpolate_frequency(series, time)
-    return None if frequency is None else series[-1].frequency / frequency
-
-
 def _direction_remarks(
     newest: Measurement, across: Measurement | None, directions: Sequence[str], moved: float | None
 ) -> tuple[Remark, ...]:
     if len(directions) == 1:
         useless = [tap for tap in (newest, across) if tap is not None and not tap.at_tip]
-        return (untapped_remark(newest.tool, directions[0], _unusable_reason(useless[0]) if useless else None),)
+        return (_untapped_remark(newest.tool, directions[0], _unusable_reason(useless[0]) if useless else None),)
     if across is None or newest.time - across.time <= MAX_DIRECTION_AGE:
         return ()
     days = round((newest.time - across.time) / timedelta(days=1))
@@ -243,6 +236,52 @@ def _direction_remarks(
     if moved is not None:
         text += f", its frequency moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
     return (Remark("older-direction", newest.tool, text, f"tap direction {across.direction} again"),)
+
+
+PREDICTED_MODE_COUNT = 8
+"""Number of computed modes."""
+MAX_PREDICTED_STIFFNESS_RATIO = 50.0
+"""Stiffness over that of the softest mode above which a mode changes limits by only a few percent and is left out."""
+
+
+def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
+    """Predict a tool in each direction, with the bearings of the newest calibrated measurement.
+
+    newest: those measurements, newest first. The damping ratio is that of the followed mode, and so is the phase of the
+    softest mode, since the same bearings and joints damp it. Raises DataError without a model of the tool or a tap
+    test.
+    """
+    if not newest:
+        build_model_state(machine, None, tool)
+        raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
+    predictions = {tap.direction: _predict_direction(machine, tap, tool) for tap in newest}
+    modes: dict[str, TipModes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
+    ids = " and ".join(tap.tap_id for tap in newest)
+    remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
+    name, calibration = f"prediction from {newest[0].tap_id}", predictions[newest[0].direction][1]
+    assembly = _make_assembly(tool, newest[0].time, name, modes, calibration)
+    tapped = assembly.directions
+    return replace(assembly, remarks=(remark, *([_untapped_remark(tool, tapped[0])] if len(tapped) == 1 else [])))
+
+
+def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
+    """Return the modes of the model in the measured band, shifted with the softest one."""
+    state, followed = build_model_state(machine, tap, tool), tap.followed
+    if followed is None:
+        raise DataError(f"{tap.tap_id}: no mode is followed")
+    frequency, stiffness = modes_at(state.spindle, PREDICTED_MODE_COUNT)
+    softest = int(np.argmin(stiffness))
+    shown = stiffness < MAX_PREDICTED_STIFFNESS_RATIO * stiffness[softest]
+    if machine.mode.band_hz is not None:
+        low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
+        shown &= (frequency >= low) & (frequency <= high)
+    origin = f"model, bearings of {tap.tap_id}"
+    modes = list[Mode]()
+    for i in np.flatnonzero(shown).tolist():
+        phase = followed.phase_deg if i == softest else 0.0
+        values = float(frequency[i]), followed.damping_ratio, float(stiffness[i])
+        modes.append(Mode(*values, method=origin, phase_deg=phase))
+    return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)
 
 
 def speed_grid(machine: Machine) -> Floats:

@@ -12,7 +12,7 @@ from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle_lobes, lower_envelope, stability_boundary, zero_order_lobes
 from lobes.tip_response import TipData
 from lobewatch.arrays import Floats
-from lobewatch.machine import CutTable, Machine
+from lobewatch.machine import CutTable
 from lobewatch.tool.assembly import Assembly
 
 MAX_CHART_SPEEDS = 400
@@ -63,11 +63,6 @@ class LobeChart:
     """Stability limits of the cut."""
 
 
-def find_cut_table(machine: Machine, name: str) -> CutTable:
-    """Return the reference cut or a program by name; KeyError for another name."""
-    return machine.cut_tables[name]
-
-
 def compute_lobe_chart(
     method: LobeMethod, x: TipData | None, y: TipData | None, cuts: Sequence[Cut], speed_rpm: Floats
 ) -> StabilityLobes:
@@ -109,9 +104,8 @@ def _compute_cut_lobes(
     if method is LobeMethod.ZERO_ORDER:
         return mean
     if isinstance(x, Frf) or isinstance(y, Frf):
-        raise ValueError(
-            "compute_lobe_chart.method semi-discretisation works from the modes; leave LobeChart.source frf out"
-        )
+        text = "semi-discretisation works from the modes; leave LobeChart.source frf out"
+        raise ValueError(f"compute_lobe_chart.method {text}")
     speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MAX_CHART_SPEEDS, speed_rpm.size))
     lowest = mean.minimum.depth
     return stability_boundary(x, y, cut, speeds, MAX_CHART_DEPTH_RATIO * lowest if np.isfinite(lowest) else 0.1)

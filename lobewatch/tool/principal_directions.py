@@ -88,9 +88,8 @@ class PrincipalDirections:
         random = np.random.default_rng((seed, 2))
         signs = random.choice([-1.0, 1.0], (count, self.sign_count))
         turn = random.uniform(-1, 1, (count, len(self.pairs))) * [pair.max_rotation for pair in self.pairs]
-        return self._vectors(
-            signs, turn, random.uniform(-1, 1, (count, self.max_cross_share.size)) * self.max_cross_share
-        )
+        lean = random.uniform(-1, 1, (count, self.max_cross_share.size)) * self.max_cross_share
+        return self._vectors(signs, turn, lean)
 
     def _vectors(self, signs: Floats, turn: Floats, lean: Floats) -> Floats:
         """Return vectors (c, n, 2) for signs (c, signs), rotations (c, pairs) in rad and cross shares (c, n)."""
@@ -125,9 +124,9 @@ def find_principal_directions(
     """Find the principal directions of the modes measured in x and in y.
 
     cross: signed modes hit in x and measured in y. Peaks of x and y are matched in the order of their frequencies. With
-    a
-    neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other. A
-    single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF decides.
+    a neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other.
+    A single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF
+    decides.
     """
     modes = [*x, *y]
     stiffness = np.array([mode.stiffness for mode in modes])
@@ -136,10 +135,7 @@ def find_principal_directions(
     if cross is None:
         pairs = _pair_without_cross_tap(modes, matched)
     else:
-        pairs = [
-            ModePair(i, j, _cross_correlation(modes[i], modes[j], (i, j), modes, matched, cross), -1, 0.0)
-            for i, j in matched
-        ]
+        pairs = [ModePair(*pair, _cross_correlation(pair, modes, matched, cross), -1, 0.0) for pair in matched]
     alone = np.setdiff1d(np.arange(len(modes)), np.ravel(matched))
     lean = np.zeros(len(modes))
     if cross is None:
@@ -155,9 +151,8 @@ def _match_modes(x: Sequence[Mode], y: Sequence[Mode]) -> list[tuple[int, int]]:
     distance = np.abs(at_x[order_x, np.newaxis] - at_y[order_y])
     gain = np.zeros((len(x) + 1, len(y) + 1))
     for i, j in np.ndindex(len(x), len(y)):
-        gain[i + 1, j + 1] = max(
-            gain[i, j + 1], gain[i + 1, j], gain[i, j] + max(MAX_PAIR_FREQUENCY_DISTANCE - distance[i, j], 0.0)
-        )
+        paired = gain[i, j] + max(MAX_PAIR_FREQUENCY_DISTANCE - distance[i, j], 0.0)
+        gain[i + 1, j + 1] = max(gain[i, j + 1], gain[i + 1, j], paired)
     i, j, matched = len(x), len(y), list[tuple[int, int]]()
     while i and j:
         if gain[i, j] == gain[i - 1, j]:
@@ -197,10 +192,8 @@ def _are_siblings(modes: Sequence[Mode], first: tuple[int, ...], second: tuple[i
     """Tell whether two modes may be a pair with perpendicular directions."""
     frequency = [np.mean([modes[i].frequency for i in numbers]) for numbers in (first, second)]
     stiffness = [1 / sum(1 / modes[i].stiffness for i in numbers) for numbers in (first, second)]
-    return bool(
-        max(frequency) < (1 + MAX_SIBLING_FREQUENCY_DISTANCE) * min(frequency)
-        and max(stiffness) < MAX_SIBLING_STIFFNESS_RATIO * min(stiffness)
-    )
+    is_near = max(frequency) < (1 + MAX_SIBLING_FREQUENCY_DISTANCE) * min(frequency)
+    return bool(is_near and max(stiffness) < MAX_SIBLING_STIFFNESS_RATIO * min(stiffness))
 
 
 def _max_rotation(x: Mode, y: Mode) -> float:
@@ -211,12 +204,7 @@ def _max_rotation(x: Mode, y: Mode) -> float:
 
 
 def _cross_correlation(
-    x: Mode,
-    y: Mode,
-    own: tuple[int, int],
-    modes: Sequence[Mode],
-    matched: Sequence[tuple[int, int]],
-    cross: Sequence[Mode],
+    own: tuple[int, int], modes: Sequence[Mode], matched: Sequence[tuple[int, int]], cross: Sequence[Mode]
 ) -> float:
     """Return the cross residue of a pair over sqrt(Rx Ry), from the nearest cross modes."""
     middle = {pair: np.mean([np.log(modes[i].frequency) for i in pair]) for pair in matched}
@@ -225,7 +213,7 @@ def _cross_correlation(
         at = np.log(mode.frequency)
         nearest = min(matched, key=lambda pair: abs(middle[pair] - at))
         total += 1 / mode.stiffness if nearest == own and abs(middle[own] - at) < MAX_PAIR_FREQUENCY_DISTANCE else 0.0
-    return float(np.clip(total * np.sqrt(x.stiffness * y.stiffness), -1, 1))
+    return float(np.clip(total * np.sqrt(modes[own[0]].stiffness * modes[own[1]].stiffness), -1, 1))
 
 
 TipModes = Sequence[Mode] | None

@@ -43,14 +43,13 @@ class MountingTracker:
     def assign(self, tap: TapEntry) -> tuple[str, tuple[Remark, ...]]:
         """Return the first test of the series of a tap test, and remarks on changes."""
         mountings = self._mountings.setdefault(tap.tool, [])
-        if mountings and tap.conditions is UNKNOWN_CONDITIONS:
+        if mountings and tap.conditions == UNKNOWN_CONDITIONS:
             return mountings[-1].first.id, ()
-        remarks = [*self._check_drawbar(tap), *self._check_hours(tap)]
+        remarks = [*self._check_values(tap)]
         current = mountings[-1] if mountings else None
         conditions = tap.conditions.with_defaults(current.conditions) if current else tap.conditions
-        fitting = next(
-            (mounting for mounting in reversed(mountings) if _is_same_mounting(mounting.conditions, conditions)), None
-        )
+        same = (old for old in reversed(mountings) if not _differing_conditions(old.conditions, conditions))
+        fitting = next(same, None)
         if current is not None and fitting is not current:
             remarks += [_mounting_change_remark(current, conditions, fitting)]
         if fitting is not None:
@@ -60,27 +59,22 @@ class MountingTracker:
             mountings.append(ToolMounting(tap, conditions))
         return mountings[-1].first.id, tuple(remarks)
 
-    def _check_drawbar(self, tap: TapEntry) -> Iterator[Remark]:
-        now, before = tap.conditions.drawbar_kn, self._drawbar.get(tap.tool)
-        if now is None:
-            return
-        self._drawbar[tap.tool] = now
-        if before not in (None, now):
-            text = f"drawbar force {now:g} kN, {before:g} kN before: the frequency may have changed with it"
-            yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
-
-    def _check_hours(self, tap: TapEntry) -> Iterator[Remark]:
-        now, before = tap.conditions.hours, self._hours
-        if now is None:
-            return
-        self._hours = now
-        if before is not None and now < before:
-            text = f"running hours {now:g} h, {before:g} h before: forecasts of a series that it is in count in days"
-            yield Remark("hours-went-back", tap.tool, text, "exclude it and replay its file with the right --hours")
-
-
-def _is_same_mounting(first: Conditions, second: Conditions) -> bool:
-    return not _differing_conditions(first, second)
+    def _check_values(self, tap: TapEntry) -> Iterator[Remark]:
+        """Yield remarks on a changed drawbar force and on fewer running hours than before."""
+        force, hours = tap.conditions.drawbar_kn, tap.conditions.hours
+        last_force, last_hours = self._drawbar.get(tap.tool), self._hours
+        if force is not None:
+            self._drawbar[tap.tool] = force
+            if last_force not in (None, force):
+                text = f"drawbar force {force:g} kN, {last_force:g} kN before: the frequency may have changed with it"
+                yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
+        if hours is not None:
+            self._hours = hours
+            if last_hours is not None and hours < last_hours:
+                series = "forecasts of a series that it is in count in days"
+                cure = "exclude it and replay its file with the right Conditions.hours"
+                text = f"running hours {hours:g} h, {last_hours:g} h before: {series}"
+                yield Remark("hours-went-back", tap.tool, text, cure)
 
 
 def _differing_conditions(first: Conditions, second: Conditions) -> list[str]:
@@ -97,8 +91,8 @@ def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: Tool
     )
     if earlier is None:
         return Remark("new-series", before.first.tool, f"{change}: a new series, compared with no test before it")
-    since = datetime.fromisoformat(earlier.first.time)
-    return Remark("earlier-series", before.first.tool, f"{change}: compared with the series begun {since:%Y-%m-%d}")
+    begun = f"compared with the series begun {earlier.first.created:%Y-%m-%d}"
+    return Remark("earlier-series", before.first.tool, f"{change}: {begun}")
 
 
 class TapPlace(msgspec.Struct, frozen=True, gc=False):
@@ -123,42 +117,29 @@ class TapPlace(msgspec.Struct, frozen=True, gc=False):
 
 
 class TapOrder:
-    """Places of tap tests in order of time."""
+    """Places of tap tests in order of time; baselines and taps: oldest first."""
 
-    def __init__(self, baselines: Sequence[datetime] = ()) -> None:
+    def __init__(self, baselines: Sequence[datetime] = (), taps: Iterable[TapEntry] = ()) -> None:
         self.places: list[TapPlace] = []
         """Places of those that were shown."""
         self._baselines = baselines
         self._newest: dict[str, dict[str, int]] = {}
         self._mountings = MountingTracker()
+        for tap in taps:
+            self.add(tap)
 
     def add(self, tap: TapEntry) -> None:
         """Add the next tap test."""
-        number, baseline = len(self.places), _find_baseline(tap, self._baselines) if self._baselines else None
+        number, baselines = len(self.places), reversed(self._baselines)
+        baseline = next((baseline for baseline in baselines if baseline <= tap.created), None)
         if self.places and self.places[-1].baseline != baseline:
             self._newest, self._mountings = {}, MountingTracker()
         series, remarks = self._mountings.assign(tap)
         newest = self._newest.setdefault(series, {})
-        across = None
-        for direction, place in newest.items():
-            if direction not in (tap.direction, CROSS_TAP) and (across is None or place > across):
-                across = place
-        before = newest.get(tap.direction)
+        others = (place for direction, place in newest.items() if direction not in (tap.direction, CROSS_TAP))
+        before, across = newest.get(tap.direction), max(others, default=None)
         newest[tap.direction] = number
         self.places.append(TapPlace(number, tap, before, across, baseline, series, newest.get(CROSS_TAP), remarks))
-
-
-def order_taps(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list[TapPlace]:
-    """Return the places of tap tests; taps and baselines oldest first."""
-    order = TapOrder(baselines)
-    for tap in taps:
-        order.add(tap)
-    return order.places
-
-
-def _find_baseline(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | None:
-    time = datetime.fromisoformat(tap.time)
-    return next((baseline for baseline in reversed(baselines) if baseline <= time), None)
 
 
 def iterate_earlier(place: TapPlace, among: Sequence[TapPlace]) -> Iterator[int]:

@@ -13,7 +13,6 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.lobe_chart import find_cut_table
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_samples, find_worst_limit
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
@@ -232,7 +231,7 @@ def compute_limit_band(
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = build_median_row(Program(cuts[0], 1.0, 1.0), at_speed.scale_modes(assembly))
-    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, find_cut_table(machine, cut), machine)
+    uncertainty = at_speed.uncertainty or uncertainty_of(assembly, machine.cut_tables[cut], machine)
     samples = uncertainty.sample(rows, N_BAND_SAMPLES)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
     moved = (samples.speed_rpm / (samples.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]

@@ -11,9 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
 CODE = r"[a-z]+(?:-[a-z]+)*"
-SHARED: dict[str, str] = {
-    "one-direction": "of an assembly, and of the standing that it leads to",
-}
+SHARED: dict[str, str] = {}
 """Codes that several modules give, each with the reason why they mean the same."""
 
 

@@ -43,8 +43,7 @@ class Acknowledgement(msgspec.Struct, frozen=True):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        fields: dict[str, Any] = msgspec.to_builtins(self)
-        return {"kind": "ack", **fields}
+        return {"kind": "ack", **msgspec.to_builtins(self)}
 
     def __str__(self) -> str:
         by = f" by {self.operator}" if self.operator else ""
@@ -80,8 +79,7 @@ class FleetScatter(msgspec.Struct, frozen=True):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        fields: dict[str, Any] = msgspec.to_builtins(self)
-        return {"kind": "scatter", **fields}
+        return {"kind": "scatter", **msgspec.to_builtins(self)}
 
 
 def read_fleet_scatters(entries: Sequence[Mapping[str, Any]]) -> tuple[FleetScatter, ...]:

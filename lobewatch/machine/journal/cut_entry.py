@@ -108,9 +108,8 @@ def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
     """Read a test cut from its journal line."""
     fields = {name: line[name] for name in CutEntry.__dataclass_fields__ if name in line}
     fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
-    recording, power = line.get("recording"), line.get("power")
-    fields |= {"recording": RecordingFile(**recording) if recording else None}
-    fields |= {"power": CutPower(**power) if power else None}
+    for name, kind in (("recording", RecordingFile), ("power", CutPower)):
+        fields[name] = kind(**line[name]) if line.get(name) else None
     return CutEntry(**fields | {"excluded": excluded})
 
 

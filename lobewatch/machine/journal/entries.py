@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
@@ -11,6 +11,7 @@ import msgspec
 
 from acquisition import check_name
 from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.journal import make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from modal import ModeEdits
 
@@ -77,28 +78,12 @@ def _to_utc(date: datetime) -> datetime:
 
 
 def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
-    times = [datetime.fromisoformat(tap.time) for tap in taps]
-    tapped = [time for time in times if begin <= time < begin + timedelta(days=1)]
+    tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
     if tapped:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
-        raise ValueError(
-            f"{begin.astimezone():%Y-%m-%d}: tapped on that day at {clock}; give the time of the new baseline too, "
-            f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
-        )
-
-
-def make_event_line(event: MaintenanceEvent, now: datetime) -> dict[str, Any]:
-    """Make the journal line of an event."""
-    fields = {"id": event.id, "date": event.time.isoformat(), "text": event.text, "new_baseline": event.new_baseline}
-    return {"kind": "event", **fields, "time": now.isoformat()}
-
-
-def make_withdrawal_line(entries: Sequence[Mapping[str, Any]], event_id: str, now: datetime) -> dict[str, Any]:
-    """Make the line that withdraws an event; ValueError for an unknown identity."""
-    ids = [event.id for event in read_events(entries)]
-    if event_id not in ids:
-        raise ValueError(f"{event_id}: no such event; there are {', '.join(ids) or 'none'}")
-    return {"kind": "event", "withdraws": event_id, "time": now.isoformat()}
+        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
+        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
+        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
 
 
 ExcludableEntry = TapEntry | CutEntry
@@ -126,21 +111,21 @@ def find_excludable_entry(
     raise ValueError(f"{name!r}: no such tap test in {folder}; MachineFolder.contents {folder} lists all {len(taps)}")
 
 
-def make_exclusion_line(entry: ExcludableEntry, reason: str, now: datetime) -> dict[str, Any]:
+def make_exclusion_line(entry: ExcludableEntry, reason: str) -> dict[str, Any]:
     """Make the line that excludes an entry; ValueError if it is excluded or has no reason."""
     if entry.excluded:
         raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
     if not reason.strip():
         raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
     check_name(reason, "reason")
-    return {"kind": "exclude", "tap": entry.id, "reason": reason, "time": now.isoformat()}
+    return make_entry("exclude", tap=entry.id, reason=reason)
 
 
-def make_inclusion_line(entry: ExcludableEntry, now: datetime) -> dict[str, Any]:
+def make_inclusion_line(entry: ExcludableEntry) -> dict[str, Any]:
     """Make the line that includes an entry again; ValueError if it is not excluded."""
     if not entry.excluded:
         raise ValueError(f"{entry.id}: is not excluded; it counts already")
-    return {"kind": "include", "tap": entry.id, "time": now.isoformat()}
+    return make_entry("include", tap=entry.id)
 
 
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:
@@ -152,11 +137,6 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
         elif line["kind"] == "include":
             reasons.pop(line["tap"], None)
     return reasons
-
-
-def make_mode_edits_line(tap_id: str, edits: ModeEdits, now: datetime) -> dict[str, Any]:
-    """Make the line of the mode edits of a tap test; empty edits revoke earlier ones."""
-    return {"kind": "modes", "tap": tap_id, **asdict(edits), "time": now.isoformat()}
 
 
 def read_mode_edits(entries: Sequence[Mapping[str, Any]]) -> dict[str, ModeEdits]:

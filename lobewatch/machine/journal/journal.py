@@ -7,28 +7,135 @@ short, never longer.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import hashlib
 import json
 import os
 import shlex
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
+from io import FileIO
+from itertools import count, pairwise
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
-from acquisition.file_io import atomic_write, read_regular_file, sync_folder
-from lobewatch.machine.journal.journal_scan import JournalEntry, JournalFileState, compute_crc, scan_journal_file
+from acquisition.file_io import atomic_write, open_regular_file, read_regular_file, sync_folder
 from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX
-from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
+from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_COPY_NAME = "journal.copy.jsonl"
 BATCH_KEY = "batch"
 """Key of the number of the first line of the same write; missing for a single line."""
+
+
+JournalEntry = dict[str, Any]
+PREVIOUS_DIGEST_KEY = b'"previous": "'
+"""Bytes of a line before the SHA-256 of the previous line."""
+MAX_JOURNAL_BYTES = 200_000_000
+"""Largest size of a journal (bytes); chosen, ten times that of 20 000 tap tests."""
+COMPARE_CHUNK_BYTES = 1 << 18
+"""Size of a chunk that is compared at once (bytes)."""
+
+
+@dataclass(frozen=True)
+class JournalFileState:
+    """State of one journal file on the disk."""
+
+    exists: bool
+    """Whether the file exists."""
+    chain: tuple[bytes, ...] = ()
+    """Lines from the first one on, each proved by the next, without line ends."""
+    chain_bytes: bytes = b""
+    """Bytes of these lines with their line ends."""
+    first_broken_line: int = 0
+    """Number of the first line that does not continue the chain; 0 without one."""
+    line_ending: bytes = b"\n"
+    """Line end of the last line of the chain."""
+    torn: bytes = b""
+    """Rest of a line after a crash."""
+    unchained_lines: tuple[bytes, ...] = ()
+    """Sound lines after a broken one."""
+
+
+def scan_journal_file(path: Path, before: JournalFileState) -> JournalFileState:
+    """Read a journal file line by line, from the part that was read before on."""
+    if not path.exists():
+        return JournalFileState(exists=False)
+    with open_regular_file(path, MAX_JOURNAL_BYTES) as file:
+        begun = before if _starts_with(file, before.chain_bytes) else JournalFileState(exists=False)
+        file.seek(len(begun.chain_bytes))
+        content = file.read()
+    if begun.exists and not (content or before.first_broken_line or before.torn) and before.line_ending == b"\n":
+        return before
+    *lines, end = content.split(b"\n")
+    chain, broken, loose = list(begun.chain), 0, list[bytes]()
+    if _continue_chain(chain, lines):
+        chain, lines = chain + lines, []
+    for number, line in enumerate(lines, len(chain) + 1):
+        if not broken and _continues_chain(chain, line):
+            chain.append(line)
+        else:
+            broken = broken or number
+            loose += [line] if _parse_line(line) else []
+    for part in (end, end[:-1]):
+        if part.endswith(b"}") and not broken and _continues_chain(chain, part):
+            return JournalFileState(True, (*chain, part), line_ending=end[len(part) :])
+    loose += [part for part in (end, end[:-1]) if broken and _parse_line(part)][:1]
+    whole = begun.chain_bytes + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
+    return JournalFileState(True, tuple(chain), whole, broken, torn=end, unchained_lines=tuple(loose))
+
+
+def _starts_with(file: FileIO, start: bytes) -> bool:
+    """Tell whether a file starts with these bytes."""
+    at = 0
+    while at < len(start):
+        part = file.read(min(COMPARE_CHUNK_BYTES, len(start) - at))
+        if not part or not start.startswith(part, at):
+            return False
+        at += len(part)
+    return True
+
+
+def _continue_chain(chain: list[bytes], lines: list[bytes]) -> bool:
+    """Tell whether all lines continue the chain; the digest in a line proves the line before it."""
+    if len(lines) < 2 or not (_continues_chain(chain, lines[0]) and _continues_chain(lines[:-1], lines[-1])):
+        return False
+    pairs = ((hashlib.sha256(before).hexdigest(), line) for before, line in pairwise(lines))
+    return all(_read_previous_digest(line) == digest.encode() for digest, line in pairs)
+
+
+def _read_previous_digest(line: bytes) -> bytes:
+    """Return the SHA-256 of the previous line as stated in a line; garbage if it is damaged."""
+    begin = line.rfind(PREVIOUS_DIGEST_KEY) + len(PREVIOUS_DIGEST_KEY)
+    return line[begin : begin + 64]
+
+
+def _continues_chain(chain: list[bytes], line: bytes) -> bool:
+    entry = _parse_line(line)
+    return entry is not None and entry["previous"] == (hashlib.sha256(chain[-1]).hexdigest() if chain else "")
+
+
+def _parse_line(line: bytes) -> JournalEntry | None:
+    """Return a sound line as a JSON object, else None."""
+    try:
+        entry: JournalEntry = json.loads(line)
+        crc = entry.pop("crc")
+        return entry if crc == compute_crc(entry) and isinstance(entry["previous"], str) and "kind" in entry else None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def compute_crc(entry: JournalEntry) -> int:
+    """Return the CRC-32 of an entry without its crc."""
+    return zlib.crc32(json.dumps(entry, sort_keys=True).encode())
 
 
 @dataclass(frozen=True)
@@ -61,8 +168,7 @@ class JournalReading:
 
 
 def _decode_lines(lines: Iterable[bytes]) -> list[JournalEntry]:
-    entries: list[JournalEntry] = msgspec.json.decode(b"[" + b",".join(lines) + b"]")
-    return entries
+    return msgspec.json.decode(b"[" + b",".join(lines) + b"]", type=list[JournalEntry])
 
 
 class Journal:
@@ -95,8 +201,7 @@ class Journal:
         """Append entries with one write and one fsync; they are committed on return.
 
         reading: fresh reading if nobody else can have written since. Raises DataError, and writes nothing, for a
-        damaged
-        journal.
+        damaged journal.
         """
         reading = reading or self.read()
         self.refuse_damage(reading)
@@ -104,15 +209,12 @@ class Journal:
             self._repair(reading)
         first = len(reading.lines) + 1
         batch = {BATCH_KEY: first} if len(entries) > 1 else {}
-        lines = [reading.lines[-1] if reading.lines else b""]
-        for number, entry in enumerate(entries, first):
-            lines.append(_encode_line(entry | batch, number, lines[-1]))
-        _append_lines(self.path, lines[1:])
+        last = reading.lines[-1] if reading.lines else b""
+        lines = _encode_lines((entry | batch for entry in entries), first, last)
+        _append_lines(self.path, lines)
         self.line_count = len(reading.lines) + len(entries)
-        try:
-            _append_lines(self.copy_path, lines[1:])
-        except OSError:  # it is committed; the copy is brought up at the next line
-            return
+        with contextlib.suppress(OSError):  # it is committed; the copy is brought up at the next line
+            _append_lines(self.copy_path, lines)
 
     def refuse_damage(self, reading: JournalReading | None = None) -> None:
         """Raise DataError if the journal is damaged."""
@@ -125,10 +227,7 @@ class Journal:
         for path in (self.path, self.copy_path):
             if path.exists():
                 _back_up_bytes(path, read_regular_file(path), "damaged")
-        lines: list[bytes] = []
-        for number, entry in enumerate(entries, 1):
-            lines.append(_encode_line(entry, number, lines[-1] if lines else b""))
-        content = b"".join(line + b"\n" for line in lines)
+        content = b"".join(line + b"\n" for line in _encode_lines(entries))
         atomic_write(self.path, content)
         atomic_write(self.copy_path, content)
 
@@ -202,20 +301,26 @@ def _are_one_batch(lines: Sequence[bytes]) -> bool:
     return len(written) < 2
 
 
-def _encode_line(entry: JournalEntry, number: int, last: bytes) -> bytes:
-    """Encode an entry without its line end; last: previous line, without its line end."""
-    fields = {name: value for name, value in entry.items() if name != "crc"}
-    fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
-    return json.dumps(fields | {"crc": compute_crc(fields)}).encode()
+def make_entry(kind: str, now: datetime | None = None, /, **fields: object) -> JournalEntry:
+    """Make an entry of a kind; now: time of writing, by default that of the clock."""
+    return {"kind": kind, **fields, "time": (now or datetime.now(UTC)).isoformat()}
 
 
-def _back_up_bytes(path: Path, content: bytes, why: str) -> Path:
+def _encode_lines(entries: Iterable[JournalEntry], first: int = 1, last: bytes = b"") -> list[bytes]:
+    """Encode entries without line ends; first: number of the first one; last: line before it, without its line end."""
+    lines = []
+    for number, entry in enumerate(entries, first):
+        fields = {name: value for name, value in entry.items() if name != "crc"}
+        fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
+        last = json.dumps(fields | {"crc": compute_crc(fields)}).encode()
+        lines.append(last)
+    return lines
+
+
+def _back_up_bytes(path: Path, content: bytes, why: str) -> None:
     """Write bytes to a new file PATH.1.REASON, PATH.2.REASON, ... before they are overwritten."""
-    number = 1
-    while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():
-        number += 1
-    atomic_write(aside, content)
-    return aside
+    asides = (path.with_name(f"{path.name}.{number}.{why}") for number in count(1))
+    atomic_write(next(aside for aside in asides if not aside.exists()), content)
 
 
 def journal_damage_remark(path: Path, fault: str) -> Remark:

@@ -27,7 +27,10 @@ def read_unverified_tap(path: Path) -> TapEntry | None:
         return None
     if has_wrong_checksum(content) or not content.startswith(HDF5_SIGNATURE):
         return None
-    return _read_tap_entry(path) if has_valid_checksum(content) else _read_in_subprocess(path)
+    if has_valid_checksum(content):
+        return _read_tap_entry(path)
+    line = _run_in_subprocess("tap", path)
+    return None if line is None else TapEntry.from_line(line)
 
 
 def _read_tap_entry(path: Path) -> TapEntry | None:
@@ -40,11 +43,6 @@ def _read_tap_entry(path: Path) -> TapEntry | None:
 def has_readable_hits(path: Path) -> bool:
     """Tell whether the hits of a file without a checksum can be read."""
     return not has_wrong_checksum(read_regular_file(path)) and _run_in_subprocess("hits", path) is not None
-
-
-def _read_in_subprocess(path: Path) -> TapEntry | None:
-    line = _run_in_subprocess("tap", path)
-    return None if line is None else TapEntry.from_line(line)
 
 
 def _run_in_subprocess(part: str, path: Path) -> dict[str, Any] | None:

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from lobes import CuttingCoefficients, Direction, tangential_and_radial
 from lobes.cut import normalize_pitch
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
 """Angle from x to the feed (rad) by axis."""
@@ -183,10 +183,9 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         """
         tool = self.tool_diameter_mm / 2
         if radius_mm < tool:
-            raise ValueError(
-                f"corner_radius_mm={radius_mm:g} is tighter than the tool, whose radius is {tool:g} mm: "
-                "give the radius that is left in the corner, or a smaller tool"
-            )
+            problem = f"is tighter than the tool, whose radius is {tool:g} mm"
+            cure = "give the radius that is left in the corner, or a smaller tool"
+            raise ValueError(f"corner_radius_mm={radius_mm:g} {problem}: {cure}")
         return (1 - math.cos(corner_engagement(tool, self.radial_mm[1], radius_mm))) / 2
 
     @property
@@ -218,9 +217,8 @@ class MaterialTable(TomlTable, frozen=True):
         """Build the coefficients in SI units."""
         tangential, radial = self.tangential_n_per_mm2, self.radial_n_per_mm2
         if self.specific_force_n_per_mm2 is not None and self.force_angle_deg is not None:
-            tangential, radial = tangential_and_radial(
-                self.specific_force_n_per_mm2, math.radians(self.force_angle_deg)
-            )
+            angle = math.radians(self.force_angle_deg)
+            tangential, radial = tangential_and_radial(self.specific_force_n_per_mm2, angle)
         pressures = (tangential or 0.0) * 1e6, (radial or 0.0) * 1e6
         edges = self.tangential_edge_n_per_mm * 1e3, self.radial_edge_n_per_mm * 1e3
         iso_group = self.iso_group or ""

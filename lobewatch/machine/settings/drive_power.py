@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobes import Cut, CuttingCoefficients, max_depth_for_drive, mean_torque
+from lobes import Cut, max_depth_for_drive, mean_torque
 from lobewatch.arrays import Floats
-from lobewatch.machine.settings.cut_tables import CutTable, DriveTable
+from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 
@@ -34,16 +34,10 @@ def drive_depth_limit(machine: Machine, table: CutTable, speed_rpm: Floats) -> F
     feed_mm = find_feed_per_tooth(machine, table)
     if feed_mm is None:
         return np.full(speed_rpm.shape, np.inf)
-    edge = machine.coefficients(table).tangential_edge
-    return max_depth_for_drive(
-        machine.build_cut(table),
-        speed_rpm,
-        table.tool_diameter_mm / 1e3,
-        feed_mm / 1e3,
-        edge if np.isfinite(edge) else 0.0,
-        machine.drive.power_kw * 1e3,
-        machine.drive.torque_nm,
-    )
+    edge, drive = machine.coefficients(table).tangential_edge, machine.drive
+    diameter, limits = table.tool_diameter_mm / 1e3, (drive.power_kw * 1e3, drive.torque_nm)
+    edge = edge if np.isfinite(edge) else 0.0
+    return max_depth_for_drive(machine.build_cut(table), speed_rpm, diameter, feed_mm / 1e3, edge, *limits)
 
 
 DEFAULT_EDGE_LENGTH = 3e-5
@@ -110,13 +104,7 @@ class PowerReading:
 
 
 def build_power_reading(
-    power_kw: float,
-    table: CutTable,
-    coefficients: CuttingCoefficients,
-    cut: Cut,
-    drive: DriveTable,
-    speed_rpm: float,
-    depth: float,
+    power_kw: float, machine: Machine, table: CutTable, speed_rpm: float, depth: float
 ) -> PowerReading:
     """Build a power reading from a power above that in air; depth in m.
 
@@ -128,19 +116,16 @@ def build_power_reading(
     if table.feed_per_tooth_mm is None:
         raise ValueError(f"{option}: says nothing without feed_per_tooth_mm; write it into machine.toml")
     if len(table.immersions) > 1:
-        raise ValueError(
-            f"{option}: of a cut whose radial depth changes on its way nobody knows at which it was; "
-            "leave it out, or read it in a cut with one radial depth"
-        )
-    if power_kw > drive.power_kw:
-        raise ValueError(f"{option}: is more than power_kw={drive.power_kw:g} of [drive]; give kW")
+        unknown = "of a cut whose radial depth changes on its way nobody knows at which it was"
+        raise ValueError(f"{option}: {unknown}; leave it out, or read it in a cut with one radial depth")
+    if power_kw > machine.drive.power_kw:
+        raise ValueError(f"{option}: is more than power_kw={machine.drive.power_kw:g} of [drive]; give kW")
+    cut, edge = machine.build_cut(table), machine.coefficients(table).tangential_edge
     diameter, feed = table.tool_diameter_mm / 1e3, table.feed_per_tooth_mm / 1e3
-    reading = PowerReading(1e3 * power_kw, cut, depth, diameter, feed, coefficients.tangential_edge)
+    reading = PowerReading(1e3 * power_kw, cut, depth, diameter, feed, edge)
     expected_kw = reading.expected_power(speed_rpm) / 1e3
     low, high = expected_kw / MAX_POWER_RATIO, expected_kw * MAX_POWER_RATIO
     if not low <= power_kw <= high:
-        raise ValueError(
-            f"{option}: with the Kt of {cut.tangential / 1e6:.0f} N/mm2 in machine.toml "
-            f"{low:.2g} to {high:.2g} kW are to be expected; give kW, less what is shown in air"
-        )
+        expected = f"{low:.2g} to {high:.2g} kW are to be expected; give kW, less what is shown in air"
+        raise ValueError(f"{option}: with the Kt of {cut.tangential / 1e6:.0f} N/mm2 in machine.toml {expected}")
     return reading

@@ -7,28 +7,21 @@ import math
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from acquisition import DataError
-from dsm import Spindle
+from dsm import Spindle, change_tool
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
-from lobewatch.machine.settings import toml_schema
-from lobewatch.machine.settings.cut_tables import (
-    FEED_ANGLES,
-    CutTable,
-    DriveTable,
-    MaterialTable,
-    ProgramTable,
-    UncertaintyTable,
-    convert_pitch,
-)
+from lobewatch.machine.settings import cut_tables as cutting
+from lobewatch.machine.settings import toml
+from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_text import parse_toml_tables, read_toml_text
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] among the names of programs."""
@@ -36,7 +29,7 @@ USER_SOURCE = "machine.toml"
 """Source of cutting coefficients that a person has entered."""
 
 
-class Machine(toml_schema.TomlTable, frozen=True):
+class Machine(toml.TomlTable, frozen=True):
     """All tables of machine.toml.
 
     >>> from pathlib import Path
@@ -64,13 +57,13 @@ class Machine(toml_schema.TomlTable, frozen=True):
     """Frequency drops that warn and alarm: [limits]."""
     speed: SpeedTable = SpeedTable()
     """Speed range of the lobe diagrams: [speed]."""
-    drive: DriveTable = DriveTable()
+    drive: cutting.DriveTable = cutting.DriveTable()
     """Power and torque of the spindle motor: [drive]."""
-    doubt: UncertaintyTable = UncertaintyTable()
+    doubt: cutting.UncertaintyTable = cutting.UncertaintyTable()
     """Uncertainty of the inputs: [doubt]."""
     notify: NotifyTable = NotifyTable()
     """Broker for alarms: [notify]."""
-    material: tuple[MaterialTable, ...] = ()
+    material: tuple[cutting.MaterialTable, ...] = ()
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
     """Cut that is watched besides the programs: [reference_cut]."""
@@ -84,11 +77,10 @@ class Machine(toml_schema.TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self._check_tools()
         self._check_hammer()
-        names = [program.name for program in self.all_programs]
+        names, low, high = [program.name for program in self.all_programs], self.speed.low_rpm, self.speed.high_rpm
         for i, program in enumerate(self.all_programs, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
                 raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
-            low, high = self.speed.low_rpm, self.speed.high_rpm
             if not (math.isnan(program.speed_rpm) or low <= program.speed_rpm <= high):
                 speed = f"speed_rpm={program.speed_rpm:g}"
                 raise ValueError(f"program {i}: {speed} is outside [speed] {low:g}..{high:g} rpm")
@@ -154,15 +146,10 @@ class Machine(toml_schema.TomlTable, frozen=True):
             Cut or program.
         """
         coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
-        return Cut(
-            teeth=table.teeth,
-            immersion=table.immersion,
-            direction=table.direction,
-            tangential=coefficients.tangential,
-            radial=coefficients.radial,
-            helix_lag=2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter,
-            pitch=convert_pitch(self.pitch_deg(table), table.teeth),
-        )
+        lag = 2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter
+        pitch = cutting.convert_pitch(self.pitch_deg(table), table.teeth)
+        shape, pressures = (table.teeth, table.immersion), (coefficients.tangential, coefficients.radial)
+        return Cut(*shape, table.direction, *pressures, helix_lag=lag, pitch=pitch)
 
     def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
         """Return a cut at each radial depth along its path, feed along x.
@@ -205,10 +192,9 @@ class Machine(toml_schema.TomlTable, frozen=True):
         table
             Cut or program.
         """
-        name = table.tool if isinstance(table, ProgramTable) else None
-        return self.tool_table(name)
+        return self.tool_table(table.tool) if isinstance(table, ProgramTable) else None
 
-    def tool_table(self, name: str | None) -> ToolTable | None:
+    def tool_table(self, name: str) -> ToolTable | None:
         """Return the [[tool]] of a name; None without one.
 
         Parameters
@@ -224,7 +210,7 @@ class Machine(toml_schema.TomlTable, frozen=True):
         if tool is None:
             return
         try:
-            convert_pitch(self.pitch_deg(program), program.teeth)
+            cutting.convert_pitch(self.pitch_deg(program), program.teeth)
         except ValueError as error:
             raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
@@ -244,10 +230,8 @@ class Machine(toml_schema.TomlTable, frozen=True):
             if not tool.segments:
                 continue
             if tool.name == self.tap.tool:
-                raise ValueError(
-                    f"tool {i}: segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]; "
-                    "leave them out here, or give another name"
-                )
+                problem = f"segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]"
+                raise ValueError(f"tool {i}: {problem}; leave them out here, or give another name")
             if self.spindle is None or self.spindle.tool_length_mm is None:
                 part = f"the part of the shaft that is {self.tap.tool!r}"
                 raise ValueError(f"tool {i}: needs [spindle] tool_length_mm, {part}")
@@ -277,7 +261,8 @@ class Machine(toml_schema.TomlTable, frozen=True):
         spindle = self.spindle.build()
         if tool == self.tap.tool:
             return spindle
-        return self.find_modelled_tool(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+        free_tool = self.find_modelled_tool(tool).build(spindle)
+        return change_tool(spindle, (self.spindle.tool_length_mm or 0.0) / 1e3, free_tool)
 
     @property
     def modelled_tools(self) -> list[ToolTable]:
@@ -311,24 +296,12 @@ class Machine(toml_schema.TomlTable, frozen=True):
         tool
             Name of the tool.
         """
-        tables = {
-            name: table
-            for name, table in self.cut_tables.items()
-            if not isinstance(table, ProgramTable) or table.tool == tool
-        }
-        return {
-            name: tuple(
-                replace(cut, feed_angle=FEED_ANGLES[axis])
-                for cut in self.engaged_cuts(table)
-                for axis in table.feed_axes
-            )
-            for name, table in tables.items()
-        }
-
-    @property
-    def cut_names(self) -> list[str]:
-        """Names of the reference cut and of all programs."""
-        return list(self.cut_tables)
+        cuts = {}
+        for name, table in self.cut_tables.items():
+            if not isinstance(table, ProgramTable) or table.tool == tool:
+                directed = product(self.engaged_cuts(table), table.feed_axes)
+                cuts[name] = tuple(replace(cut, feed_angle=cutting.FEED_ANGLES[axis]) for cut, axis in directed)
+        return cuts
 
     @property
     def cut_tables(self) -> dict[str, CutTable]:
@@ -347,19 +320,19 @@ class Machine(toml_schema.TomlTable, frozen=True):
 
 def read_machine_file(path: Path) -> Machine:
     """Read a machine file; DataError with the place of a fault, OSError if it cannot be read."""
-    return parse_machine_file(read_toml_text(path), str(path))
+    return parse_machine_file(toml.read_toml_text(path), str(path))
 
 
 def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
     """Parse the text of a machine file; DataError with the place of a fault."""
     tables: dict[str, Any] = {}
     try:
-        tables = parse_toml_tables(text)
-        toml_schema.check_control_characters(tables)
+        tables = toml.parse_toml_tables(text)
+        toml.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{toml_schema.suggest_decimal_point(text)}") from error
+        raise DataError(f"{name}: {error}{toml.suggest_decimal_point(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {toml_schema.explain_validation_error(str(error), tables, Machine)}") from error
+        raise DataError(f"{name}: {toml.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error

@@ -6,7 +6,7 @@ import os
 from typing import NamedTuple
 from urllib.parse import quote, unquote, urlsplit
 
-from lobewatch.machine.settings.toml_schema import TomlTable
+from lobewatch.machine.settings.toml import TomlTable
 
 DEFAULT_MQTT_PORTS = {"mqtt": 1883, "mqtts": 8883}
 """Default port by scheme; mqtts is encrypted."""

@@ -15,7 +15,7 @@ from acquisition import Remark
 from lobewatch.machine.settings import setup_tables as setup
 from lobewatch.machine.settings import spindle_tables as model
 from lobewatch.machine.settings.cut_tables import CutTable, DriveTable, MaterialTable, UncertaintyTable
-from lobewatch.machine.settings.toml_schema import TomlTable
+from lobewatch.machine.settings.toml import TomlTable
 
 KT_RANGE = (200.0, 6000.0)
 """Tangential cutting coefficient Kt (N/mm2)."""
@@ -58,8 +58,7 @@ PLAUSIBLE_RANGES: Mapping[type[TomlTable], Mapping[str, tuple[float, float]]] = 
         "position_mm": (1, 999),
         "stick_out_mm": (3, 1000),
         "drawbar_kn": (0.5, 150),
-        "sensor_mass_g": (0.1, 99),
-        "cable_mass_g": (0.1, 99),
+        **dict.fromkeys(("sensor_mass_g", "cable_mass_g"), (0.1, 99)),
         "sensor_band_hz": (100, 99_000),
     },
     setup.DaqTable: {"sample_rate_hz": (1000, 999_999), "calibration_interval_months": (1, 120)},
@@ -95,11 +94,9 @@ PLAUSIBLE_RANGES: Mapping[type[TomlTable], Mapping[str, tuple[float, float]]] = 
         "corner_radius_mm": (0.2, 199),
     },
     MaterialTable: {
-        "tangential_n_per_mm2": KT_RANGE,
-        "specific_force_n_per_mm2": KT_RANGE,
+        **dict.fromkeys(("tangential_n_per_mm2", "specific_force_n_per_mm2"), KT_RANGE),
         "force_angle_deg": (39, 90),
-        "tangential_edge_n_per_mm": (0.5, 400),
-        "radial_edge_n_per_mm": (0.5, 400),
+        **dict.fromkeys(("tangential_edge_n_per_mm", "radial_edge_n_per_mm"), (0.5, 400)),
     },
     model.SpindleTable: {
         "bearing_stiffness_n_per_um": (5, 4999),

@@ -19,10 +19,7 @@ NamedTable = TypeVar("NamedTable", bound=CutTable)
 
 SETTING_KEYS = ("speed_rpm", "depth_mm")
 """Keys of the setting of a program."""
-REQUIRED_CUT_KEYS = (
-    *SETTING_KEYS,
-    *("tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction"),
-)
+REQUIRED_CUT_KEYS = (*SETTING_KEYS, *("tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction"))
 """Keys of a [[program]] that a requested cut needs."""
 COEFFICIENT_KEYS = {"tangential_n_per_mm2", "radial_n_per_mm2"}
 """Keys that replace a material."""
@@ -60,15 +57,10 @@ class CutSetting:
 
     def cut_entry_fields(self, speed_rpm: float) -> dict[str, Any]:
         """Return the fields of a `CutEntry` that follow from the setting and the true speed (rpm)."""
-        feed = self.table.feed_per_tooth_mm
-        shared = {name: getattr(self, name) for name in ("program", "tool", "cut", "feed", "depth")}
-        return shared | {
-            "coefficients": self.material,
-            "feed_per_tooth": None if feed is None else feed / 1e3,
-            "commanded_rpm": self.speed_rpm,
-            "speed_rpm": speed_rpm,
-            "power": None if self.power is None else self.power.at(speed_rpm),
-        }
+        feed, power = self.table.feed_per_tooth_mm, None if self.power is None else self.power.at(speed_rpm)
+        fields = {name: getattr(self, name) for name in ("program", "tool", "cut", "feed", "depth")}
+        fields |= {"feed_per_tooth": None if feed is None else feed / 1e3, "coefficients": self.material}
+        return fields | {"commanded_rpm": self.speed_rpm, "speed_rpm": speed_rpm, "power": power}
 
 
 def find_cut_setting(
@@ -79,14 +71,10 @@ def find_cut_setting(
     power_kw is the power shown in the cut less that in air. Raises ValueError for an unknown name or an invalid value.
     """
     table = find_by_name(machine.cut_tables, program)
-    for name, key, value, unit in (
-        ("speed", "speed_rpm", speed_rpm, "rpm"),
-        ("depth", "depth_mm", depth_mm, "mm"),
-    ):
+    for name, key, value, unit in (("speed", "speed_rpm", speed_rpm, "rpm"), ("depth", "depth_mm", depth_mm, "mm")):
         if value is not None and not _is_positive(value):
-            raise ValueError(
-                f"ProgramTable.{key} {value:g}: is not above 0; give the {name} that was cut with, in {unit}"
-            )
+            cure = f"give the {name} that was cut with, in {unit}"
+            raise ValueError(f"ProgramTable.{key} {value:g}: is not above 0; {cure}")
     preset = table if isinstance(table, ProgramTable) else None
     speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
@@ -96,31 +84,25 @@ def find_cut_setting(
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
     program_name, tool = (preset.name, preset.tool) if preset else (None, machine.tap.tool)
-    coefficients, cut = machine.coefficients(table), machine.build_cut(table)
-    setting = CutSetting(table, coefficients.material, program_name, tool, cut, table.feed, float(speed), depth / 1e3)
+    material, cut = machine.coefficients(table).material, machine.build_cut(table)
+    setting = CutSetting(table, material, program_name, tool, cut, table.feed, float(speed), depth / 1e3)
     if power_kw is None:
         return setting
-    reading = build_power_reading(power_kw, table, coefficients, cut, machine.drive, speed, setting.depth)
-    return replace(setting, power=reading)
+    return replace(setting, power=build_power_reading(power_kw, machine, table, speed, setting.depth))
 
 
 def choose_cut(
-    machine: Machine,
-    program: str,
-    cut: str,
-    speed_rpm: float | None,
-    depth_mm: float | None,
-    power_kw: float | None = None,
+    machine: Machine, program: str, cut: str, speed: float | None, depth: float | None, power_kw: float | None = None
 ) -> CutSetting:
-    """Return the setting of a program, or of a cut with its own speed and depth; ValueError unless one is named."""
+    """Return the setting of a program, or of a cut with speed (rpm) and depth (mm); ValueError unless one is named."""
     if bool(program) == bool(cut):
-        names = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
+        names = ", ".join(map(repr, machine.cut_tables)) or "none: add a [[program]] to machine.toml"
         both = f"{'both' if cut else 'neither'} of choose_cut.program and choose_cut.cut"
         raise ValueError(f"{both}: say which cut it is; there are {names}")
-    if cut and (speed_rpm is None or depth_mm is None):
+    if cut and (speed is None or depth is None):
         cure = "give speed and depth, or choose_cut.program with those of its own"
-        raise ValueError(f"choose_cut.cut {cut}: {_missing_setting_field(speed_rpm)} is missing; {cure}")
-    return find_cut_setting(machine, program or cut, speed_rpm, depth_mm, power_kw)
+        raise ValueError(f"choose_cut.cut {cut}: {_missing_setting_field(speed)} is missing; {cure}")
+    return find_cut_setting(machine, program or cut, speed, depth, power_kw)
 
 
 def _missing_setting_field(speed: float | None) -> str:

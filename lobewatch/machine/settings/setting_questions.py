@@ -14,7 +14,7 @@ from lobewatch.machine.settings.cut_tables import CutTable, MaterialTable, Progr
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.machine.settings.plausibility import ImplausibleSetting, SettingFault, check_ranges, check_ratio
 from lobewatch.machine.settings.spindle_tables import MassTable, SpindleTable, ToolTable
-from lobewatch.machine.settings.toml_schema import TomlTable
+from lobewatch.machine.settings.toml import TomlTable
 
 
 def find_program_questions(machine: Machine, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
@@ -37,12 +37,11 @@ def find_all_questions(machine: Machine) -> list[ImplausibleSetting]:
 
 def find_template_bearings(machine: Machine) -> ImplausibleSetting | None:
     """Return the question about a bearing stiffness that is still that of the template; None if replaced."""
-    spindle, template = machine.spindle, ranges.TEMPLATE_BEARING_STIFFNESS
-    if spindle is None or spindle.bearing_stiffness_n_per_um != template:
+    template, key = ranges.TEMPLATE_BEARING_STIFFNESS, "bearing_stiffness_n_per_um"
+    if machine.spindle is None or machine.spindle.bearing_stiffness_n_per_um != template:
         return None
     why = "is what a new machine.toml holds, and no tap test has found it yet: all of the model rests on it"
-    location, key = "[spindle]", "bearing_stiffness_n_per_um"
-    question = ImplausibleSetting(SettingFault.TEMPLATE_VALUE, location, key, f"{template:g}", why)
+    question = ImplausibleSetting(SettingFault.TEMPLATE_VALUE, "[spindle]", key, f"{template:g}", why)
     return next(iter(_remove_accepted(machine, [question])), None)
 
 
@@ -78,8 +77,8 @@ def _check_drive(machine: Machine) -> Iterator[ImplausibleSetting]:
     if math.isfinite(drive.power_kw) and math.isfinite(drive.torque_nm):
         corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi
         if not 50 <= corner <= 2 * machine.speed.high_rpm:
-            why = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm, where [speed] ends at "
-            why += f"{machine.speed.high_rpm:g}"
+            meeting = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm"
+            why = f"{meeting}, where [speed] ends at {machine.speed.high_rpm:g}"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, "[drive]", "power_kw", f"{drive.power_kw:g}", why)
 
 
@@ -88,10 +87,9 @@ def _check_program(machine: Machine, program: ProgramTable) -> Iterator[Implausi
     place = f"program {program.name!r}"
     yield from _check_cut_and_material(machine, program, place)
     if program in machine.program:  # a requested cut takes its geometry from these programs
-        yield from _check_same_tool(program, place, [p for p in machine.program if p.tool == program.tool])
+        yield from _check_same_tool(machine, program, place)
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from _check_tool(tool)
             yield from _check_program_tool(program, tool, place)
     if program.tool == machine.tap.tool and machine.tap.stick_out_mm is not None:
         limits, diameter = ranges.STICK_OUT_RATIO_RANGE, program.tool_diameter_mm
@@ -134,36 +132,28 @@ def _check_radial_coefficient(table: CutTable | MaterialTable, place: str) -> It
     return check_ratio(place, "radial_n_per_mm2", kr, kt, ranges.KR_RATIO_RANGE)
 
 
-def _check_same_tool(
-    program: ProgramTable, place: str, same_tool: Sequence[ProgramTable]
-) -> Iterator[ImplausibleSetting]:
+def _check_same_tool(machine: Machine, program: ProgramTable, place: str) -> Iterator[ImplausibleSetting]:
     """Yield diameter or teeth of a program that another program of its tool contradicts."""
+    same_tool = [other for other in machine.program if other.tool == program.tool]
     for key in ("tool_diameter_mm", "teeth"):
         value = getattr(program, key)
-        other = next((other for other in same_tool if getattr(other, key) != value), None)
-        if other is not None:
+        for other in [other for other in same_tool if getattr(other, key) != value][:1]:
             why = f"where {other.name!r} of the same tool has {getattr(other, key):g}: a radius, an inch, another tool?"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
 
 
 def _check_program_tool(program: ProgramTable, tool: ToolTable, place: str) -> Iterator[ImplausibleSetting]:
-    """Yield values of a program that its [[tool]] contradicts."""
-    for key, tool_key in {
-        "teeth": "teeth",
-        "tool_diameter_mm": "diameter_mm",
-        "flute_length_mm": "flute_length_mm",
-    }.items():
+    """Yield implausible values of a [[tool]], and values of its program that it contradicts."""
+    name, limits = f"tool {tool.name!r}", ranges.FLUTE_LENGTH_RATIO_RANGE
+    yield from check_ranges(tool, name)
+    if tool.flute_length_mm is not None and tool.diameter_mm is not None:
+        yield from check_ratio(name, "flute_length_mm", tool.flute_length_mm, tool.diameter_mm, limits)
+    for key in ("teeth", "tool_diameter_mm", "flute_length_mm"):
+        tool_key = key.removeprefix("tool_")
         value, tool_value = getattr(program, key), getattr(tool, tool_key)
         if None not in (value, tool_value) and value != tool_value:
             why = f"where {tool_key} of [[tool]] {tool.name!r} is {tool_value:g}: a radius, an inch, another tool?"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
-
-
-def _check_tool(tool: ToolTable) -> Iterator[ImplausibleSetting]:
-    place, limits = f"tool {tool.name!r}", ranges.FLUTE_LENGTH_RATIO_RANGE
-    yield from check_ranges(tool, place)
-    if tool.flute_length_mm is not None and tool.diameter_mm is not None:
-        yield from check_ratio(place, "flute_length_mm", tool.flute_length_mm, tool.diameter_mm, limits)
 
 
 def _check_model(machine: Machine, program: ProgramTable) -> Iterator[ImplausibleSetting]:

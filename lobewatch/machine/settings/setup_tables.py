@@ -9,19 +9,11 @@ from typing import Annotated, Literal, Self
 
 from msgspec import Meta
 
-from acquisition import (
-    STANDARD_GRAVITY,
-    Channel,
-    Conditions,
-    DeviceSettings,
-    SensorInput,
-    TapDirection,
-    check_settings,
-    find_driver,
-)
+import acquisition
+from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
 from acquisition.text_boards import FrameFormat, OutputFormat
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
 """Mounting of an accelerometer."""
@@ -103,9 +95,8 @@ class TapTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self.conditions(self.tool)
         if self.hammer == "none" and self.trigger_n is not None:
-            raise ValueError(
-                f'trigger_n={self.trigger_n:g} with hammer="none": no force triggers; leave it out, trial hits choose'
-            )
+            problem = 'with hammer="none": no force triggers; leave it out, trial hits choose'
+            raise ValueError(f"trigger_n={self.trigger_n:g} {problem}")
         if self.cable_mass_g and self.sensor_mass_g is None:
             raise ValueError(f"cable_mass_g={self.cable_mass_g:g} without sensor_mass_g; give both")
 
@@ -119,7 +110,7 @@ class TapTable(TomlTable, frozen=True):
         """Mass and mounting of the accelerometer."""
         return SensorLoading.of(self.sensor_mass_g, self.cable_mass_g, self.mounting or "")
 
-    def conditions(self, tool: str) -> Conditions:
+    def conditions(self, tool: str) -> acquisition.Conditions:
         """Return the conditions of a tap test; the stick-out is that of the tapped tool only.
 
         Parameters
@@ -128,7 +119,7 @@ class TapTable(TomlTable, frozen=True):
             Name of the tool in the spindle.
         """
         stick_out = self.stick_out_mm if tool == self.tool else None
-        return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
+        return acquisition.Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
 
 
 class ModeTable(TomlTable, frozen=True):
@@ -165,10 +156,10 @@ class SpeedTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         if not self.low_rpm < self.high_rpm:
-            around = (
-                f"of a spindle of one speed give what is around it, {0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
-            )
-            cure = around if self.low_rpm == self.high_rpm else "give the lowest, then the highest"
+            cure = "give the lowest, then the highest"
+            if self.low_rpm == self.high_rpm:
+                around = f"{0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
+                cure = f"of a spindle of one speed give what is around it, {around}"
             raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}; {cure}")
 
 
@@ -206,7 +197,7 @@ class ChannelTable(TomlTable, frozen=True):
         if self.sensitivity_mv_per_n is not None:
             sensitivity = self.sensitivity_mv_per_n / 1e3
         else:
-            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / STANDARD_GRAVITY
+            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
         channel = Channel(
             self.quantity,
             sensitivity * self.gain,
@@ -264,7 +255,7 @@ class DaqTable(TomlTable, frozen=True):
     """Sensors of a DAQ that does not describe them."""
 
     def __post_init__(self) -> None:
-        check_settings(find_driver(self.driver), self.settings)
+        acquisition.check_settings(acquisition.find_driver(self.driver), self.settings)
 
     @property
     def settings(self) -> DeviceSettings:

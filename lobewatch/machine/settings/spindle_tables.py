@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Sequence
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
-from lobewatch.machine.settings.toml_schema import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
 
 
 class SegmentTable(TomlTable, frozen=True):
@@ -124,24 +125,20 @@ class SpindleTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         length = sum(segment.length_mm for segment in self.segments)
-        kinds: dict[str, Sequence[BearingTable | MassTable | JointTable]] = {
-            "bearing": self.bearings,
-            "mass": self.masses,
-            "joint": self.joints,
-        }
+        kinds: dict[str, Sequence[Any]] = {"bearing": self.bearings, "mass": self.masses, "joint": self.joints}
         for kind, parts in kinds.items():
             for i, part in enumerate(parts, 1):
                 if part.position_mm > length:
-                    raise ValueError(
-                        f"{kind} {i}: position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
-                    )
+                    place = f"position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
+                    raise ValueError(f"{kind} {i}: {place}")
         first = min(bearing.position_mm for bearing in self.bearings)
         if self.tool_length_mm is not None and self.tool_length_mm > first:
-            raise ValueError(
-                f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing, at {first:g} mm; "
-                "give the length of the tool alone"
-            )
-        _check_model(self.build)
+            problem = f"reaches beyond the first bearing, at {first:g} mm; give the length of the tool alone"
+            raise ValueError(f"tool_length_mm={self.tool_length_mm:g} {problem}")
+        try:
+            self.build()
+        except ValueError as error:
+            raise ValueError(f"{error} (here in SI units)") from error
 
     def build(self) -> Spindle:
         """Build the spindle in SI units."""
@@ -166,14 +163,6 @@ def _to_metres(millimetres: float | None) -> float | None:
     return None if millimetres is None else millimetres / 1e3
 
 
-def _check_model(build: Callable[[], Spindle]) -> None:
-    """Refuse what dsm refuses, whose messages are in SI units."""
-    try:
-        build()
-    except ValueError as error:
-        raise ValueError(f"{error} (here in SI units)") from error
-
-
 class ToolTable(TomlTable, frozen=True):
     """Table [[tool]]; segments from the tip to the holder are for a tool that the model predicts."""
 
@@ -195,25 +184,12 @@ class ToolTable(TomlTable, frozen=True):
         for key in ("cutting_speed_m_min", "feed_per_tooth_mm"):
             value = getattr(self, key)
             if isinstance(value, tuple) and value[0] > value[1]:
-                low, high = value
-                raise ValueError(
-                    f"{key}=[{low:g}, {high:g}] does not rise; give [least, greatest], or the greatest alone"
-                )
+                cure = "give [least, greatest], or the greatest alone"
+                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] does not rise; {cure}")
         if self.masses and not self.segments:
             raise ValueError("masses without segments; give the shape of the tool too, or leave the masses out")
 
     def build(self, spindle: Spindle) -> Spindle:
         """Build the tool as a free shaft in SI units, with defaults of the spindle."""
-        return Spindle(
-            [segment.build() for segment in self.segments],
-            (),
-            youngs_modulus=spindle.youngs_modulus,
-            density=spindle.density,
-            theory=spindle.theory,
-            shear_modulus=spindle.shear_modulus,
-            masses=[mass.build() for mass in self.masses],
-        )
-
-    def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
-        """Return the spindle with this tool instead of the drawn one."""
-        return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))
+        segments, masses = [part.build() for part in self.segments], [mass.build() for mass in self.masses]
+        return replace(spindle, segments=segments, bearings=(), masses=masses, joints=())

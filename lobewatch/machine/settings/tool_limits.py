@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from lobes import (
-    CutKind,
-    PublishedRange,
-    ToolMaterial,
-    classify_cut,
-    published_cutting_speed,
-    published_feed_per_tooth,
-    published_speed_of_any_tool,
-)
+import lobes
+from lobes import CutKind, PublishedRange, ToolMaterial
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.machine_file import USER_SOURCE, Machine
 
-PROGRAM_KEYS_BY_TOOL_FIELD: Mapping[str, str] = {
-    **{name: name for name in ("teeth", "helix_deg", "flute_length_mm", "pitch_deg")},
-    "diameter_mm": "tool_diameter_mm",
-    "feed_mm": "feed_per_tooth_mm",
-}
+PROGRAM_KEYS_BY_TOOL_FIELD = {name: name for name in ("teeth", "helix_deg", "flute_length_mm", "pitch_deg")}
+PROGRAM_KEYS_BY_TOOL_FIELD |= {"diameter_mm": "tool_diameter_mm", "feed_mm": "feed_per_tooth_mm"}
 """Fields of a tool that its programs have too, with the key in a [[program]]."""
 
 
@@ -80,14 +70,9 @@ def find_tool_properties(machine: Machine, name: str) -> ToolProperties:
     if table is None:
         return ToolProperties(name, **common)
     own = {field: value for field in PROGRAM_KEYS_BY_TOOL_FIELD if (value := getattr(table, field, None)) is not None}
-    return ToolProperties(
-        name,
-        **common | own,
-        tool_material=table.tool_material,
-        cutting_speed_m_min=_to_range(table.cutting_speed_m_min),
-        feed_per_tooth_mm=_to_range(table.feed_per_tooth_mm),
-        max_speed_rpm=table.max_speed_rpm or math.inf,
-    )
+    own |= {key: _to_range(getattr(table, key)) for key in ("cutting_speed_m_min", "feed_per_tooth_mm")}
+    own |= {"tool_material": table.tool_material, "max_speed_rpm": table.max_speed_rpm or math.inf}
+    return ToolProperties(name, **common | own)
 
 
 def find_feed_per_tooth(machine: Machine, table: CutTable) -> float | None:
@@ -170,8 +155,7 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     """Return the limits of the tool of a cut in its material.
 
     Speeds come from [[tool]] cutting_speed_m_min, else from published values for both materials; without them, up to
-    the
-    fastest of all tools. Sources of the published ranges: docs/tools.md.
+    the fastest of all tools. Sources of the published ranges: docs/tools.md.
 
     Parameters
     ----------
@@ -197,22 +181,15 @@ def find_tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     ('slot', '3000 to 24000 rpm', ['tool_material', 'material'])
     """
     tool = find_tool_properties(machine, table.tool if isinstance(table, ProgramTable) else machine.tap.tool)
-    cut = classify_cut(table.immersion)
+    cut = lobes.classify_cut(table.immersion)
     speed, feed = _find_speed_range(machine, table, tool, cut), _find_feed_range(machine, table, tool, cut)
     per_rpm = math.pi * table.tool_diameter_mm / 1e3
     fastest = min(machine.speed.high_rpm, tool.max_speed_rpm)
     low, high = (0.0, math.inf) if speed is None else (speed.low / per_rpm, speed.high / per_rpm)
-    begin = low if low <= fastest else 0.0
-    return ToolLimits(
-        tool,
-        cut,
-        max(machine.speed.low_rpm, begin),
-        min(fastest, high),
-        speed,
-        feed,
-        _find_max_depth_mm(table, tool),
-        tuple(_find_missing_data(machine, table, tool, speed, feed)),
-    )
+    speeds = max(machine.speed.low_rpm, low if low <= fastest else 0.0), min(fastest, high)
+    missing = tuple(_find_missing_data(machine, table, tool, speed, feed))
+    flutes = tool.flute_length_mm if table.flute_length_mm is None else None
+    return ToolLimits(tool, cut, *speeds, speed, feed, flutes or table.deepest_mm, missing)
 
 
 def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:
@@ -220,8 +197,8 @@ def _find_speed_range(machine: Machine, table: CutTable, tool: ToolProperties, c
     if tool.cutting_speed_m_min is not None:
         return AllowedRange(*tool.cutting_speed_m_min, USER_SOURCE)
     material = machine.coefficients(table)
-    own = None if tool.tool_material is None else published_cutting_speed(material, tool.tool_material, cut)
-    return _convert_published_range(own or published_speed_of_any_tool(material, cut), 60.0)
+    own = None if tool.tool_material is None else lobes.published_cutting_speed(material, tool.tool_material, cut)
+    return _convert_published_range(own or lobes.published_speed_of_any_tool(material, cut), 60.0)
 
 
 def _find_feed_range(machine: Machine, table: CutTable, tool: ToolProperties, cut: CutKind) -> AllowedRange | None:
@@ -231,7 +208,7 @@ def _find_feed_range(machine: Machine, table: CutTable, tool: ToolProperties, cu
     if tool.tool_material is None:
         return None
     diameter = table.tool_diameter_mm / 1e3
-    feed = published_feed_per_tooth(machine.coefficients(table), tool.tool_material, cut, diameter)
+    feed = lobes.published_feed_per_tooth(machine.coefficients(table), tool.tool_material, cut, diameter)
     return _convert_published_range(feed, 1e3)
 
 
@@ -240,12 +217,6 @@ def _convert_published_range(published: PublishedRange | None, unit: float) -> A
         return None
     names = dict.fromkeys(source.partition(": ")[0] for source in published.sources)
     return AllowedRange(published.low * unit, published.high * unit, "; ".join(names))
-
-
-def _find_max_depth_mm(table: CutTable, tool: ToolProperties) -> float:
-    if table.flute_length_mm is None and tool.flute_length_mm is not None:
-        return tool.flute_length_mm
-    return table.deepest_mm
 
 
 def _find_missing_data(

@@ -10,7 +10,7 @@ from typing import Any, Self
 from acquisition import STANDARD_GRAVITY, Channel, DataError, DeviceError, find_driver
 from acquisition.devices import DeviceSettings, PortScan, convert_driver_errors, scan_ports
 from lobewatch.machine.settings.machine_file import parse_machine_file
-from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml, parse_toml_tables
+from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,6 @@ def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -
     return numbers
 
 
-def format_answer_number(value: float) -> str:
-    """Format a number as it is typed."""
-    return f"{value:.10g}"
+def format_answer(*values: float) -> str:
+    """Format numbers as they are typed."""
+    return " ".join(f"{value:.10g}" for value in values)

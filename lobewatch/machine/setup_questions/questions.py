@@ -1,54 +1,143 @@
-"""Setup questions on machine, tool and cutting, and the list of all setup questions."""
+"""Setup questions on machine, DAQ, sensors, tool and cutting."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from functools import partial
+from typing import Any, get_args
 
+from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
-from lobewatch.machine.settings.toml_text import TomlValue
+from lobewatch.machine.settings.setup_tables import SensorMounting
+from lobewatch.machine.settings.toml import TomlValue
 from lobewatch.machine.setup_questions import draft as setup
-from lobewatch.machine.setup_questions.sensor_questions import SENSOR_QUESTIONS
+from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion
+
+SENSITIVITY_KEYS = {"force": "sensitivity_mv_per_n", "acceleration": "sensitivity_mv_per_g"}
+"""Key of the sensitivity of a sensor by quantity."""
+MOUNTINGS: tuple[str, ...] = get_args(SensorMounting)
+"""Words for the mounting of an accelerometer."""
+NO_HAMMER_ANSWER = "none"
+"""Answer without a force sensor."""
 
 
-def _current_name(draft: setup.MachineDraft) -> str:
-    return str(draft.table("machine")["name"])
+def _current_port(draft: MachineDraft) -> str:
+    daq = draft.table("daq")
+    if port := daq.get("port"):
+        rate = [setup.format_answer(daq["sample_rate_hz"])] if "sample_rate_hz" in daq else []
+        return " ".join([port, *([daq["driver"], *rate] if "driver" in daq else [])])
+    answering = [look.port for look in draft.detected_daqs.values() if look.text]
+    return answering[0] if answering else setup.OPEN_ANSWER
 
 
-def _set_name(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
-    return draft.set("machine", name=answer.strip())
+def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
+    """Set a port, with driver and rate after it for a silent device, or the number of a listed one."""
+    if setup.is_open_answer(answer):
+        return draft.set("daq", port=None, driver=None)
+    answering = [look.port for look in draft.detected_daqs.values() if look.text]
+    if answer.strip().isdecimal():
+        number = int(answer)
+        if not 1 <= number <= len(answering):
+            raise ValueError(f"{answer}: no DAQ of this number is listed; give the port, as in /dev/ttyACM0")
+        answer = answering[number - 1]
+    port, driver, rate = [*answer.split(maxsplit=2), "", ""][:3]
+    if driver and driver not in list_driver_names():
+        raise ValueError(f"driver {driver!r} is not known; there are {', '.join(list_driver_names())}")
+    look = draft.detected_daqs.get(port) or setup.inspect_port(port)
+    draft = replace(draft, detected_daqs={**draft.detected_daqs, port: look})
+    driver = driver or look.driver
+    draft = draft.set("daq", port=port, driver=None if driver == "taps" else driver)
+    if rate:
+        draft = draft.set("daq", sample_rate_hz=setup.parse_numbers(rate, ("samples a second",))[0])
+    if find_driver(driver).prints_samples:
+        find_driver(driver).check(DeviceSettings(draft.table("daq").get("sample_rate_hz")))
+    return draft
 
 
-def _current_speeds(draft: setup.MachineDraft) -> str:
+def _channel_number(quantity: str, draft: MachineDraft) -> int:
+    """Return the index of a sensor in [[daq.channel]], or of a new one."""
+    quantities = [channel.get("quantity") for channel in draft.table("daq").get("channel", ())]
+    return quantities.index(quantity) if quantity in quantities else len(quantities)
+
+
+def _described_by_daq(quantity: str, draft: MachineDraft) -> str:
+    if draft.needs_sensors or (quantity == "force" and _lacks_hammer(draft)):
+        return ""
+    says = draft.daq.sensor_text(quantity)
+    return f"{says}, says the DAQ" if says else "the DAQ will say it itself"
+
+
+def _lacks_hammer(draft: MachineDraft) -> bool:
+    return bool(draft.daq.channels) and not draft.daq.sensor_text("force")
+
+
+def _current_sensor(quantity: str, draft: MachineDraft) -> str:
+    if quantity == "force" and (draft.has_no_force_sensor or _lacks_hammer(draft)):
+        return NO_HAMMER_ANSWER
+    channel = draft.table("daq.channel", _channel_number(quantity, draft))
+    if not channel:
+        return ""
+    return setup.format_answer(*(channel[key] for key in ("input", SENSITIVITY_KEYS[quantity], "range_v")))
+
+
+def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft:
+    names = ("input of the DAQ", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
+    number, sensitivity, reach = setup.parse_numbers(answer, names)
+    if not number.is_integer():
+        raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
+    values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
+    return draft.set("daq.channel", _channel_number(quantity, draft), **values, range_v=reach)
+
+
+def _set_hammer(draft: MachineDraft, answer: str) -> MachineDraft:
+    if answer.strip().casefold() == NO_HAMMER_ANSWER:
+        return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
+    return _set_sensor("force", draft.set("tap", hammer=None), answer)
+
+
+def _current_mounting(draft: MachineDraft) -> str:
+    tap = draft.table("tap")
+    words = [setup.format_answer(tap["sensor_mass_g"])] if "sensor_mass_g" in tap else []
+    return " ".join([*words, *([tap["mounting"]] if "mounting" in tap else [])]) or setup.OPEN_ANSWER
+
+
+def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
+    if setup.is_open_answer(answer):
+        return draft.set("tap", sensor_mass_g=None, mounting=None)
+    words = [word.strip(",;") for word in answer.casefold().split()]
+    mountings = [word for word in words if word in MOUNTINGS]
+    rest = " ".join(word for word in words if word not in MOUNTINGS)
+    names = (f"mass in g, then {', '.join(MOUNTINGS)}",)
+    mass = setup.parse_numbers(rest, names, 0 if mountings else 1)
+    return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
+
+
+_DAQ_EXAMPLE = "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200"
+_FIXING_TEXT = f"Accelerometer on the tool: its mass (g), and fixed by {', '.join(MOUNTINGS[:-1])} or hand?"
+DAQ_QUESTION = SetupQuestion("daq", "On which port is the DAQ?", _DAQ_EXAMPLE, _current_port, _set_port)
+
+
+def _current_speeds(draft: MachineDraft) -> str:
     speed = draft.table("speed")
-    limits = speed.get("low_rpm", 1000), speed.get("high_rpm", 24000)
-    return " ".join(map(setup.format_answer_number, limits))
+    return setup.format_answer(speed.get("low_rpm", 1000), speed.get("high_rpm", 24000))
 
 
-def _set_speeds(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
     low, high = setup.parse_numbers(answer, ("lowest speed in rpm", "highest speed in rpm"))
     return draft.set("speed", low_rpm=low, high_rpm=high)
 
 
-def _current_drive(draft: setup.MachineDraft) -> str:
+def _current_drive(draft: MachineDraft) -> str:
     drive = draft.table("drive")
-    known = [setup.format_answer_number(drive[key]) for key in ("power_kw", "torque_nm") if key in drive]
-    return " ".join(known) if len(known) == 2 else setup.OPEN_ANSWER
+    known = [drive[key] for key in ("power_kw", "torque_nm") if key in drive]
+    return setup.format_answer(*known) if len(known) == 2 else setup.OPEN_ANSWER
 
 
-def _set_drive(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
     power, torque = setup.parse_numbers(answer, ("power in kW", "torque in N m"))
     return draft.set("drive", power_kw=power, torque_nm=torque)
-
-
-NAME_QUESTION = setup.SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name)
-SPEEDS_QUESTION = setup.SetupQuestion(
-    "speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds
-)
-DRIVE_QUESTION = setup.SetupQuestion(
-    "drive", "Power (kW) and torque (N m) of the spindle motor?", "15 40", _current_drive, _set_drive
-)
 
 
 DEFAULT_PROGRAM_NAME = "first cut"
@@ -60,22 +149,18 @@ SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
-def _current_tool(draft: setup.MachineDraft) -> str:
+def _current_tool(draft: MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    numbers = [setup.format_answer_number(value) for value in (*values, *([stick_out] if stick_out else []))]
     made_of = draft.table("tool", _tool_number(draft)).get("tool_material")
-    return " ".join([*numbers, *([made_of] if made_of else [])])
+    numbers = setup.format_answer(*values, *([stick_out] if stick_out else []))
+    return f"{numbers} {made_of}" if made_of else numbers
 
 
-def _set_tool(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
-    names = (
-        "teeth",
-        "diameter in mm",
-        "helix in deg",
-        f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)",
-    )
+def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
+    length = f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)"
     numbers, made_of = _split_tool_answer(answer)
+    names = ("teeth", "diameter in mm", "helix in deg", length)
     teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} teeth; the number of teeth comes first")
@@ -96,7 +181,7 @@ def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
     return answer, None
 
 
-def _tool_number(draft: setup.MachineDraft) -> int:
+def _tool_number(draft: MachineDraft) -> int:
     """Return the index of the [[tool]] of the tapped tool, or of a new one."""
     number = 0
     while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
@@ -104,46 +189,40 @@ def _tool_number(draft: setup.MachineDraft) -> int:
     return number
 
 
-def _current_material(draft: setup.MachineDraft) -> str:
+def _current_material(draft: MachineDraft) -> str:
     cut = draft.table("reference_cut")
     if "material" in cut:
         return str(cut["material"])
     pair = tuple(cut[key] for key in SETUP_COEFFICIENT_KEYS if key in cut)
-    return (
-        setup.OPEN_ANSWER
-        if pair in (SETUP_TEMPLATE_COEFFICIENTS, ())
-        else " ".join(setup.format_answer_number(value) for value in pair)
-    )
+    return setup.OPEN_ANSWER if pair in (SETUP_TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
 
 
-def _set_material(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
+    values: dict[str, TomlValue] = {"material": None}
     try:
-        tangential, radial = setup.parse_numbers(answer, ("Kt", "Kr"))
-        material = None
+        values |= dict(zip(SETUP_COEFFICIENT_KEYS, setup.parse_numbers(answer, ("Kt", "Kr")), strict=True))
     except ValueError:
-        tangential, radial, material = None, None, answer.strip()
-    return _set_in_all_cuts(
-        draft, {"material": material, **dict(zip(SETUP_COEFFICIENT_KEYS, (tangential, radial), strict=True))}
-    )
+        values |= {"material": answer.strip(), **dict.fromkeys(SETUP_COEFFICIENT_KEYS)}
+    return _set_in_all_cuts(draft, values)
 
 
-def _set_in_all_cuts(draft: setup.MachineDraft, values: dict[str, TomlValue]) -> setup.MachineDraft:
+def _set_in_all_cuts(draft: MachineDraft, values: dict[str, TomlValue]) -> MachineDraft:
     """Set values of the reference cut and of the first program."""
     draft = draft.set("reference_cut", **values)
     return draft.set("program", 0, **values) if draft.table("program", 0) else draft
 
 
-def _current_program(draft: setup.MachineDraft) -> str:
+def _current_program(draft: MachineDraft) -> str:
     program = draft.table("program", 0)
     if not program:
         return setup.OPEN_ANSWER
     keys = ("speed_rpm", "depth_mm", "radial_depth_mm", "feed_per_tooth_mm")
-    return f"{program['name']}: " + " ".join(setup.format_answer_number(program[key]) for key in keys if key in program)
+    return f"{program['name']}: {setup.format_answer(*(program[key] for key in keys if key in program))}"
 
 
-def _set_program(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
+def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
@@ -157,43 +236,48 @@ def _set_program(draft: setup.MachineDraft, answer: str) -> setup.MachineDraft:
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
-TOOL_QUESTION = setup.SetupQuestion(
-    "tool",
-    "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of "
-    f"{_TOOL_MATERIALS_TEXT}?",
-    "4 20 30 80 coated carbide",
-    _current_tool,
-    _set_tool,
-)
-MATERIAL_QUESTION = setup.SetupQuestion(
-    "material",
-    "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)",
-    "42CrMo4, 1.7225, AA 6061, 700 250",
-    _current_material,
-    _set_material,
-)
-PROGRAM_QUESTION = setup.SetupQuestion(
-    "program",
-    "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?",
-    "slot: 8000 2 20 0.1",
-    _current_program,
-    _set_program,
-)
-
-
-SETUP_QUESTIONS: tuple[setup.SetupQuestion, ...] = (
-    NAME_QUESTION,
-    SPEEDS_QUESTION,
-    DRIVE_QUESTION,
-    *SENSOR_QUESTIONS,
-    TOOL_QUESTION,
-    MATERIAL_QUESTION,
-    PROGRAM_QUESTION,
+_TOOL_TEXT = "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of"
+_MATERIAL_TEXT = "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)"
+_MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
+_PROGRAM_TEXT = "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?"
+_DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor?"
+_EXAMPLE_TOOL = "4 20 30 80 coated carbide"
+SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
+    SetupQuestion(
+        "name",
+        "What is the machine called?",
+        "mill-3",
+        lambda draft: str(draft.table("machine")["name"]),
+        lambda draft, answer: draft.set("machine", name=answer.strip()),
+    ),
+    SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds),
+    SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
+    DAQ_QUESTION,
+    SetupQuestion(
+        "hammer",
+        "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)? Or none: no force sensor.",
+        "0 2.25 5",
+        partial(_current_sensor, "force"),
+        _set_hammer,
+        partial(_described_by_daq, "force"),
+    ),
+    SetupQuestion(
+        "accelerometer",
+        "Accelerometer: input of the DAQ, sensitivity (mV/g, on its calibration sheet), range (V)?",
+        "1 10 5",
+        partial(_current_sensor, "acceleration"),
+        partial(_set_sensor, "acceleration"),
+        partial(_described_by_daq, "acceleration"),
+    ),
+    SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
+    SetupQuestion("tool", f"{_TOOL_TEXT} {_TOOL_MATERIALS_TEXT}?", _EXAMPLE_TOOL, _current_tool, _set_tool),
+    SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),
+    SetupQuestion("program", _PROGRAM_TEXT, "slot: 8000 2 20 0.1", _current_program, _set_program),
 )
 """All questions, in their order."""
 
 
-def find_setup_question(name: str) -> setup.SetupQuestion:
+def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
     for question in SETUP_QUESTIONS:
         if question.name == name:

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
 from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
-from lobewatch.tool.assembly import Assembly
 
 LINE_KIND_MARKS = {
     "turns": ("turns of the spindle", Paint.FIRST, "|"),
@@ -28,16 +26,11 @@ MIN_SHOWN_AMPLITUDE = 1e-4
 
 
 def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
-    """Write the picture of the cuts in a recording to a file."""
-    save_figure(plot_cut_spectrum(comparisons), path)
-
-
-def plot_cut_spectrum(comparisons: Sequence[CutComparison]) -> Figure:
-    """Plot amplitude over frequency, a panel for each cut; only its title where there is no spectrum."""
+    """Plot amplitude over frequency to a file, a panel for each cut; only its title where there is no spectrum."""
     figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
     for axis, comparison in zip(axes, comparisons, strict=True):
         _draw_spectrum(axis, comparison)
-    return figure
+    save_figure(figure, path)
 
 
 def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
@@ -55,15 +48,12 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
     for name, lines in group_peaks(comparison.detected).items():
         label, colour, mark = LINE_KIND_MARKS[name]
         axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
-    if comparison.assembly is not None:
-        _draw_modes(axis, comparison.assembly)
+    tool = comparison.assembly
+    for direction, modes, dashes in () if tool is None else (("x", tool.x, ":"), ("y", tool.y, "--")):
+        label = f"modes in {direction}, at rest"
+        for mode in modes or ():
+            axis.axvline(mode.frequency, color=Paint.GOOD, ls=dashes, lw=1, label=label)
+            label = ""
     top = float(np.max(amplitude))
     axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(MIN_SHOWN_AMPLITUDE * top, 3 * top))
     axis.legend(loc="upper right", ncols=3, fontsize=8)
-
-
-def _draw_modes(axis: Axes, assembly: Assembly) -> None:
-    for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
-        for number, mode in enumerate(modes or ()):
-            label = f"modes in {name}, at rest" if number == 0 else None
-            axis.axvline(mode.frequency, color=Paint.GOOD, ls=dashes, lw=1, label=label)

@@ -44,9 +44,8 @@ FIGURE_STYLE: dict[Any, Any] = {
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a picture in the format that the ending names; ValueError for one that is not known."""
     if path.suffix.lower() not in (".svg", ".png", ".pdf"):
-        raise ValueError(
-            f"{path}: a picture cannot end in {path.suffix!r}; name a file that ends in .svg, .png or .pdf"
-        )
+        cure = "name a file that ends in .svg, .png or .pdf"
+        raise ValueError(f"{path}: a picture cannot end in {path.suffix!r}; {cure}")
     _disable_math_text(figure)
     with mpl.rc_context(FIGURE_STYLE):
         figure.savefig(path, dpi=150)
@@ -82,13 +81,9 @@ def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
     return figure, list(axes[:, 0])
 
 
+Point = tuple[float, float]
 LabelSide = Literal["right", "left", "above", "below"]
-LABEL_SIDES: dict[LabelSide, tuple[float, float]] = {
-    "right": (1, 0),
-    "left": (-1, 0),
-    "above": (0, 1),
-    "below": (0, -1),
-}
+LABEL_SIDES: dict[LabelSide, tuple[int, int]] = {"right": (1, 0), "left": (-1, 0), "above": (0, 1), "below": (0, -1)}
 LABEL_FONT_SIZE = 8.5
 """Font size of labels (points)."""
 PHONE_FONT_SIZE = 11.5
@@ -134,13 +129,7 @@ class LabelPlacer:
         self._may_lack = may_lack
         self._taken: list[_Box] = []
 
-    def add(
-        self,
-        text: str,
-        place: tuple[float, float],
-        colour: str = "black",
-        sides: Sequence[LabelSide] = tuple(LABEL_SIDES),
-    ) -> None:
+    def add(self, text: str, place: Point, color: str = "black", sides: Sequence[LabelSide] = (*LABEL_SIDES,)) -> None:
         """Add a label at the side of a point where it covers least, the first of several equal sides."""
         boxes = {side: self._box(text, place, side) for side in sides}
         best = min(boxes, key=lambda side: self._covered(boxes[side]))
@@ -148,49 +137,39 @@ class LabelPlacer:
             return
         self._taken.append(boxes[best])
         right, up = LABEL_SIDES[best]
-        self._axes.annotate(
-            text,
-            place,
-            xytext=(LABEL_DISTANCE * right, self._above * up),
-            textcoords="offset points",
-            fontsize=LABEL_FONT_SIZE,
-            color=colour,
-            ha={1: "left", -1: "right"}.get(int(right), "center"),
-            va={1: "bottom", -1: "top"}.get(int(up), "center"),
-            bbox=LABEL_BACKGROUND,
-        )
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": LABEL_FONT_SIZE, "bbox": LABEL_BACKGROUND}
+        style["ha"] = {1: "left", -1: "right"}.get(right, "center")
+        style["va"] = {1: "bottom", -1: "top"}.get(up, "center")
+        self._axes.annotate(text, place, (LABEL_DISTANCE * right, self._above * up), color=color, **style)
 
-    def reserve_area(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+    def reserve_area(self, low: Point, high: Point) -> None:
         """Keep labels out of the rectangle between two corners where they have a choice."""
         self._taken.append(_Box(*self._points(low), *self._points(high)))
 
-    def reserve_mark(self, place: tuple[float, float], size: float) -> None:
+    def reserve_mark(self, place: Point, size: float) -> None:
         """Keep labels off a mark of this size (points) where they have a choice."""
         x, y = self._points(place)
         self._taken.append(_Box(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
 
-    def _box(self, text: str, place: tuple[float, float], side: LabelSide) -> _Box:
+    def _box(self, text: str, place: Point, side: LabelSide) -> _Box:
         lines, (right, up) = text.split("\n"), LABEL_SIDES[side]
         wide, high = LETTER_WIDTH * self._room * max(map(len, lines)), LINE_HEIGHT * self._room * len(lines)
         x, y = self._points(place)
-        middle = x + right * (LABEL_DISTANCE + wide / 2), y + up * (self._above + high / 2)
-        return _Box(middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
+        x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (self._above + high / 2)
+        return _Box(x - wide / 2, y - high / 2, x + wide / 2, y + high / 2)
 
     def _covered(self, box: _Box) -> float:
         """Return the area of a box on other labels and outside of the axes."""
         inside = box.overlap(_Box(0, 0, *self._size))
         return box.area - inside + sum(box.overlap(taken) for taken in self._taken)
 
-    def _points(self, place: tuple[float, float]) -> tuple[float, float]:
-        shares = (
-            (value - low) / (high - low)
-            for value, (low, high) in zip(place, (self._axes.get_xlim(), self._axes.get_ylim()), strict=True)
-        )
-        x, y = (share * size for share, size in zip(shares, self._size, strict=True))
-        return x, y
+    def _points(self, place: Point) -> Point:
+        (x, y), (wide, high) = place, self._size
+        (left, right), (low, top) = self._axes.get_xlim(), self._axes.get_ylim()
+        return (x - left) / (right - left) * wide, (y - low) / (top - low) * high
 
     @property
-    def _size(self) -> tuple[float, float]:
+    def _size(self) -> Point:
         box = self._axes.get_window_extent()
         points = 72 / self._axes.figure.dpi
         return box.width * points, box.height * points

@@ -7,6 +7,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -83,8 +84,8 @@ def plot_lobes(
     wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
     wanted += [1e3 * cut.depth for cut in heard]
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
-    low, high = (now[1], now[1]) if band is None else (band.low, band.high)
-    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
+    edges = (now[1], now[1]) if band is None else (band.low, band.high)
+    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in edges)
     axes.fill_between(speed_rpm, high, 2 * top, color=Paint.NEWEST, alpha=0.10, lw=0)
     if band is not None:
         axes.fill_between(speed_rpm, low, high, color=Paint.NEWEST, alpha=0.35, lw=0, label=BAND_LABEL)
@@ -109,9 +110,8 @@ def plot_waterfall(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, 
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     top = _map_limit(depth)
     rows, columns = _cell_edges(date2num(times), 30.0), _cell_edges(speed_rpm, 1.0)
-    mesh = axes.pcolormesh(
-        columns, rows, np.minimum(depth * 1e3, top), cmap=DEPTH_COLORMAP, vmin=0, vmax=top, rasterized=True
-    )
+    style: dict[str, Any] = {"cmap": DEPTH_COLORMAP, "vmin": 0, "vmax": top, "rasterized": True}
+    mesh = axes.pcolormesh(columns, rows, np.minimum(depth * 1e3, top), **style)
     figure.colorbar(mesh, ax=axes, label=DEPTH_SCALE_LABEL)
     axes.yaxis.set_major_locator(AutoDateLocator())
     axes.yaxis.set_major_formatter(DateFormatter("%Y-%m-%d" if np.ptp(rows) > MAX_DAYS_WITH_TIME else "%Y-%m-%d %H:%M"))
@@ -172,45 +172,28 @@ def _draw_marks(
     """Draw test cuts, pockets and programs with their labels."""
     labels = LabelPlacer(axes, PHONE_FONT_SIZE, may_lack=True) if is_small else LabelPlacer(axes)
     draw_test_cuts(axes, heard, labels)
+    style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
     for i, pocket in enumerate(pockets):
-        _draw_pocket(axes, pocket, labels, WINDOW_LABEL if i == 0 else "")
-    for program in programs:
-        _draw_program(axes, program, labels)
+        (low, high), depth = pocket.window_rpm, pocket.depth_mm
+        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else WINDOW_LABEL, **style))
+        labels.reserve_area((low, 0.0), (high, depth))
+    places = [(program.program.speed_rpm, program.program.depth_mm) for program in programs]
+    for program, place in zip(programs, places, strict=True):
+        colour, mark = VERDICT_MARKS[program.stability]
+        axes.plot(*place, mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
+        labels.reserve_mark(place, PROGRAM_MARK_SIZE)
     for pocket in () if is_small else pockets:
         text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
         labels.add(text, (pocket.speed_rpm, pocket.depth_mm), POCKET_GREEN, ("above", "right", "left"))
-    for program in programs:
-        name, place = program.program.name, _program_point(program)
+    for program, place in zip(programs, places, strict=True):
+        name = program.program.name
         labels.add(name if is_small else f"{name}\n{program.stability}", place)
-
-
-def _draw_pocket(axes: Axes, pocket: Setting, labels: LabelPlacer, label: str) -> None:
-    low, high = pocket.window_rpm
-    box = Rectangle(
-        (low, 0), high - low, pocket.depth_mm, fc="white", ec=POCKET_GREEN, lw=1.2, hatch="////", label=label
-    )
-    axes.add_patch(box)
-    labels.reserve_area((low, 0.0), (high, pocket.depth_mm))
-
-
-def _draw_program(axes: Axes, verdict: Verdict, labels: LabelPlacer) -> None:
-    colour, mark = VERDICT_MARKS[verdict.stability]
-    axes.plot(*_program_point(verdict), mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
-    labels.reserve_mark(_program_point(verdict), PROGRAM_MARK_SIZE)
-
-
-def _program_point(verdict: Verdict) -> tuple[float, float]:
-    """Return speed (rpm) and axial depth of cut (mm) of a program."""
-    return verdict.program.speed_rpm, verdict.program.depth_mm
 
 
 def select_test_cuts(cuts: Sequence[CutEntry], name: str, tool: str, cut: Cut) -> list[CutEntry]:
     """Select usable test cuts of this tool, cutter and immersion, with the same name or the same coefficients."""
-    alike = [
-        heard
-        for heard in cuts
-        if heard.is_usable and heard.tool == tool and geometry_key(heard.cut) == geometry_key(cut)
-    ]
+    usable = (heard for heard in cuts if heard.is_usable and heard.tool == tool)
+    alike = [heard for heard in usable if geometry_key(heard.cut) == geometry_key(cut)]
     force = cut.tangential, cut.radial
     return [heard for heard in alike if heard.program == name or (heard.cut.tangential, heard.cut.radial) == force]
 
@@ -292,20 +275,17 @@ def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
     cut, tool = now.name, now.assembly.tool
     newest = None if now.assembly.predicted else logbook.measurement(now.assembly.tap_id)
     series = [] if newest is None else logbook.history.series(tool, newest.direction)
-    shown = [row for row in _pick_evenly(series) if row.x]
-    diagrams = [
-        (row.time, lobes[cut]) for row in shown if cut in (lobes := compute_row_lobes(row, logbook.machine, [cut]))
-    ]
-    if not diagrams:
+    shown = [row for row in pick_evenly(series, MAX_WATERFALL_ROWS) if row.x]
+    diagrams = [(row.time, compute_row_lobes(row, logbook.machine, [cut]).get(cut)) for row in shown]
+    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
+    if not limits:
         raise DataError(f"--waterfall shows measured lobes; no tap test with tool {tool!r} has any of {cut!r}")
+    times, depths = zip(*limits, strict=True)
     title = f"{logbook.machine.machine.name}: {cut}\nzero order"
-    depth = np.stack([lobes.depth for _, lobes in diagrams])
-    return plot_waterfall(speed_grid(logbook.machine), [time for time, _ in diagrams], depth, title)
+    return plot_waterfall(speed_grid(logbook.machine), times, np.stack(depths), title)
 
 
-def _pick_evenly(rows: Sequence[HistoryRow]) -> list[HistoryRow]:
-    """Return the first row, the newest, and others evenly spaced between them."""
-    return [
-        rows[i]
-        for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_WATERFALL_ROWS)).round().astype(int))
-    ]
+def pick_evenly(rows: Sequence[HistoryRow], most: int) -> list[HistoryRow]:
+    """Return the first row, the newest, and others evenly spaced between them, no more than `most`."""
+    places = np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int)
+    return [rows[i] for i in np.unique(places)]

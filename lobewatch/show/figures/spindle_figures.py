@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
-from lobewatch.logbook.chart_data import ModelFigureData
+from lobewatch.logbook import ModelFigureData
 from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
 from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 
@@ -33,6 +33,7 @@ CIRCLE_HALF_WIDTHS = 3.0
 """Range of a circle on either side of its resonance (half-power half-widths)."""
 
 
+VERTICAL_LABEL: dict[str, Any] = {"rotation": 90, "ha": "center", "va": "bottom"}
 TRUST_MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
 """Mark after the frequency of a mode."""
 
@@ -64,28 +65,18 @@ def _circle_rank(mode: Mode) -> tuple[int, float]:
 def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     f = state.frf.frequency
     axes.semilogy(f, np.abs(state.frf.accelerance), color=Paint.FIRST, lw=0.8, label="measured")
-    for i, band in enumerate(state.bands):
-        part = f[band.lines]
+    labels = "fit in its bands", "measured - fit"
+    for band in state.bands:
+        part, left = f[band.lines], state.residual(band)[0]
         size = (2 * np.pi * part) ** 2
-        left = state.residual(band)[0]
-        fitted = state.frf.receptance[band.lines] - left
-        axes.semilogy(
-            part, np.abs(fitted) * size, color=Paint.NEWEST, ls="--", label="fit in its bands" if i == 0 else None
-        )
-        axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label="measured - fit" if i == 0 else None)
+        fitted = np.abs(state.frf.receptance[band.lines] - left) * size
+        axes.semilogy(part, fitted, color=Paint.NEWEST, ls="--", label=labels[0])
+        axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label=labels[1])
+        labels = "", ""
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
     for mode, place in zip(modes, places, strict=True):
-        axes.annotate(
-            _mode_label(mode),
-            (place, 1.0),
-            xytext=(0, 2),
-            textcoords="offset points",
-            xycoords=("data", "axes fraction"),
-            rotation=90,
-            ha="center",
-            va="bottom",
-            fontsize=8,
-        )
+        coordinates = ("data", "axes fraction"), "offset points"
+        axes.annotate(_mode_label(mode), (place, 1.0), (0, 2), *coordinates, fontsize=8, **VERTICAL_LABEL)
     low, high = axes.get_ylim()
     is_frf = all(mode.has_stiffness for mode in modes)
     axes.set_ylabel("|accelerance| (m/s²/N)" if is_frf else "|spectrum of a decay| (m/s)")
@@ -121,19 +112,11 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
     axes.plot([], [], "o", color=Paint.NEWEST, ms=3, label="stable pole")
     for mode in modes:
         axes.axvline(mode.frequency, color=Paint.NEWEST, lw=0.6)
-    others = candidate_frequencies(state)
-    for frequency, place in zip(
-        others, _spread_labels(others.tolist(), MIN_LABEL_SPACING * np.ptp(axes.get_xlim())), strict=True
-    ):
-        axes.annotate(
-            _frequency_text(frequency),
-            (place, ORDER_AXIS_TOP),
-            rotation=90,
-            ha="center",
-            va="bottom",
-            fontsize=7,
-            color=Paint.NEWEST,
-        )
+    others = candidate_frequencies(state).tolist()
+    places = _spread_labels(others, MIN_LABEL_SPACING * np.ptp(axes.get_xlim()))
+    for frequency, place in zip(others, places, strict=True):
+        text, style = _frequency_text(frequency), {"fontsize": 7, "color": Paint.NEWEST, **VERTICAL_LABEL}
+        axes.annotate(text, (place, ORDER_AXIS_TOP), **style)
     axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
     axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
     axes.yaxis.set_major_locator(MultipleLocator(2))
@@ -165,11 +148,9 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     axes.plot(curve.real, curve.imag, color=Paint.NEWEST, lw=1, label="fit")
     axes.plot([0.0, top.real], [0.0, top.imag], color=Paint.ALARM, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(
-        f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}: {_phase_text(mode)}\n"
-        "mobility (mm/s/N)",
-        fontsize=8,
-    )
+    phase = f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°" if mode.phase_deg else "real"
+    named = f"{_frequency_text(mode.frequency)} Hz{TRUST_MARKS[assess_trust(mode)]}"
+    axes.set_title(f"{named}: {phase}\nmobility (mm/s/N)", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     axes.yaxis.set_major_locator(MaxNLocator(4))
@@ -178,13 +159,6 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
 def _mobility(frequency: Floats, receptance: Complexes) -> Complexes:
     """Return the mobility (mm/s/N)."""
     return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
-
-
-def _phase_text(mode: Mode) -> str:
-    """Return the phase of the modal constant with its standard error, or "real"."""
-    if not mode.phase_deg:
-        return "real"
-    return f"phase {format_with_error(mode.phase_deg, mode.phase_deg_std or None)}°"
 
 
 STEEL_GREY = "#c9d3dc"
@@ -196,9 +170,8 @@ def plot_model(picture: ModelFigureData) -> Figure:
     """Plot all figures of a model on one page."""
     with mpl.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=(12.0, 10.0), layout="constrained")
-        axes: dict[str, Axes] = figure.subplot_mosaic(
-            [["shaft", "curve"], ["shapes", "whirl"], ["frf", "frf"]], height_ratios=[0.8, 1.2, 1.1]
-        )
+        rows = [["shaft", "curve"], ["shapes", "whirl"], ["frf", "frf"]]
+        axes: dict[str, Axes] = figure.subplot_mosaic(rows, height_ratios=[0.8, 1.2, 1.1])
         figure.suptitle(picture.title)
     draw_shaft(axes["shaft"], picture.spindle)
     draw_shapes(axes["shapes"], picture.modes)
@@ -217,12 +190,9 @@ def draw_shaft(axes: Axes, spindle: Spindle) -> None:
         _draw_segment(axes, segment, start)
         start += segment.length
     for bearing in spindle.bearings:
-        radius = _radius_at(spindle, bearing.position) * 1e3
-        for side in (-1, 1):
-            marker = "^" if side < 0 else "v"
-            axes.plot(
-                bearing.position * 1e3, side * (radius + 5), marker, color=Paint.NEWEST, ms=7, mec="white", mew=0.5
-            )
+        z, radius = bearing.position * 1e3, _radius_at(spindle, bearing.position) * 1e3 + 5
+        for y, marker in ((-radius, "^"), (radius, "v")):
+            axes.plot(z, y, marker, color=Paint.NEWEST, ms=7, mec="white", mew=0.5)
     for mass in spindle.masses:
         axes.plot(mass.position * 1e3, 0, "o", color=Paint.ALARM, ms=9, mec="white")
     for joint in spindle.joints:
@@ -247,12 +217,9 @@ def _radius_at(spindle: Spindle, position: float) -> float:
     """Return the largest outer radius (m) of the segments at a position (m)."""
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
     slack = 1e-6 * ends[-1]
-    near = [
-        max(segment.diameters_at(0.0)[0], segment.diameters_at(1.0)[0])
-        for segment, a, b in zip(spindle.segments, ends[:-1], ends[1:], strict=True)
-        if a - slack <= position <= b + slack
-    ]
-    return max(near) / 2
+    places = zip(spindle.segments, ends[:-1], ends[1:], strict=True)
+    near = [segment for segment, a, b in places if a - slack <= position <= b + slack]
+    return max(segment.diameters_at(share)[0] for segment in near for share in (0.0, 1.0)) / 2
 
 
 def draw_shapes(axes: Axes, modes: Modes) -> None:
@@ -282,16 +249,15 @@ def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
     """Draw forward and backward whirl frequencies over speed, in the fixed and in the rotating frame."""
     speed = whirl.speed_rpm / 1e3
     for number, (colour, _) in zip(range(whirl.forward.shape[0]), MODE_LINES, strict=False):
-        first = number == 0
-        lines: Sequence[tuple[Floats, str, str]] = (
-            (whirl.forward[number], "-", "forward, from the housing"),
-            (whirl.backward[number], "--", "backward, from the housing"),
-            (whirl.rotating_forward[number], "-", "the same, turning with the shaft"),
-            (whirl.rotating_backward[number], "--", ""),
+        lines: Sequence[tuple[Floats, str, float, float, str]] = (
+            (whirl.forward, "-", 1.5, 1.0, "forward, from the housing"),
+            (whirl.backward, "--", 1.5, 1.0, "backward, from the housing"),
+            (whirl.rotating_forward, "-", 0.8, 0.55, "the same, turning with the shaft"),
+            (whirl.rotating_backward, "--", 0.8, 0.55, ""),
         )
-        for index, (values, dashes, label) in enumerate(lines):
-            style: dict[str, Any] = {"lw": 1.5, "alpha": 1.0} if index < 2 else {"lw": 0.8, "alpha": 0.55}
-            axes.plot(speed, values, color=colour, ls=dashes, label=label if first and label else None, **style)
+        for values, dashes, lw, alpha, label in lines:
+            label = label if number == 0 else ""
+            axes.plot(speed, values[number], color=colour, ls=dashes, label=label, lw=lw, alpha=alpha)
     top = float(np.max(whirl.forward)) * 1.1
     axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once a revolution")
     axes.axvspan(0, highest_speed / 1e3, color=Paint.GOOD, alpha=0.10, lw=0, label="speed range of the machine")
@@ -304,9 +270,8 @@ def draw_model_frf(axes: Axes, model: Frf, measured: Frf | None) -> None:
     """Draw the magnitude of the receptance of the model and of the newest tap test."""
     if measured is not None:
         shown = measured.in_band((float(model.frequency[0]), float(model.frequency[-1])))
-        axes.semilogy(
-            shown.frequency, np.abs(shown.receptance) * 1e9, color=Paint.FIRST, lw=1.0, label="measured, newest"
-        )
+        size = np.abs(shown.receptance) * 1e9
+        axes.semilogy(shown.frequency, size, color=Paint.FIRST, lw=1.0, label="measured, newest")
     axes.semilogy(model.frequency, np.abs(model.receptance) * 1e9, color=Paint.NEWEST, lw=1.6, ls="--", label="model")
     axes.set(xlabel="frequency (Hz)", ylabel="|receptance| (nm/N)")
     axes.set_xlim(model.frequency[0], model.frequency[-1])

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
-from lobewatch.machine.settings.setup_tables import LimitsTable
+from lobewatch.machine import LimitsTable
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import Paint, new_axes
 
@@ -31,9 +31,6 @@ class TrendMarks(NamedTuple):
     """Times and texts of maintenance events."""
     excluded: Sequence[tuple[datetime, float]] = ()
     """Times and values of excluded tap tests."""
-
-
-NO_MARKS = TrendMarks()
 
 
 class TrendCurve(NamedTuple):
@@ -59,10 +56,8 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
     past = point_days(trend.points)
     near = forecast.dates <= max(past[-1] + FORECAST_SHARE * (past[-1] - past[0]), forecast.dates[1])
     low, high = (trend.first_value * np.exp(forecast.quantile_line(quantile)[near] / 100) for quantile in (0.1, 0.9))
-    line = np.append(forecast.fitted, forecast.mean_line[near])
-    return TrendCurve(
-        np.append(past, forecast.dates[near]), trend.first_value * np.exp(line / 100), forecast.dates[near], low, high
-    )
+    line = trend.first_value * np.exp(np.append(forecast.fitted, forecast.mean_line[near]) / 100)
+    return TrendCurve(np.append(past, forecast.dates[near]), line, forecast.dates[near], low, high)
 
 
 def plot_frf(
@@ -74,10 +69,8 @@ def plot_frf(
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [
-        (now, "now", Paint.NEWEST, "-"),
-        *([(earliest, "first", Paint.FIRST, "--")] if earliest is not None else []),
-    ]
+    tests = [(now, "now", Paint.NEWEST, "-")]
+    tests += [] if earliest is None else [(earliest, "first", Paint.FIRST, "--")]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -101,7 +94,7 @@ def plot_trend(
     stds: Floats,
     label: str,
     limits: LimitsTable | None = None,
-    marks: TrendMarks = NO_MARKS,
+    marks: TrendMarks | None = None,
     course: TrendCurve | None = None,
     size: tuple[float, float] = TREND_FIGURE_SIZE,
 ) -> Figure:
@@ -113,21 +106,19 @@ def plot_trend(
     days = date2num(times)
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=Paint.NEWEST, capsize=2)
     if limits is not None:
-        for percent, colour, dashes in (
-            (limits.frequency_warn_percent, Paint.FIRST, "--"),
-            (limits.frequency_alarm_percent, Paint.ALARM, "-"),
-        ):
+        warn, alarm = limits.frequency_warn_percent, limits.frequency_alarm_percent
+        style: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
+        for percent, colour, dashes in ((warn, Paint.FIRST, "--"), (alarm, Paint.ALARM, "-")):
             level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
-            axes.annotate(
-                f"-{percent:g} %", (1, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=colour
-            )
+            axes.annotate(f"-{percent:g} %", (1, level), color=colour, **style)
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
     if course is not None:
         axes.plot(course.days, course.line, color=Paint.NEWEST, lw=1)
         axes.fill_between(course.days_ahead, course.low, course.high, color=Paint.NEWEST, alpha=0.2, lw=0)
-    _add_marks(axes, marks)
+    if marks is not None:
+        _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
@@ -143,7 +134,5 @@ def _add_marks(axes: Axes, marks: TrendMarks) -> None:
     for time, text in marks.events:
         day = date2num(time)
         axes.axvline(day, color=Paint.EVENT, ls=":", lw=1)
-        place: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points", "rotation": 90, "fontsize": 8}
-        axes.annotate(
-            shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place
-        )
+        shown, coordinates = shorten(text, 26, placeholder="…"), (("data", "axes fraction"), "offset points")
+        axes.annotate(shown, (day, 0), (2, 2), *coordinates, va="bottom", rotation=90, fontsize=8)

@@ -8,9 +8,10 @@ import os
 import secrets
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -71,18 +72,11 @@ def write_parquet(base: Any, query: str, path: Path) -> int:
 def _table_arrays(table: TapTestTable) -> dict[str, NDArray[Any]]:
     """Return the columns of a table as arrays, by name."""
     n, of_series = len(table.tap_id), np.array(table.series_numbers, np.int64)
-    tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
-    return {
-        "folder": np.full(n, table.folder, object),
-        "machine": np.full(n, table.machine, object),
-        "tap_id": np.array(table.tap_id, object),
-        "time": np.array(table.time, np.float64),
-        "tool": tools[of_series - 1],
-        "direction": directions[of_series - 1],
-        "series": of_series,
-        "remarks": np.array(table.remarks, object),
-        **dict(zip(TAP_NUMBER_COLUMNS, table.numbers.T, strict=True)),
-    }
+    tools, directions = (np.array([place[part] for place in table.series], object)[of_series - 1] for part in (0, 1))
+    columns = {name: np.full(n, getattr(table, name), object) for name in ("folder", "machine")}
+    columns |= {name: np.array(getattr(table, name), object) for name in ("tap_id", "remarks")}
+    columns |= {"time": np.array(table.time, np.float64), "tool": tools, "direction": directions, "series": of_series}
+    return columns | dict(zip(TAP_NUMBER_COLUMNS, table.numbers.T, strict=True))
 
 
 CSV_DIGITS, CSV_ERROR_DIGITS = 7, 3
@@ -127,44 +121,29 @@ def _write_sqlite(tables: Iterable[TapTestTable], path: Path) -> int:
     with closing(sqlite3.connect(path, isolation_level=None)) as base:
         base.execute("PRAGMA journal_mode = OFF")
         base.execute("PRAGMA synchronous = OFF")  # a new file under another name: whole, or thrown away
-        names = ", ".join(TAP_NUMBER_COLUMNS)
-        base.executescript(
-            SQLITE_SCHEMA.format(numbers=", ".join(f"{name} REAL" for name in TAP_NUMBER_COLUMNS), names=names)
-        )
+        numbers = ", ".join(f"{name} REAL" for name in TAP_NUMBER_COLUMNS)
+        base.executescript(SQLITE_SCHEMA.format(numbers=numbers, names=", ".join(TAP_NUMBER_COLUMNS)))
         base.execute("BEGIN")
         for machine, table in enumerate(tables, 1):
             base.execute("INSERT INTO machine VALUES (?, ?, ?)", (machine, table.folder, table.machine))
             series_rows = [(series + n, machine, n, *place) for n, place in enumerate(table.series, 1)]
             base.executemany("INSERT INTO series VALUES (?, ?, ?, ?, ?)", series_rows)
             of_series = [series + n for n in table.series_numbers]
-            numbers = _compact_numbers(table.numbers).T.tolist()
-            base.executemany(insert, zip(of_series, table.tap_id, table.time, table.remarks, *numbers, strict=True))
+            values = np.where(table.numbers > 1e7, np.rint(table.numbers), table.numbers)  # integers: half the bytes
+            taps = zip(of_series, table.tap_id, table.time, table.remarks, *values.T.tolist(), strict=True)
+            base.executemany(insert, taps)
             count, series = count + len(of_series), series + len(table.series)
         base.execute("COMMIT")
     return count
 
 
-def _compact_numbers(numbers: Floats) -> Floats:
-    """Round large numbers to integers, which SQLite stores in half the bytes, with a relative error below 1e-7."""
-    return np.where(numbers > 1e7, np.rint(numbers), numbers)
-
-
-def _write_csv(tables: Iterable[TapTestTable], path: Path) -> int:
-    with path.open("wb") as file:
-        return _write_csv_rows(tables, file)
-
-
-def _write_gzip(tables: Iterable[TapTestTable], path: Path) -> int:
-    with path.open("wb") as file, gzip.GzipFile("", "wb", 1, file, mtime=0) as zipped:
-        return _write_csv_rows(tables, zipped)
-
-
-def _write_csv_rows(tables: Iterable[TapTestTable], file: IO[bytes] | gzip.GzipFile) -> int:
+def _write_csv(tables: Iterable[TapTestTable], path: Path, *, zipped: bool = False) -> int:
     count = 0
-    file.write(",".join(EXPORT_COLUMNS).encode() + b"\n")
-    for table in tables:
-        file.write("".join(_csv_rows(table)).encode())
-        count += len(table.tap_id)
+    with path.open("wb") as file, gzip.GzipFile("", "wb", 1, file, mtime=0) if zipped else nullcontext(file) as out:
+        out.write(",".join(EXPORT_COLUMNS).encode() + b"\n")
+        for table in tables:
+            out.write("".join(_csv_rows(table)).encode())
+            count += len(table.tap_id)
     return count
 
 
@@ -202,7 +181,7 @@ def _write_parquet(tables: Iterable[TapTestTable], path: Path) -> int:
 TABLE_WRITERS: dict[str, Callable[[Iterable[TapTestTable], Path], int]] = {
     ".sqlite": _write_sqlite,
     ".csv": _write_csv,
-    ".csv.gz": _write_gzip,
+    ".csv.gz": partial(_write_csv, zipped=True),
     ".parquet": _write_parquet,
 }
 """Writer of a table for each file name extension."""
@@ -236,14 +215,15 @@ def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome
             months = base.execute("SELECT DISTINCT month FROM missing ORDER BY month").fetchall()
             added = sum(_write_month(base, folder, month) for (month,) in months)
         (count,) = base.execute("SELECT count(*) FROM lines").fetchone()
-        outdated = _outdated_months(base, [table.folder for table in tables])
+        differ = " OR ".join(f"present.{name} IS DISTINCT FROM lines.{name}" for name in EXPORT_COLUMNS[3:])
+        query = OUTDATED_QUERY.format(differ=differ)
+        outdated = [month for (month,) in base.execute(query, [[table.folder for table in tables]]).fetchall()]
     sentences = [f"{added} of them are new there"]
     if outdated:
         months = ", ".join(f"month={month}" for month in outdated)
-        sentences.append(
-            f"{months}: some there were excluded or analysed anew since; to have them as they are now, delete "
-            f"{'this folder' if len(outdated) == 1 else 'these folders'} and export again"
-        )
+        folders = "this folder" if len(outdated) == 1 else "these folders"
+        cure = f"to have them as they are now, delete {folders} and export again"
+        sentences.append(f"{months}: some there were excluded or analysed anew since; {cure}")
     return ExportOutcome(count, {"folder": str(folder), "added": added, "outdated_months": outdated}, sentences)
 
 
@@ -273,8 +253,3 @@ def _write_month(base: Any, folder: Path, month: str) -> int:
         temporary.unlink(missing_ok=True)
     sync_folder(place)
     return count
-
-
-def _outdated_months(base: Any, folders: list[str]) -> list[str]:
-    differ = " OR ".join(f"present.{name} IS DISTINCT FROM lines.{name}" for name in EXPORT_COLUMNS[3:])
-    return [month for (month,) in base.execute(OUTDATED_QUERY.format(differ=differ), [folders]).fetchall()]

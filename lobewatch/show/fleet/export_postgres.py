@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 from acquisition import DataError
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
@@ -59,17 +59,6 @@ PSYCOPG_LOG.addHandler(logging.NullHandler())
 PSYCOPG_LOG.propagate = False
 
 
-class _ExportCounts(NamedTuple):
-    """Numbers of tap tests."""
-
-    read: int
-    """Number of tap tests read."""
-    written: int
-    """Number of rows that were added or changed."""
-    set_aside: int
-    """Number of stored rows that no longer count."""
-
-
 def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
@@ -78,17 +67,16 @@ def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     the server fails; rows written before that stay.
     """
     place, remaining = server_name(address), iter(tables)
-    total = _ExportCounts(0, 0, 0)
+    read = written = set_aside = 0
     with _connection(address, place) as connection:
         is_hypertable = _make_table(connection)
         while (counts := _write_next(connection, remaining)) is not None:
-            total = _ExportCounts(*map(sum, zip(total, counts, strict=True)))
+            read, written, set_aside = read + counts[0], written + counts[1], set_aside + counts[2]
     kind = "a hypertable of TimescaleDB" if is_hypertable else "a plain table"
-    sentences = [f"{POSTGRES_TABLE} is {kind}; {total.written} of them written, the others stand there as they are"]
-    if total.set_aside:
-        sentences.append(f"{total.set_aside} there count no longer")
-    fields = {"written": total.written, "set_aside": total.set_aside, "hypertable": is_hypertable}
-    return ExportOutcome(total.read, {"database": place, **fields}, sentences)
+    sentences = [f"{POSTGRES_TABLE} is {kind}; {written} of them written, the others stand there as they are"]
+    sentences += [f"{set_aside} there count no longer"] if set_aside else []
+    fields = {"database": place, "written": written, "set_aside": set_aside, "hypertable": is_hypertable}
+    return ExportOutcome(read, fields, sentences)
 
 
 def server_name(address: str) -> str:
@@ -115,9 +103,8 @@ def _connection(address: str, place: str) -> Iterator[Any]:
     from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
     given = conninfo_to_dict(address)
-    watchful = make_conninfo(
-        address, **{name: value for name, value in CONNECTION_TIMEOUTS.items() if name not in given}
-    )
+    missing = {name: value for name, value in CONNECTION_TIMEOUTS.items() if name not in given}
+    watchful = make_conninfo(address, **missing)
     try:
         with psycopg.connect(watchful, autocommit=True) as connection:
             connection.execute(f"SET lock_timeout = '{POSTGRES_LOCK_WAIT}s'")
@@ -143,11 +130,17 @@ def _make_table(connection: Any) -> bool:
         return bool(has_timescale)
 
 
-def _write_next(connection: Any, remaining: Iterator[TapTestTable]) -> _ExportCounts | None:
-    """Read the next machines and write them; None where none are left."""
+def _write_next(connection: Any, remaining: Iterator[TapTestTable]) -> tuple[int, int, int] | None:
+    """Read the next machines and write them; None where none are left.
+
+    Return the numbers of tap tests read, of rows added or changed, and of stored rows that no longer count.
+    """
+    batch, count = list[TapTestTable](), 0
     with connection.transaction(), connection.cursor() as cursor:
         cursor.execute(EXPORT_LOCK_QUERY)
-        batch = _read_batch(remaining)
+        while count < POSTGRES_BATCH_TAPS and (table := next(remaining, None)) is not None:
+            batch.append(table)
+            count += len(table.tap_id)
         if not batch:
             return None
         cursor.execute(CREATE_INCOMING)
@@ -156,15 +149,7 @@ def _write_next(connection: Any, remaining: Iterator[TapTestTable]) -> _ExportCo
                 copy.write_row(row)
         written = cursor.execute(UPSERT).rowcount
         set_aside = cursor.execute(MARK_EXCLUDED, [[table.folder for table in batch]]).rowcount
-    return _ExportCounts(sum(len(table.tap_id) for table in batch), written, set_aside)
-
-
-def _read_batch(remaining: Iterator[TapTestTable]) -> list[TapTestTable]:
-    batch, count = list[TapTestTable](), 0
-    while count < POSTGRES_BATCH_TAPS and (table := next(remaining, None)) is not None:
-        batch.append(table)
-        count += len(table.tap_id)
-    return batch
+    return count, written, set_aside
 
 
 def _table_rows(table: TapTestTable) -> Iterator[Sequence[Any]]:

@@ -4,32 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any
 
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
-from lobewatch.monitoring.threshold_dates import (
-    UNIX_EPOCH,
-    ThresholdDates,
-    build_forecast_rows,
-    build_limit_row,
-    find_next_limit,
-)
-from lobewatch.show.terminal.output import align_columns, format_csv, make_printable
+from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, build_limit_row, find_next_limit
+from lobewatch.monitoring.trend import date_of_days
+from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
 """Codes of reasons that have columns of their own."""
 
 
-def fleet_rows(machines: Sequence[FleetMachine]) -> list[dict[str, Any]]:
+def fleet_rows(machines: Sequence[FleetMachine]) -> list[JsonObject]:
     """Return a row for each machine, in their order."""
     return [fleet_row(machine) for machine in machines]
 
 
-def fleet_row(machine: FleetMachine) -> dict[str, Any]:
+def fleet_row(machine: FleetMachine) -> JsonObject:
     """Return the row of one machine, with the series of the largest frequency drop."""
     summary, dated = machine.summary, machine.current
     ahead = find_next_limit(summary.limits)
@@ -75,7 +70,7 @@ def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -
 
 
 def _month_text(days: float | None) -> str:
-    return "" if days is None else f"{UNIX_EPOCH + timedelta(days=days):%Y-%m}"
+    return "" if days is None else f"{date_of_days(days):%Y-%m}"
 
 
 FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
@@ -97,7 +92,13 @@ def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
-    return _to_one_line(row["key"]), light, _drop_text(row), _due_text(row), row["limit"]
+    drop = "" if row["fall"] is None else format_with_error(row["fall"], row["fall_std"])
+    drop = "first test" if row["fall_std"] == 0 else drop
+    due, left = "", row["days_left"]
+    if left is not None:
+        last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
+        due = f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")
+    return _to_one_line(row["key"]), light, drop, due, row["limit"]
 
 
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
@@ -110,19 +111,3 @@ def _machine_notes(row: Mapping[str, Any]) -> list[str]:
 
 def _to_one_line(text: str) -> str:
     return make_printable(text).replace("\n", " ").replace("\t", " ")
-
-
-def _drop_text(row: Mapping[str, Any]) -> str:
-    if row["fall"] is None:
-        return ""
-    if row["fall_std"] == 0:
-        return "first test"
-    return format_with_error(row["fall"], row["fall_std"])
-
-
-def _due_text(row: Mapping[str, Any]) -> str:
-    left = row["days_left"]
-    if left is None:
-        return ""
-    last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
-    return f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")

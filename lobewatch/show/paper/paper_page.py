@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from acquisition import DataError
 from acquisition.file_io import atomic_write, make_folder
-from dsm import WhirlMap, mode_shapes
+from dsm import mode_shapes
 from lobewatch.arrays import Complexes, Floats
 from lobewatch.paper import PaperStudy, printed
 from lobewatch.paper.finite_elements import ELEMENT_COUNTS, ElementKind
@@ -58,14 +58,6 @@ def _plot_convergence(study: PaperStudy) -> Figure:
     return figure
 
 
-def _plot_real_part(study: PaperStudy) -> Figure:
-    return _plot_response(study, "Re")
-
-
-def _plot_imaginary_part(study: PaperStudy) -> Figure:
-    return _plot_response(study, "Im")
-
-
 def _plot_response(study: PaperStudy, part: str) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
     tap = study.tap
@@ -73,19 +65,15 @@ def _plot_response(study: PaperStudy, part: str) -> Figure:
     def values(receptance: Complexes) -> Floats:
         return (receptance.real if part == "Re" else receptance.imag) * 1e6
 
-    axes.plot(
-        tap.frf.frequency, values(tap.frf.receptance), color=Paint.NEWEST, lw=1.8, label="mode with the paper's numbers"
-    )
-    surrogate = f"surrogate, {len(tap.surrogate_modes)} modes"
-    axes.plot(
-        tap.surrogate_frf.frequency, values(tap.surrogate_frf.receptance), color=Paint.FIRST, ls="--", label=surrogate
-    )
+    label, surrogate = "mode with the paper's numbers", f"surrogate, {len(tap.surrogate_modes)} modes"
+    axes.plot(tap.frf.frequency, values(tap.frf.receptance), color=Paint.NEWEST, lw=1.8, label=label)
+    frequency, receptance = tap.surrogate_frf.frequency, tap.surrogate_frf.receptance
+    axes.plot(frequency, values(receptance), color=Paint.FIRST, ls="--", label=surrogate)
     hits = tap.tapped.in_band(RESPONSE_BAND)
     axes.plot(hits.frequency, values(hits.receptance), ".", color=Paint.GOOD, ms=5, label="ten emulated hits on it")
     if part == "Re":
-        below, above = tap.extremes
-        _draw_mark(axes, tap.measured.receptance(np.array([below])).real[0] * 1e6, below, "omega_A")
-        _draw_mark(axes, tap.measured.receptance(np.array([above])).real[0] * 1e6, above, "omega_B")
+        for at, name in zip(tap.extremes, ("omega_A", "omega_B"), strict=True):
+            _draw_mark(axes, tap.measured.receptance(np.array([at])).real[0] * 1e6, at, name)
     else:
         _draw_mark(axes, tap.depth * 1e6, tap.measured.frequency, "D")
     axes.axhline(0, color="black", lw=0.6)
@@ -100,21 +88,11 @@ def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
     axes.annotate(f"{name}: {frequency:.1f} Hz, {height:.4f} µm/N", (frequency, height), **text)
 
 
-def _plot_rigid_whirl(study: PaperStudy) -> Figure:
-    return _plot_whirl((study.plain.rigid_whirl, study.shear.rigid_whirl), printed.RIGID_CRITICAL_SPEED)
-
-
-def _plot_free_whirl(study: PaperStudy) -> Figure:
-    return _plot_whirl((study.plain.whirl, study.shear.whirl), printed.CRITICAL_SPEED)
-
-
-def _plot_whirl(maps: tuple[WhirlMap, WhirlMap], critical: float) -> Figure:
+def _plot_whirl(study: PaperStudy, whirl: str, critical: float) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
-    plain, shear = maps
-    speed = plain.speed_rpm / 1e3
-    axes.plot(
-        speed, plain.rotating_forward[0], color=Paint.NEWEST, lw=1.8, label="seen from the shaft, as in the paper"
-    )
+    plain, shear = (getattr(shaft, whirl) for shaft in (study.plain, study.shear))
+    speed, label = plain.speed_rpm / 1e3, "seen from the shaft, as in the paper"
+    axes.plot(speed, plain.rotating_forward[0], color=Paint.NEWEST, lw=1.8, label=label)
     axes.plot(speed, plain.forward[0], color=Paint.GOOD, lw=1.8, ls="--", label="seen from the housing")
     label = "the same with shear and gyroscopic moments"
     axes.plot(speed, shear.rotating_forward[0], color=Paint.NEWEST, lw=0.9, ls=":")
@@ -130,19 +108,16 @@ def _plot_whirl(maps: tuple[WhirlMap, WhirlMap], critical: float) -> Figure:
 
 def _plot_stiffness_curve(study: PaperStudy) -> Figure:
     figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
-    for shaft, name, dashes in (
-        (study.plain, "Euler-Bernoulli, as in the paper", "-"),
-        (study.shear, "Timoshenko", "--"),
-    ):
+    looks = (study.plain, "Euler-Bernoulli, as in the paper", "-"), (study.shear, "Timoshenko", "--")
+    for shaft, name, dashes in looks:
         axes.semilogx(*shaft.curve, color=Paint.NEWEST, ls=dashes, label=f"surrogate, {name}")
         axes.axhline(shaft.rigid_frequency, color=Paint.FIRST, lw=0.8, ls=dashes)
     axes.annotate("rigid bearings", (1.2e7, study.plain.rigid_frequency + 25), color=Paint.FIRST, fontsize=9)
     points = (printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS), (printed.FREQUENCY, printed.OLD_FREQUENCY)
     axes.plot(*points, label="paper, new and old", **PAPER_MARK)
     axes.plot(1e13, printed.RIGID_FREQUENCY, label="paper, rigid", **(PAPER_MARK | {"marker": "s"}))
-    axes.set(
-        xlabel="stiffness of each bearing (N/m)", ylabel="first frequency (Hz)", xlim=(1e7, 1.5e13), ylim=(0, 2600)
-    )
+    axes.set(xlabel="stiffness of each bearing (N/m)", ylabel="first frequency (Hz)")
+    axes.set(xlim=(1e7, 1.5e13), ylim=(0, 2600))
     axes.legend(loc="lower right")
     return figure
 
@@ -158,10 +133,8 @@ def _plot_paper_lobes(study: PaperStudy) -> Figure:
     for chart, label, colour, dashes in looks:
         depth = np.minimum(chart.depth / lobes.new.minimum.depth, 2 * MAX_DEPTH_RATIO)
         axes.plot(chart.speed_rpm / 1e3, depth, color=colour, ls=dashes, lw=1.5, label=label)
-    before, after = lobes.pocket
-    axes.annotate(
-        "", (after / 1e3, 5.2), (before / 1e3, 5.2), arrowprops={"arrowstyle": "->", "color": "black", "lw": 1.2}
-    )
+    before, after = ((speed / 1e3, 5.2) for speed in lobes.pocket)
+    axes.annotate("", after, before, arrowprops={"arrowstyle": "->", "color": "black", "lw": 1.2})
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="limiting depth / lowest limit, new (-)")
     axes.set(xlim=(lobes.new.speed_rpm[0] / 1e3, lobes.new.speed_rpm[-1] / 1e3), ylim=(0, MAX_DEPTH_RATIO))
     axes.legend(loc="upper left")
@@ -173,18 +146,21 @@ class PaperFigure(NamedTuple):
 
     caption: str
     """Caption of the figure."""
-    draw: Callable[[PaperStudy], Figure]
-    """Function that draws it."""
+    draw: Callable[..., Figure]
+    """Function that draws it from the study."""
+    options: tuple[Any, ...] = ()
+    """Further arguments of the function."""
 
 
+RIGID_WHIRL, WHIRL = ("rigid_whirl", printed.RIGID_CRITICAL_SPEED), ("whirl", printed.CRITICAL_SPEED)
 PAPER_FIGURES: Mapping[str, PaperFigure] = {
     "fig-3": PaperFigure("Fig. 3: the surrogate with its ten bearings, and its first modes", _plot_shaft),
     "fig-8": PaperFigure("Fig. 8: the first frequency over the stiffness of each bearing", _plot_stiffness_curve),
     "convergence": PaperFigure("Finite elements against the exact first frequency", _plot_convergence),
-    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _plot_rigid_whirl),
-    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _plot_free_whirl),
-    "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _plot_real_part),
-    "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_imaginary_part),
+    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _plot_whirl, RIGID_WHIRL),
+    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _plot_whirl, WHIRL),
+    "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _plot_response, ("Re",)),
+    "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_response, ("Im",)),
     "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _plot_paper_lobes),
 }
 """Figures 3 and 5 to 10, and the convergence of the finite elements, by file name."""
@@ -207,7 +183,7 @@ def write_paper_page(study: PaperStudy, folder: Path) -> Path:
         raise DataError(f"{folder}: is a file; name a folder with --out")
     make_folder(folder / "images")
     for name, picture in PAPER_FIGURES.items():
-        save_figure(picture.draw(study), folder / "images" / f"paper-{name}.png")
+        save_figure(picture.draw(study, *picture.options), folder / "images" / f"paper-{name}.png")
     page = folder / PAPER_PAGE_NAME
     atomic_write(page, render_paper_page(study).encode())
     return page

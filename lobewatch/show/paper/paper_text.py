@@ -5,10 +5,9 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from lobewatch.paper import Claim, Comparison, PaperStudy
-from lobewatch.show.terminal.json_fields import json_fields
+from lobewatch.paper import Comparison, PaperStudy
+from lobewatch.show.terminal.output import JsonObject, json_fields
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
@@ -22,7 +21,7 @@ NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference r
 CLAIM_FIELDS = json_fields("claim=text verdict evidence")
 
 
-def paper_json(study: PaperStudy, page: Path | None) -> dict[str, Any]:
+def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
     """Return every number and every claim of the paper, and the page that was written."""
     rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {
@@ -43,13 +42,8 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
             yield from _indent(row.reason, width)
     yield from ("", "What the paper claims, and whether it holds on the surrogate")
     for claim in study.claims:
-        yield from textwrap.wrap(claim_text(claim), width)
+        yield from textwrap.wrap(f"{claim.verdict}: {claim.text}", width)
         yield from _indent(claim.evidence, width)
-
-
-def claim_text(claim: Claim) -> str:
-    """Return a claim with the verdict on it."""
-    return f"{claim.verdict}: {claim.text}"
 
 
 def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
@@ -77,10 +71,8 @@ def difference_text(row: Comparison) -> str:
 
 
 def _table_line(texts: tuple[str, ...]) -> str:
-    sides = "<<>><>"
-    return " ".join(
-        f"{text:{side}{width}}" for text, side, width in zip(texts, sides, PAPER_COLUMN_WIDTHS, strict=True)
-    ).rstrip()
+    columns = zip(texts, "<<>><>", PAPER_COLUMN_WIDTHS, strict=True)
+    return " ".join(f"{text:{side}{width}}" for text, side, width in columns).rstrip()
 
 
 def _indent(text: str, width: int) -> list[str]:

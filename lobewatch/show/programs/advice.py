@@ -1,4 +1,4 @@
-"""Show verdicts with advice, for `lobewatch check` and the report."""
+"""Show verdicts with advice, for `lobewatch check` and the report, and stability lobes with recommended pockets."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from rich.table import Table
 
-from acquisition import Remark
-from lobewatch.logbook import Logbook
-from lobewatch.logbook.analysis import Analysis
-from lobewatch.machine import Machine
+from acquisition import Remark, merge_remarks
+from lobes import PocketShift, StabilityLobes
+from lobewatch.logbook import Analysis, LobeComparison, Logbook
+from lobewatch.logbook.chart_data import NO_POCKET_CODE
+from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.cut_range import CutRange
-from lobewatch.show.programs.verdicts import verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import count_noun, remark_lines
+from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
@@ -63,12 +62,24 @@ def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvi
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.initial_verdict(verdict))
 
 
-def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> dict[str, Any]:
+setting_json = json_fields("speed_rpm depth_mm window_rpm depth_margin frequency_left=drop_margin")
+"""Function that returns a recommended speed and depth with its robustness."""
+ADVICE_FIELDS = json_fields(
+    """
+    was_stable_at_first=first_verdict.is_stable verdict_at_first=first_verdict.stability advice=advice.best
+    advice_here=advice.deepest_here tolerable_decay=advice.tolerable_drop remarks
+    """,
+    {"advice": setting_json, "advice_here": setting_json},
+)
+
+
+def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> JsonObject:
     """Return all programs with advice, and how many may not be run; remarks: on the files."""
-    return {"programs": [advice_json(program) for program in programs], **count_unsafe(programs), "remarks": remarks}
+    advised = [verdict_json(program.verdict) | ADVICE_FIELDS(program) for program in programs]
+    return {"programs": advised, **count_unsafe(programs), "remarks": remarks}
 
 
-def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
+def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> Texts:
     """Return all programs in words: the table, the advice, and notes on reading it."""
     decays = [frequency_margin_text(program.advice) for program in programs]
     verdicts = [program.verdict for program in programs]
@@ -78,18 +89,6 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
         *verdict_notes(verdicts, machine),
         *remark_lines([*remarks, *(remark for program in programs for remark in program.other_remarks)]),
     ]
-
-
-ADVICE_FIELDS = json_fields("""
-    was_stable_at_first=first_verdict.is_stable verdict_at_first=first_verdict.stability advice=advice.best
-    advice_here=advice.deepest_here tolerable_decay=advice.tolerable_drop remarks
-""")
-
-
-def advice_json(program: ProgramAdvice) -> dict[str, Any]:
-    """Return one program with its verdict and advice."""
-    settings = {"advice": setting_json(program.advice.best), "advice_here": setting_json(program.advice.deepest_here)}
-    return verdict_json(program.verdict) | ADVICE_FIELDS(program) | settings
 
 
 def frequency_margin_text(advice: Advice) -> str:
@@ -133,17 +132,20 @@ def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
     elif verdict.stability is Stability.DOUBTFUL:
         settles = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
         texts = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
-        yield f"{name}: {'; '.join([*texts, *_interim_texts(program, machine)])}"
+        if verdict.assembly is not None and is_compliance_known(verdict.program, verdict.assembly):
+            texts.append(f"until then {_alternative_text(program, machine)}")  # open measurements come first
+        yield f"{name}: {'; '.join(texts)}"
     if verdict.is_beyond_drive:
-        yield f"{name}: [drive] allows no more than {_floor_depth_text(verdict.drive_limit)} mm at this speed"
+        allowed = math.floor(verdict.drive_limit * 1e5) / 100
+        yield f"{name}: [drive] allows no more than {allowed:.2f} mm at this speed"
 
 
 def _chatter_text(program: ProgramAdvice) -> str:
     verdict = program.verdict
     word = "period-two chatter" if verdict.kind == "flip" else "chatter"
     where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    text = f"{word}{where}{worst_feed_text(verdict)}"
-    return f"stable at first, no longer: {text}" if program.is_no_longer_stable else text
+    was = "stable at first, no longer: " if program.is_no_longer_stable else ""
+    return f"{was}{word}{where}{worst_feed_text(verdict)}"
 
 
 def worst_feed_text(verdict: Verdict) -> str:
@@ -155,54 +157,25 @@ def worst_feed_text(verdict: Verdict) -> str:
     return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _interim_texts(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
-    """Return what to do until the verdict is settled; open measurements come first."""
-    verdict = program.verdict
-    if verdict.assembly is not None and is_compliance_known(verdict.program, verdict.assembly):
-        yield f"until then {_alternative_text(program, machine)}"
-
-
 def _alternative_text(advice: ProgramAdvice, machine: Machine) -> str:
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.deepest_here
     gap = None if verdict.assembly is None else find_open_question(verdict.program, verdict.assembly)
     if gap is not None:
         return f"{gap[1]}: only then can a safe speed be named"
-    reach = _speed_range_text(CutRange.of(machine, verdict.program))
+    cut_range = CutRange.of(machine, verdict.program)
+    reach = f"in {format_rpm(cut_range.low_rpm)} to {format_rpm(cut_range.high_rpm)} rpm"
+    reach = "that the tool bears" if cut_range.is_empty else reach
     if best is None:
         return f"no safe speed {reach}; choose another tool"
     if best.depth_mm == verdict.program.depth_mm:
         return f"run this depth at {format_rpm(best.speed_rpm)} rpm {robustness_text(best)}"
     texts = [f"no safe speed for this depth {reach}"]
-    if not _is_same_setting(best, shallower):
+    if shallower is None or (best.speed_rpm, best.depth_mm) != (shallower.speed_rpm, shallower.depth_mm):
         texts.append(f"most chips: {best.depth_mm:g} mm at {format_rpm(best.speed_rpm)} rpm {robustness_text(best)}")
     if shallower is not None:
         depth, speed = f"{shallower.depth_mm:g}", format_rpm(shallower.speed_rpm)
         texts.append(f"at {speed} rpm no deeper than {depth} mm {robustness_text(shallower)}")
     return "; ".join(texts)
-
-
-def _speed_range_text(reach: CutRange) -> str:
-    """Return the range of speeds that was searched."""
-    if reach.is_empty:
-        return "that the tool bears"
-    return f"in {format_rpm(reach.low_rpm)} to {format_rpm(reach.high_rpm)} rpm"
-
-
-def _is_same_setting(best: Setting, shallower: Setting | None) -> bool:
-    return shallower is not None and (best.speed_rpm, best.depth_mm) == (shallower.speed_rpm, shallower.depth_mm)
-
-
-def _floor_depth_text(depth: float) -> str:
-    """Return a depth (m) in mm, rounded down to two decimals."""
-    return f"{math.floor(depth * 1e5) / 100:.2f}"
-
-
-SETTING_FIELDS = json_fields("speed_rpm depth_mm window_rpm depth_margin frequency_left=drop_margin")
-
-
-def setting_json(setting: Setting | None) -> dict[str, Any] | None:
-    """Return a recommended speed and depth with its robustness."""
-    return None if setting is None else SETTING_FIELDS(setting)
 
 
 def format_rpm(speed: float) -> str:
@@ -212,14 +185,82 @@ def format_rpm(speed: float) -> str:
 
 def robustness_text(setting: Setting) -> str:
     """Return the margins of a setting in speed, depth and frequency, rounded down."""
-    low, high = setting.window_rpm
+    low, high = map(format_rpm, setting.window_rpm)
     margin = f"{math.floor(100 * setting.depth_margin + 1e-6)} % of depth to spare"
-    return (
-        f"({format_rpm(low)} to {format_rpm(high)} rpm is safe; {margin}; {_frequency_drop_text(setting.drop_margin)})"
-    )
+    fall, more = setting.drop_margin, " or more" if setting.drop_margin >= CHECKED_DROPS[-1] else ""
+    drop = f"less than {100 * CHECKED_DROPS[1]:g} %" if fall <= 0 else f"{100 * fall:.3g} %{more}"
+    return f"({low} to {high} rpm is safe; {margin}; the frequency may fall by {drop})"
 
 
-def _frequency_drop_text(fall: float) -> str:
-    if fall <= 0:
-        return f"the frequency may fall by less than {100 * CHECKED_DROPS[1]:g} %"
-    return f"the frequency may fall by {100 * fall:.3g} %" + (" or more" if fall >= CHECKED_DROPS[-1] else "")
+POCKET_TIP_FIELDS = json_fields("speed_rpm depth_mm=depth*1e3 from_rpm to_rpm")
+SHIFT_FIELDS = json_fields(
+    "then=before now=after speed_change depth_change", {"then": POCKET_TIP_FIELDS, "now": POCKET_TIP_FIELDS}
+)
+COMPARISON_FIELDS = json_fields(
+    """
+    tap_id=now.assembly.tap_id source=now.source speed_rpm=now.lobes.speed_rpm depth_mm=now.lobes.depth*1e3
+    chatter_frequencies_hz=now.lobes.chatter_frequency kind=now.lobes.kind pockets pocket_shifts=shifts
+    programs=verdicts
+    """,
+    {"pockets": setting_json, "pocket_shifts": SHIFT_FIELDS, "programs": verdict_json},
+)
+LOBES_FIELDS = json_fields("""
+    method method_detail=detail minimum_depth_mm=minimum.depth*1e3 at_speed_rpm=minimum.speed_rpm
+    chatter_frequency_hz=minimum.chatter_frequency
+""")
+
+
+def lobes_json(name: str, lobes: StabilityLobes) -> JsonObject:
+    """Return the method and the lowest point of a diagram."""
+    return {"cut": name} | LOBES_FIELDS(lobes)
+
+
+def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> JsonObject:
+    """Return the newest diagram, its pockets, and the verdicts on the programs with this cut."""
+    diagram = lobes_json(comparison.now.name, comparison.now.lobes) | COMPARISON_FIELDS(comparison)
+    return diagram | {"remarks": merge_remarks(remarks)}
+
+
+def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> Texts:
+    """Return the newest diagram in words, its pockets, and the verdicts on the programs with this cut."""
+    now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
+    lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
+    texts: Texts = [
+        f"{now.name}: {now.lobes.method_text}, from the {now.source} of {now.assembly.tap_id}",
+        f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
+        if math.isfinite(low.depth)
+        else f"no limit in this speed range ({now.lobes.method_text})",
+        *shift_lines(comparison.shifts),
+    ]
+    if comparison.pockets:
+        heading = "safe now and until the next tap tests, the largest removal rate first:"
+        texts += [heading, pocket_table(comparison.pockets)]
+    texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
+    if verdicts:
+        texts += [verdict_table(verdicts), f"verdicts by {verdicts[0].method}, as lobewatch check"]
+    if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
+        still = "the diagram and its pockets are" if now.name == REFERENCE_CUT else "the diagram is"
+        texts.append(f"{at_speed_text(taught)}; {still} of the spindle at rest")
+    return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET_CODE])]
+
+
+def pocket_table(pockets: Sequence[Setting]) -> Table:
+    """Return a table with a line for each recommended pocket."""
+    table = new_table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "fall left")
+    for pocket in pockets:
+        window = "{:.0f}..{:.0f}".format(*pocket.window_rpm)
+        margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
+        drop = f"{100 * pocket.drop_margin:.0f} %{' or more' if pocket.drop_margin >= CHECKED_DROPS[-1] else ''}"
+        table.add_row(f"{pocket.speed_rpm:.0f}", window, f"{pocket.depth_mm:.2f}", margin, drop)
+    return table
+
+
+def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
+    """Return a line for each of the three fastest pockets that moved."""
+    for shift in sorted(shifts, key=lambda shift: shift.before.speed_rpm, reverse=True)[:3]:
+        before, after = shift.before, shift.after
+        yield (
+            f"pocket of the diagram moved from {before.speed_rpm:.0f} to {after.speed_rpm:.0f} rpm "
+            f"({100 * shift.speed_change:+.1f} %), its tip from {before.depth * 1e3:.2f} to "
+            f"{after.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
+        )

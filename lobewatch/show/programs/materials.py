@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
@@ -12,30 +11,26 @@ from rich.table import Table
 from lobes import Cut, CuttingCoefficients
 from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
 from lobewatch.machine.settings.drive_power import CutPower
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import new_table
+from lobewatch.show.terminal.output import json_fields, new_table
 
 MAX_MATERIALS_IN_FULL = 5
 """Largest number of materials that are shown with their sources."""
 
 
-MATERIAL_FIELDS = json_fields("""
-    name=material iso_group equivalents kt_n_per_mm2=tangential/1e6 kt_range_n_per_mm2=tangential_range
-    kr_n_per_mm2=radial/1e6 kr_over_kt=radial kr_over_kt_range=ratio_range kte_n_per_mm=tangential_edge/1e3
-    kre_n_per_mm=radial_edge/1e3 chip_thickness_mm=specific_forces specific_forces note source
-""")
 SPECIFIC_FORCE_FIELDS = json_fields("kc1_1_n_per_mm2=at_1_mm/1e6 mc=exponent source")
-
-
-def material_json(material: CuttingCoefficients) -> dict[str, Any]:
-    """Return one material; a range is [lowest, highest], or None where no spread is published."""
-    tangential, forces = material.tangential_range, material.specific_forces
-    return MATERIAL_FIELDS(material) | {
-        "kt_range_n_per_mm2": tangential and [limit / 1e6 for limit in tangential],
-        "kr_over_kt": material.radial / material.tangential,
-        "chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None,
-        "specific_forces": [SPECIFIC_FORCE_FIELDS(force) for force in forces],
-    }
+material_json = json_fields(
+    """
+    name=material iso_group equivalents kt_n_per_mm2=tangential/1e6 kt_range_n_per_mm2=tangential_range/1e6
+    kr_n_per_mm2=radial/1e6 kr_over_kt=self kr_over_kt_range=ratio_range kte_n_per_mm=tangential_edge/1e3
+    kre_n_per_mm=radial_edge/1e3 chip_thickness_mm=self specific_forces note source
+    """,
+    {
+        "kr_over_kt": lambda material: material.radial / material.tangential,
+        "chip_thickness_mm": lambda material: REFERENCE_CHIP_THICKNESS * 1e3 if material.specific_forces else None,
+        "specific_forces": SPECIFIC_FORCE_FIELDS,
+    },
+)
+"""Function that returns one material; a range is [lowest, highest], or None where no spread is published."""
 
 
 def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
@@ -59,16 +54,10 @@ def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | T
 
 def _material_cells(material: CuttingCoefficients) -> list[str]:
     edge = material.tangential_edge
-    return [
-        escape(material.material),
-        material.iso_group or "-",
-        f"{material.tangential / 1e6:.0f}",
-        _range_text(material.tangential_range, 1e6, 0),
-        f"{material.radial / material.tangential:.2f}",
-        _range_text(material.ratio_range, 1.0, 2),
-        "-" if math.isnan(edge) else f"{edge / 1e3:.0f}",
-        escape(", ".join(material.equivalents)),
-    ]
+    tangential = f"{material.tangential / 1e6:.0f}", _range_text(material.tangential_range, 1e6, 0)
+    ratio = f"{material.radial / material.tangential:.2f}", _range_text(material.ratio_range, 1.0, 2)
+    others = "-" if math.isnan(edge) else f"{edge / 1e3:.0f}", escape(", ".join(material.equivalents))
+    return [escape(material.material), material.iso_group or "-", *tangential, *ratio, *others]
 
 
 def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) -> str:

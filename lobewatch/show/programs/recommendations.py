@@ -7,17 +7,13 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
-
-from rich.table import Table
 
 from acquisition import Remark
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import LINE_REMARK_CODES, format_rpm, robustness_text, setting_json, worst_feed_text
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, new_table, remark_lines
+from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, JsonObject, Texts, json_fields, new_table, remark_lines
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation
@@ -27,48 +23,49 @@ UNIT_FEED_MM = 0.1
 
 
 PROGRAM_FIELDS = json_fields("name tool material teeth tool_diameter_mm radial_depth_mm")
-RECOMMENDED_FIELDS = json_fields("""
-    direction=program.direction worse_direction=program.direction feed=program.feed worst_feed_deg=verdict.feed_angle
+RECOMMENDED_FIELDS = json_fields(
+    """
+    direction=self worse_direction=program.direction feed=program.feed worst_feed_deg=verdict.feed_angle
     verdict=verdict.stability measured=verdict.is_measured cuts=verdict.n_cuts chance_turning=verdict.chatter_risk
-""")
-PROPOSAL_FIELDS = json_fields("""
-    tool=verdict.program.tool teeth=verdict.program.teeth speed_rpm=verdict.program.speed_rpm depth_mm=proposed
-    equal_is_as_good=proposed proposed_deg=proposed.pattern.pitch_deg half_wave_deg
+    """,
+    {
+        "direction": lambda answer: "either" if answer.any_direction else answer.program.direction,
+        "worst_feed_deg": math.degrees,
+    },
+)
+PROPOSAL_FIELDS = json_fields(
+    """
+    tool=verdict.program.tool teeth=verdict.program.teeth speed_rpm=verdict.program.speed_rpm depth_mm=self
+    equal_is_as_good=self proposed_deg=proposed.pattern.pitch_deg half_wave_deg
     chatter_frequency_hz=verdict.chatter_frequency
-""")
+    """,
+    {"equal_is_as_good": lambda proposal: proposal.proposed is None},
+)
 PITCH_FIELDS = json_fields("""
     pitch_deg=pattern.pitch_deg pattern=pattern.name limit_mm=limit*1e3 limit_low_mm=low*1e3 limit_high_mm=high*1e3 gain
-    gain_low gain_high share_worse least_chip=pattern largest_chip=pattern verdict=stability
-    off_centre=pattern.imbalance
+    gain_low gain_high share_worse least_chip=pattern.feed_ratio_range.0 largest_chip=pattern.feed_ratio_range.1
+    verdict=stability off_centre=pattern.imbalance
 """)
 
 
-def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> dict[str, Any]:
+def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
-    alternatives = (
-        {"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives
-    )
+    others = ({"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives)
     return PROGRAM_FIELDS(answer.program) | {
-        "recommended": _recommended_json(answer),
+        "recommended": _setting_with_feed_json(answer.setting, answer) | RECOMMENDED_FIELDS(answer)
+        if answer.setting and answer.verdict
+        else None,
         "reason": answer.reason or None,
         "what_would_change_it": answer.remedies,
-        "alternatives": list(alternatives),
+        "alternatives": list(others),
         "remarks": [*remarks, *_other_remarks(answer)],
     }
 
 
-def _recommended_json(answer: Recommendation) -> dict[str, Any] | None:
-    if answer.setting is None or answer.verdict is None:
-        return None
-    recommended = _setting_with_feed_json(answer.setting, answer) | RECOMMENDED_FIELDS(answer)
-    either = {"direction": "either"} if answer.any_direction else {}
-    return recommended | either | {"worst_feed_deg": math.degrees(answer.verdict.feed_angle)}
-
-
-def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> dict[str, Any]:
+def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> JsonObject:
     feed = None if answer.feed_mm is None else answer.feed_mm[1]
     return {
-        **(setting_json(setting) or {}),
+        **setting_json(setting),
         "cutting_speed_m_min": cutting_speed(setting, answer.program),
         "feed_per_tooth_mm": feed,
         "chips_cm3_per_min": math.nan if feed is None else removal_rate(setting, answer.program, feed),
@@ -88,15 +85,11 @@ def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> flo
 
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
     """Return the recommendation first, then what it rests on; remarks: on the files."""
-    return [
-        *(_recommended_lines(answer) if answer.setting else _no_setting_lines(answer)),
-        *(f"{other.label}: {_alternative_text(other.setting, answer)}" for other in answer.alternatives),
-        *remark_lines([*remarks, *_other_remarks(answer)]),
-    ]
-
-
-def _alternative_text(setting: Setting, answer: Recommendation) -> str:
-    return f"{_setting_text(setting, answer)} {robustness_text(setting)}; {_removal_rate_text(setting, answer)}"
+    lines = [*_recommended_lines(answer)]
+    for label, setting in ((other.label, other.setting) for other in answer.alternatives):
+        margins = f"{robustness_text(setting)}; {_removal_rate_text(setting, answer)}"
+        lines.append(f"{label}: {_setting_text(setting, answer)} {margins}")
+    return [*lines, *remark_lines([*remarks, *_other_remarks(answer)])]
 
 
 def saved_lines(folder: Path, name: str) -> list[str]:
@@ -107,6 +100,9 @@ def saved_lines(folder: Path, name: str) -> list[str]:
 def _recommended_lines(answer: Recommendation) -> Iterator[str]:
     setting, verdict = answer.setting, answer.verdict
     if setting is None or verdict is None:
+        yield f"{answer.program.name}: none; {answer.reason}"
+        if answer.remedies:
+            yield f"what would change it: {'; '.join(answer.remedies)}"
         return
     way = "up or down" if answer.any_direction and answer.program.immersion < 1 else ""
     predicted = "" if verdict.is_measured else ", predicted: doubtful until the tool is tapped"
@@ -116,12 +112,6 @@ def _recommended_lines(answer: Recommendation) -> Iterator[str]:
     if verdict.n_cuts:
         has = "s have" if verdict.n_cuts > 1 else " has"
         yield f"  as {verdict.n_cuts} test cut{has} taught of the turning spindle"
-
-
-def _no_setting_lines(answer: Recommendation) -> Iterator[str]:
-    yield f"{answer.program.name}: none; {answer.reason}"
-    if answer.remedies:
-        yield f"what would change it: {'; '.join(answer.remedies)}"
 
 
 def _setting_text(setting: Setting, answer: Recommendation) -> str:
@@ -148,26 +138,29 @@ HIDDEN_PITCH_CODES = ("doubt-decides",)
 """Codes of remarks on the verdict, which this output does not show."""
 
 
-def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> dict[str, Any]:
+def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
     """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
     return PROPOSAL_FIELDS(proposal) | {
         "depth_mm": depth_mm,
-        "equal_is_as_good": proposal.proposed is None,
         "equal": _pitch_json(proposal.equal, depth_mm),
         "unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal],
         "remarks": _pitch_remarks(proposal, remarks),
     }
 
 
-def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> dict[str, Any]:
-    least, largest = pitch.pattern.feed_ratio_range
-    verdict = None if depth_mm is None else pitch.stability
-    return PITCH_FIELDS(pitch) | {"least_chip": least, "largest_chip": largest, "verdict": verdict}
+def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
+    return PITCH_FIELDS(pitch) | ({"verdict": None} if depth_mm is None else {})
 
 
-def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> list[str | Table]:
+def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:
     """Return a table of the patterns, and which to have ground; depth_mm: requested depth of cut, None for any."""
-    table = _pitches_table(proposal, depth_mm)
+    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
+    table = new_table(*headings, *([] if depth_mm is None else [f"<at {depth_mm:g} mm"]))
+    for pitch in (proposal.equal, *proposal.unequal):  # as many lines as its angles need, two at least
+        verdict = [] if depth_mm is None else [[pitch.stability.value]]
+        columns = *_pitch_columns(pitch, pitch is proposal.equal), *verdict
+        for cells in zip_longest(*columns, fillvalue=""):
+            table.add_row(*cells)
     return [table, *_proposal_lines(proposal), *remark_lines(_pitch_remarks(proposal, remarks))]
 
 
@@ -175,31 +168,17 @@ def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[R
     return [*remarks, *(remark for remark in proposal.verdict.remarks if remark.code not in HIDDEN_PITCH_CODES)]
 
 
-def _pitches_table(proposal: PitchProposal, depth_mm: float | None) -> Table:
-    """Return each pattern in as many lines as its angles need, two at least, equal pitch first."""
-    verdicts = [] if depth_mm is None else [f"<at {depth_mm:g} mm"]
-    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
-    table = new_table(*headings, *verdicts)
-    for pitch in (proposal.equal, *proposal.unequal):
-        columns = [*_pitch_columns(pitch, pitch is proposal.equal), *([[pitch.stability.value]] if verdicts else [])]
-        for cells in zip_longest(*columns, fillvalue=""):
-            table.add_row(*cells)
-    return table
-
-
 def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:
     """Return the lines of each column but that of the verdict."""
     gain, low, high = (f"{100 * share:+.0f}" for share in (pitch.gain, pitch.gain_low, pitch.gain_high))
+    depths = pitch.limit, pitch.low, pitch.high
+    limit, least, most = (f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none" for depth in depths)
     yield textwrap.wrap(" ".join(f"{angle:.4g}" for angle in pitch.pattern.pitch_deg), MIN_COLUMN_WIDTH)
     yield [pitch.pattern.name]
-    yield [_pitch_limit_text(pitch.limit), f"({_pitch_limit_text(pitch.low)}..{_pitch_limit_text(pitch.high)})"]
+    yield [limit, f"({least}..{most})"]
     yield [""] if is_equal else [f"{gain} %", f"({low}..{high} %)"]
     yield [f"{pitch.pattern.feed_ratio_range[1]:.2f}"]
     yield [f"{100 * pitch.pattern.imbalance:.1f} %"]
-
-
-def _pitch_limit_text(depth: float) -> str:
-    return f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none"
 
 
 def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
@@ -211,9 +190,11 @@ def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
         return
     angles = ", ".join(f"{angle:g}" for angle in proposed.pattern.pitch_deg)
     gain, low, high = (round(100 * share) for share in (proposed.gain, proposed.gain_low, proposed.gain_high))
+    share = math.ceil(100 * proposed.share_worse)
+    worse = f"below it in {share} % of that" if share else "never below it"
     yield (
         f"pitch_deg = [{angles}]: the limit {at} is {gain} % above that of equal pitch, {low} to {high} % over what is "
-        f"not known, {_worse_text(proposed)}"
+        f"not known, {worse}"
     )
     largest, fed = proposed.pattern.feed_ratio_range[1], program.feed_per_tooth_mm
     chip = "" if fed is None else f", {fed * largest:.3g} mm where {fed:g} mm is fed per tooth"
@@ -231,7 +212,3 @@ def _equal_pitch_reason(proposal: PitchProposal) -> str:
     if not proposal.unequal:
         return "no unequal pitch stays within what chips and balance allow"
     return f"no pattern raises the low end of its limit by {100 * (MIN_PITCH_GAIN - 1):.0f} %"
-
-
-def _worse_text(judged: PitchEvaluation) -> str:
-    return f"below it in {math.ceil(100 * judged.share_worse)} % of that" if judged.share_worse else "never below it"

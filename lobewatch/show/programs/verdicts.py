@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.markup import escape
@@ -14,13 +14,11 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import count_noun, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
-from lobewatch.verdicts import Stability, Verdict
+from lobewatch.verdicts import SpindleAtSpeed, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
-from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
@@ -51,15 +49,11 @@ def factor_text(name: str) -> str:
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 
 
-def uncertainty_json(verdict: Verdict) -> dict[str, Any] | None:
-    """Return relative half-widths by cause (degrees for phases) of the modes in x, then y; None without a result."""
-    if verdict.samples is None:
-        return None
-    uncertainty = verdict.samples.uncertainty
-    modes = {
-        cause: dict(zip(UNCERTAINTY_KEYS, (widths * [1, 1, 1, DEGREES_PER_RADIAN]).T.tolist(), strict=True))
-        for cause, widths in uncertainty.modes.items()
-    }
+def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
+    """Return relative half-widths by cause (degrees for phases) of the modes in x, then y."""
+    units = [1, 1, 1, DEGREES_PER_RADIAN]
+    columns = {cause: (widths * units).T.tolist() for cause, widths in uncertainty.modes.items()}
+    modes = {cause: dict(zip(UNCERTAINTY_KEYS, values, strict=True)) for cause, values in columns.items()}
     ranges = {"tangential": uncertainty.tangential, "radial_over_tangential": uncertainty.ratio}
     coefficients = {name: [factor.low - 1, factor.high - 1] for name, factor in ranges.items()}
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
@@ -67,32 +61,28 @@ def uncertainty_json(verdict: Verdict) -> dict[str, Any] | None:
 
 def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """Return the lines below a table of verdicts: the uncertainty, and what the verdicts hold for."""
-    evaluated = [verdict for verdict in verdicts if verdict.samples is not None and verdict.assembly is not None]
-    learned = [verdict for verdict in evaluated if verdict.n_cuts]
-    texts = [NOT_ROTATING_TEXT] if len(learned) < len(evaluated) else []
-    return [*uncertainty_lines(verdicts, machine), *texts, *([at_speed_text(learned)] if learned else [])]
-
-
-def at_speed_text(verdicts: Sequence[Verdict]) -> str:
-    """Return what verdicts hold for where test cuts were used."""
-    names, n_cuts = ", ".join(verdict.program.name for verdict in verdicts), verdicts[0].at_speed.n_cuts
-    cuts = count_noun(n_cuts, "cut")
-    return f"{names}: the words hold for the spindle as it turns, from {cuts}, and low..high for 98 % of it"
-
-
-def uncertainty_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
-    """Return the uncertainty of the programs, a line for each group with the same one."""
-    named: dict[str, list[str]] = {}
+    named, evaluated, learned = dict[str, list[str]](), 0, list[Verdict]()
     for verdict in verdicts:
         if verdict.samples is not None and verdict.assembly is not None:
             parts = _uncertainty_parts(verdict, verdict.samples.uncertainty, verdict.assembly, machine)
             named.setdefault("; ".join(parts), []).append(verdict.program.name)
+            evaluated += 1
+            learned += [verdict] if verdict.n_cuts else []
     about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
-    return [f"{about[text]}: {text} ({UNCERTAINTY_PAGE})" for text in named]
+    lines = [f"{about[text]}: {text} ({UNCERTAINTY_PAGE})" for text in named]
+    lines += [NOT_ROTATING_TEXT] if len(learned) < evaluated else []
+    return [*lines, *([at_speed_text(learned)] if learned else [])]
+
+
+def at_speed_text(verdicts: Sequence[Verdict]) -> str:
+    """Return what verdicts hold for where test cuts were used."""
+    names = ", ".join(verdict.program.name for verdict in verdicts)
+    cuts = count_noun(verdicts[0].at_speed.n_cuts, "cut")
+    return f"{names}: the words hold for the spindle as it turns, from {cuts}, and low..high for 98 % of it"
 
 
 def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly, machine: Machine) -> Iterator[str]:
-    given, standard = machine.doubt, UncertaintyTable()
+    given = machine.doubt
     if verdict.n_cuts:
         yield from _learned_parts(verdict.at_speed, doubt.speed)
         return
@@ -106,9 +96,8 @@ def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly,
             yield f"{_widths_text(np.max(widths, axis=0))} {label}"
     if doubt.axes is not None and doubt.axes.sign_count:
         yield "modes askew to either side (cross not tapped)"
-    yield f"speed {_half_width_text(doubt.speed)}" + (
-        f" ({FROM_MACHINE_FILE})" if given.speed_percent != standard.speed_percent else ""
-    )
+    source = f" ({FROM_MACHINE_FILE})" if given.speed_percent != UncertaintyTable().speed_percent else ""
+    yield f"speed {_half_width_text(doubt.speed)}{source}"
     yield from _coefficient_parts(verdict, doubt, machine)
 
 
@@ -116,31 +105,22 @@ def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     cuts, before, after = count_noun(at_speed.n_cuts, "cut"), at_speed.prior_ranges, at_speed.posterior_ranges
     for key in ("tangential", "ratio", *(name for name in before if name.startswith("frequency"))):
         prior, posterior = (f"{factor.low:.2f}..{factor.high:.2f}" for factor in (before[key], after[key]))
-        yield f"{factor_text(key)} x {posterior}" + (
-            f", {prior} before the {cuts}" if key == "tangential" else f" ({prior})"
-        )
+        earlier = f", {prior} before the {cuts}" if key == "tangential" else f" ({prior})"
+        yield f"{factor_text(key)} x {posterior}{earlier}"
     yield f"speed {_half_width_text(speed)}"
 
 
 def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
-    rows = {"x": 0, "y": len(assembly.x or ())}
-    texts = {
-        name: f"{_widths_text(widths[rows[name]])} {label} ({_scatter_source_text(assembly, name, given)})"
-        for name in assembly.directions
-    }
-    if len(set(texts.values())) == 1:
-        yield next(iter(texts.values()))
-    else:
-        yield from (f"in {name} {text}" for name, text in texts.items())
-
-
-def _scatter_source_text(assembly: Assembly, side: str, given: UncertaintyTable) -> str:
-    asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
-    scatter = f"scatter of {len(assembly.series.get(side, ()))} tests"
-    source = scatter if assembly.scatter(side) is not None else f"default until {MIN_TAPS_FOR_SCATTER} tests"
-    if all(wish is not None for wish in asked):
-        return FROM_MACHINE_FILE
-    return source if all(wish is None for wish in asked) else f"{source}, {FROM_MACHINE_FILE}"
+    asked, texts = (given.frequency_percent, given.damping_percent, given.stiffness_percent), dict[str, str]()
+    for side in assembly.directions:
+        scatter = f"scatter of {len(assembly.series.get(side, ()))} tests"
+        sources = [scatter if assembly.scatter(side) is not None else f"default until {MIN_TAPS_FOR_SCATTER} tests"]
+        sources = [] if None not in asked else sources
+        sources += [FROM_MACHINE_FILE] if any(wish is not None for wish in asked) else []
+        width = widths[len(assembly.x or ()) if side == "y" else 0]
+        texts[side] = f"{_widths_text(width)} {label} ({', '.join(sources)})"
+    is_same = len(set(texts.values())) == 1
+    yield from [*texts.values()][:1] if is_same else (f"in {side} {text}" for side, text in texts.items())
 
 
 def _coefficient_parts(verdict: Verdict, uncertainty: Uncertainty, machine: Machine) -> Iterator[str]:
@@ -191,25 +171,22 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
 }
 """Style of each verdict, the same everywhere."""
 VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
-
-
-VERDICT_FIELDS = json_fields("""
-    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=assembly.tap_id
+verdict_json = json_fields(
+    """
+    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=self
     stable=is_stable verdict=stability measured=is_measured limit_mm=limit*1e3 limit_low_mm=limit_low*1e3
     limit_high_mm=limit_high*1e3 depth_margin chance_turning=chatter_risk decided_by=decisive_cause cuts=n_cuts
-    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3 doubt=samples
-    method method_detail=detail
-""")
-
-
-def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """Return one verdict as a JSON object; unknown numbers are NaN or None."""
-    return VERDICT_FIELDS(verdict) | {
-        "tap_id": verdict.assembly.tap_id if verdict.assembly else "",
-        "decided_by": verdict.decisive_cause or None,
-        "worst_feed_deg": math.degrees(verdict.feed_angle),
-        "doubt": uncertainty_json(verdict),
-    }
+    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3
+    doubt=samples.uncertainty method method_detail=detail
+    """,
+    {
+        "tap_id": lambda verdict: verdict.assembly.tap_id if verdict.assembly else "",
+        "decided_by": lambda cause: cause or None,
+        "worst_feed_deg": math.degrees,
+        "doubt": uncertainty_json,
+    },
+)
+"""Function that returns one verdict as a JSON object; unknown numbers are NaN or None."""
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:
@@ -218,7 +195,9 @@ def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> T
     for i, verdict in enumerate(verdicts):
         program = verdict.program
         numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(verdict), chatter_risk_text(verdict))
-        table.add_row(escape(program.name), *numbers, *margins[i : i + 1], _styled_verdict(verdict))
+        is_limited = verdict.stability is Stability.STABLE and verdict.is_beyond_drive
+        style = "bold" if is_limited else VERDICT_STYLES[verdict.stability].style
+        table.add_row(escape(program.name), *numbers, *margins[i : i + 1], f"[{style}]{verdict_text(verdict)}[/]")
     return table
 
 
@@ -265,14 +244,10 @@ def is_safe(verdict: Verdict) -> bool:
     return verdict.stability is Stability.STABLE and not verdict.is_beyond_drive
 
 
-def _styled_verdict(verdict: Verdict) -> str:
-    is_limited = verdict.stability is Stability.STABLE and not is_safe(verdict)
-    style = "bold" if is_limited else VERDICT_STYLES[verdict.stability].style
-    return f"[{style}]{verdict_text(verdict)}[/]"
-
-
 def _depth_text(depth: float, verdict: Verdict) -> str:
-    return f"> {_mm_text(_searched_depth(verdict))}" if math.isinf(depth) else _mm_text(depth)
+    mm = 1e3 * (_searched_depth(verdict) if math.isinf(depth) else depth)
+    digits = 2 if mm < 99.995 else 1 if mm < 999.95 else 0
+    return f"{'> ' if math.isinf(depth) else ''}{mm:.{digits}f}"
 
 
 def _searched_depth(verdict: Verdict) -> float:
@@ -283,15 +258,10 @@ def _searched_depth(verdict: Verdict) -> float:
     return float(np.min(force[0] / force)) * float(TRIED_LIMIT_SHARES[-1]) * verdict.limit
 
 
-def _mm_text(depth: float) -> str:
-    mm = depth * 1e3
-    return f"{mm:.2f}" if mm < 99.995 else f"{mm:.1f}" if mm < 999.95 else f"{mm:.0f}"
-
-
-def program_texts(logbook: Logbook) -> list[str | Table]:
+def program_texts(logbook: Logbook) -> Texts:
     """Return the verdicts on all programs, where to read on, and the remarks on the files."""
     verdicts = logbook.verdicts()
-    texts: list[str | Table] = [verdict_table(verdicts), *verdict_notes(verdicts, logbook.machine)] if verdicts else []
+    texts: Texts = [verdict_table(verdicts), *verdict_notes(verdicts, logbook.machine)] if verdicts else []
     if not all(map(is_safe, verdicts)):
         texts.append("lobewatch check says what would settle it, and where to go instead")
     return [*texts, *remark_lines(logbook.remarks)]

@@ -16,12 +16,12 @@ from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
+from lobewatch.show.figures.lobe_figures import pick_evenly, plot_lobes, select_test_cuts
 from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.report.section import NumberTable, tabulate_lobes
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
@@ -62,8 +62,8 @@ class LobeDiagram(NamedTuple):
         """Depths (m) of the bands and of the rotating spindle, by name."""
         edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
         if self.learned is not None:
-            edges |= {"at speed": self.learned.lobes.depth, "at speed, lowest": self.learned.band.low}
-            edges |= {"at speed, highest": self.learned.band.high}
+            lobes, band = self.learned.lobes, self.learned.band
+            edges |= {"at speed": lobes.depth, "at speed, lowest": band.low, "at speed, highest": band.high}
         return edges
 
 
@@ -78,20 +78,12 @@ def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence
     depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
     cuts = machine.cuts(assembly.tool)
     same = [program for program in programs if cuts.get(program.verdict.program.name) == cuts[cut]]
-    settings = (
-        setting for program in same for setting in (program.advice.best, program.advice.deepest_here) if setting
-    )
-    verdicts = [program.verdict for program in same]
-    return LobeDiagram(
-        cut,
-        now,
-        depths | {assembly.label: now.depth},
-        verdicts,
-        list(dict.fromkeys(settings)),
-        compute_limit_band(now, cut, assembly, machine),
-        select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0]),
-        compute_lobes_at_speed(verdicts, machine),
-    )
+    settings = (setting for program in same for setting in (program.advice.best, program.advice.deepest_here))
+    verdicts, depths = [program.verdict for program in same], depths | {assembly.label: now.depth}
+    band = compute_limit_band(now, cut, assembly, machine)
+    heard = select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0])
+    learned = compute_lobes_at_speed(verdicts, machine)
+    return LobeDiagram(cut, now, depths, verdicts, list(dict.fromkeys(filter(None, settings))), band, heard, learned)
 
 
 MAX_LOBE_DIAGRAMS = 24
@@ -129,10 +121,8 @@ class LobeHistory(NamedTuple):
     def numbers(self) -> NumberTable:
         """Depth (mm) over speed of each diagram."""
         step = max(math.ceil(self.speed_rpm.size / MAX_LOBE_SPEEDS), 1)
-        depths = [*self.depth, *self.ahead.values()]
-        return tabulate_lobes(
-            self.speed_rpm[::step], {name: depth[::step] for name, depth in zip(self.labels, depths, strict=True)}
-        )
+        named = zip(self.labels, [*self.depth, *self.ahead.values()], strict=True)
+        return tabulate_lobes(self.speed_rpm[::step], {name: depth[::step] for name, depth in named})
 
     @property
     def marks(self) -> NumberTable | None:
@@ -162,9 +152,8 @@ def compute_lobe_history(
     assembly: the newest; series: of the same tool, for the forecast; cuts: all test cuts. The forecast lets all
     modes drop by the same share, with K from the model.
     """
-    shown = [row for row in rows if row.x or row.y]
-    picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MAX_LOBE_DIAGRAMS)).round().astype(int)).tolist()
-    diagrams = [(shown[i].time, compute_row_lobes(shown[i], machine, [cut]).get(cut)) for i in picked]
+    shown = pick_evenly([row for row in rows if row.x or row.y], MAX_LOBE_DIAGRAMS)
+    diagrams = [(row.time, compute_row_lobes(row, machine, [cut]).get(cut)) for row in shown]
     limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
     if len(limits) < 2:
         return None
@@ -203,6 +192,6 @@ def _forecast_drop(trend: Trend, months: int) -> float | None:
 
 
 def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
-    stiffness_at, _ = model_softening(assembly)
+    stiffness = model_softening(assembly)[0](fall)
     modes = (assembly.x if direction == "x" else assembly.y) or ()
-    return [mode.scaled(1 - fall, stiffness_at(fall), "foretold") for mode in modes]
+    return [mode.scaled(1 - fall, stiffness, "foretold") for mode in modes]

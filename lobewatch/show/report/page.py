@@ -25,16 +25,10 @@ def render_page(template: str, **content: Any) -> str:
     """Return the HTML of a template in this folder; it gets styles, scripts and plots."""
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, finalize=_name_options
-    )
-    environment.filters |= {
-        "in_css": _escape_css,
-        "named": _label_svg,
-        "macro_name": _macro_name,
-        "next": next,
-        "unbroken": _join_units,
-    }
+    options: dict[str, Any] = {"autoescape": True, "undefined": jinja2.StrictUndefined, "finalize": _name_options}
+    environment = jinja2.Environment(loader=loader, **options)
+    environment.filters |= {"in_css": _escape_css, "named": _label_svg, "next": next, "unbroken": _join_units}
+    environment.filters["macro_name"] = lambda part: type(part).__name__.lower()
     return environment.get_template(template).render(_static_files() | content)
 
 
@@ -74,11 +68,6 @@ def _static_files() -> dict[str, str]:
 def _escape_css(text: str) -> str:
     """Escape a name inside a string of a style sheet."""
     return re.sub(r"[^\w .,:;()+-]", lambda match: f"\\{ord(match[0]):x} ", text)
-
-
-def _macro_name(part: object) -> str:
-    """Return the macro of parts.html for a part of a section: its class name in lower case."""
-    return type(part).__name__.lower()
 
 
 def _join_units(text: str) -> str:

@@ -1,28 +1,153 @@
-"""Write the report of one machine, and the report of a fleet."""
+"""Write the report of one machine with its summary, and the report of a fleet."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from datetime import datetime
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime, timedelta
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from acquisition import Remark, merge_remarks
 from dsm import format_with_error
-from lobewatch.logbook import Logbook
-from lobewatch.logbook.analysis import Analysis
-from lobewatch.monitoring.status_rules import StatusLevel
+from lobewatch.logbook import Analysis, Logbook
+from lobewatch.machine import Machine
+from lobewatch.monitoring import MachineStatus, SeriesStatus
+from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
+from lobewatch.monitoring.threshold_dates import NO_FORECAST, ProgramForecast
+from lobewatch.show.figures.drawing import render_svg
+from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE
+from lobewatch.show.figures.trend_figures import plot_frf
 from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS
 from lobewatch.show.history import condition_texts
+from lobewatch.show.programs.advice import ProgramAdvice, format_rpm
+from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.page import make_gauge, render_page, write_page
-from lobewatch.show.report.report_data import collect_report_data
+from lobewatch.show.report.report_data import FREQUENCY_VALUE, ReportData, collect_report_data, make_value_trend
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
-from lobewatch.show.report.summary import make_summary
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.status_labels import status_css_class
-from lobewatch.verdicts.verdict import Stability
+from lobewatch.show.terminal.output import JsonObject, json_fields
+from lobewatch.show.terminal.status_labels import status_css_class, status_label
+from lobewatch.show.trend import change_text, no_dates_text, rate_text, reach_text, trend_text
+from lobewatch.verdicts import Stability
+
+UNKNOWN_FATE = ProgramForecast(NO_FORECAST, NO_FORECAST)
+MAX_SUMMARY_REASONS = 3
+"""Largest number of reasons and of series in the summary."""
+TABLE_REASON_CODES = (
+    *("frequency-alarm", "frequency-warn", "decay"),
+    *("program-not-stable", "program-doubtful", "program-unknown"),
+    "overdue",
+)
+"""Codes of reasons that the tables of the summary show, unless they are the worst."""
+
+
+def make_summary(data: ReportData) -> dict[str, Any]:
+    """Make the summary as the template takes it."""
+    standing, limits = data.outlook.status, data.machine.limits
+    worst, levels = standing.series[0], (limits.frequency_warn_percent, limits.frequency_alarm_percent)
+    has_changed = worst.drop.is_known and not worst.is_baseline
+    return {
+        **_status_content(standing),
+        "gauge": make_gauge(worst.drop.value, *levels) if has_changed else None,
+        "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
+        "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
+        "programs": [_program_content(program, data) for program in data.programs],
+        "no_dates": no_dates_text(data.outlook),
+        "tap": _next_tap_text(standing, data.machine),
+        "pictures": list(draw_summary_figures(data)),
+    }
+
+
+def _status_content(standing: MachineStatus) -> dict[str, Any]:
+    """Return the status in words, the reasons and the next step."""
+    first, others = _pick_reasons(standing)
+    notable = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD]
+    shown = notable[: MAX_SUMMARY_REASONS - 1]
+    return {
+        "light": status_label(standing.status, standing.is_early),
+        "kind": status_css_class(standing.status, standing.is_early),
+        "reasons": [remark.finding for remark in [*first, *shown]],
+        "others": [remark.finding for remark in others if remark not in shown],
+        "next_step": standing.next_step,
+    }
+
+
+def _pick_reasons(standing: MachineStatus) -> tuple[list[Remark], list[Remark]]:
+    """Return the worst reason, of the series with the largest drop, and those that the summary shows nowhere else."""
+    plain, order = set(standing.reasons), {series.name: place for place, series in enumerate(standing.series)}
+    alike = [remark for remark in standing.remarks if remark.code == standing.remarks[0].code]
+    first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
+    beside = [remark for remark in standing.remarks if remark.code not in TABLE_REASON_CODES or remark not in plain]
+    return first, [remark for remark in merge_remarks(beside) if remark not in first]
+
+
+def _series_content(series: SeriesStatus) -> dict[str, str]:
+    """Return name, change, trend and rate of a series."""
+    if series.is_baseline:
+        return {"name": series.name, "change": "first test", "course": "nothing to compare it with yet"}
+    trend = series.trend
+    course = [] if trend is None else [*filter(None, (trend_text(trend), rate_text(trend)))]
+    since = f"since {series.first_time:%Y-%m-%d}"
+    return {"name": series.name, "change": change_text(series), "course": "; ".join(course) or since}
+
+
+def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]:
+    name, word, outlook = program.verdict.program.name, program.verdict.stability, data.outlook
+    fate, now = outlook.programs.get(name, UNKNOWN_FATE), outlook.status.time
+    until = {
+        Stability.STABLE: f"doubtful {reach_text(fate.doubtful, now)}",
+        Stability.DOUBTFUL: f"not stable {reach_text(fate.not_stable, now)}",
+        Stability.NOT_STABLE: "not stable already",
+        Stability.UNKNOWN: "not known",
+    }
+    return {
+        "name": name,
+        "kind": VERDICT_STYLES[word].css_class,
+        "word": f"{VERDICT_STYLES[word].symbol} {word}",
+        "until": until[word],
+        "instead": alternative_text(program),
+    }
+
+
+def alternative_text(program: ProgramAdvice) -> str:
+    """Return the recommended speed and depth in a few words."""
+    assembly, settings = program.verdict.assembly, (program.advice.best, program.advice.deepest_here)
+    if program.verdict.stability is Stability.STABLE:
+        return "as it is"
+    if program.verdict.stability is Stability.UNKNOWN or assembly is None or not assembly.is_complete:
+        return "not known: see below"
+    texts = [f"{format_rpm(item.speed_rpm)} rpm, {item.depth_mm:g} mm" for item in settings if item is not None]
+    return " or ".join(dict.fromkeys(texts)) or "no safe speed: another tool"
+
+
+def _next_tap_text(standing: MachineStatus, machine: Machine) -> str:
+    left, last = standing.days_left, standing.last_tap
+    if left is None or last is None:
+        return "now: it was never tapped"
+    due = f"{last + timedelta(days=math.floor(machine.machine.tap_interval_days)):%Y-%m-%d}"
+    return f"now: overdue since {due}" if left < 0 else f"by {due}"
+
+
+def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
+    """Draw the trend of the frequency, or the response of a single tap test, and the lobes where there are any.
+
+    Each is its caption and its <svg> element.
+    """
+    points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
+    if points is not None:
+        ahead = ", and where it goes" if points.curve is not None else ""
+        figure = points.figure(SMALL_FIGURE_SIZE)
+        figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
+        yield f"Natural frequency in {data.last.direction} (Hz){ahead}", render_svg(figure)
+    elif (frf := data.newest.frf) is not None:
+        figure = plot_frf(None, frf, data.response_band(frf), SMALL_FIGURE_SIZE)
+        yield "Receptance at the tool tip", render_svg(figure)
+    if diagram is not None:
+        then = "; dashed: at first" if len(diagram.depths) > 1 else ""
+        caption = f"Depth (mm), {diagram.cut}: chatter above the line{then}"
+        yield caption, render_svg(diagram.figure(is_small=True))
 
 
 def write_report(
@@ -62,7 +187,7 @@ REPORT_FIELDS = json_fields("""
 
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
-) -> dict[str, Any]:
+) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
     groups, tap = [make(data) for make in sections], data.newest
@@ -95,36 +220,26 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
     """Return the HTML of a fleet, a line for each machine, in the order of the rows."""
     lights = [row["light"] for row in rows]
     counts = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
-    numbers = NumberTable(FLEET_COLUMNS, [[_enum_value(row[column]) for column in FLEET_COLUMNS] for row in rows])
+    cells = [[row[column] for column in FLEET_COLUMNS] for row in rows]
+    numbers = NumberTable(FLEET_COLUMNS, cells)
     machines = [_machine_content(row) for row in rows]
     return render_page("fleet.html", name=name, now=now, counts=counts, machines=machines, numbers=numbers)
 
 
-def _enum_value(value: Any) -> Any:
-    return value.value if isinstance(value, StatusLevel) else value
-
-
-def _machine_content(row: Mapping[str, Any]) -> dict[str, Any]:
+def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine as the template takes it."""
-    left, last = row["days_left"], row["last_tap"]
-    due = (
-        "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
-    )
-    fall, std = row["fall"], row["fall_std"]
+    left, last, fall, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
+    due = "never tapped"
+    if left is not None:
+        due = f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
     has_changed = fall is not None and std != 0
-    fallen = f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with"
     return {
-        "name": row["name"],
-        "key": row["key"],
-        "light": row["word"],
+        **row,
         "kind": status_css_class(row["light"], row["is_early"]),
         "reasons": row["reasons"] or [row["why"] or ("all is well" if row["light"] is StatusLevel.GOOD else "-")],
-        "next_step": row["next_step"],
-        "fallen": fallen,
+        "fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with",
         "gauge": make_gauge(fall, *row["limits"]) if has_changed else None,
-        "series": row["series"],
         "spark": spark_points(row["points"]),
-        "until": row["limit"],
         "programs": programs_text(row["programs"]),
         "due": f"{due}, last {last.partition('T')[0]}" if last else due,
     }
@@ -144,10 +259,9 @@ def spark_points(points: Sequence[tuple[float, float]]) -> str:
     """Return a trend (days, %) as points of a small polyline; empty below two points."""
     if len(points) < 2:
         return ""
-    days, percents = zip(*points, strict=True)
-    span, reach = days[-1] - days[0], max(max(percents) - min(percents), 1.0)
-    places = (
-        (SPARK_WIDTH * (day - days[0]) / (span or 1.0), SPARK_HEIGHT * (max(percents) - percent) / reach)
+    (first, *_, last), percents = zip(*points, strict=True)
+    top, span, reach = max(percents), last - first or 1.0, max(max(percents) - min(percents), 1.0)
+    return " ".join(
+        f"{SPARK_WIDTH * (day - first) / span:.1f},{SPARK_HEIGHT * (top - percent) / reach:.1f}"
         for day, percent in points
     )
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)

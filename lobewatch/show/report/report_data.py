@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from acquisition import Frf, TapTest
 from lobewatch.history import HistoryRow
 from lobewatch.history.tap_measurements import measure_excluded_taps
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import LimitsTable, Machine
-from lobewatch.measurement.estimate import Estimate
+from lobewatch.measurement import Estimate
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.show.figures.trend_figures import TREND_FIGURE_SIZE, TrendCurve, TrendMarks, make_trend_curve, plot_trend
 from lobewatch.show.programs.advice import ProgramAdvice, advise_program
@@ -168,11 +168,11 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     if len(estimates) < MIN_TAPS_FOR_VALUE:
         return None
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
-    events = [(event.time, event.text) for event in data.analysis.files.events if event.time >= since]
+    events = [(event.time, event.text) for event in data.analysis.files.contents.events if event.time >= since]
     numbers = [estimate.value / value.scale for _, estimate in estimates]
-    near = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
+    low, high = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
-    marks = TrendMarks(events, [(time, number) for time, number in aside if near[0] <= number <= near[1]])
+    marks = TrendMarks(events, [(time, number) for time, number in aside if low <= number <= high])
     is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
     limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +12,7 @@ from matplotlib.figure import Figure
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
-from lobewatch.measurement.estimate import Estimate
-from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.drawing import render_svg
-from lobewatch.show.figures.trend_figures import TrendCurve
 from lobewatch.show.terminal.option_names import with_option_names
 
 MAX_RESPONSE_LINES = 1500
@@ -39,32 +35,6 @@ class NumberTable(NamedTuple):
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")
 
 
-def tabulate_value(
-    unit: str,
-    scale: float,
-    estimates: Iterable[tuple[datetime, Estimate]],
-    excluded: Iterable[tuple[datetime, float]],
-    curve: TrendCurve | None,
-) -> NumberTable:
-    """Tabulate a value over time: tests, excluded tests, the fitted line, and the 80 % band of the forecast.
-
-    The values of `estimates` are in SI, `scale` is the size of the unit shown; the others are in this unit.
-    """
-    lines: list[list[Any]] = [
-        ["test", _day_text(time), estimate.value / scale, estimate.std / scale, "", ""] for time, estimate in estimates
-    ]
-    lines += [["does not count", _day_text(time), value, "", "", ""] for time, value in excluded]
-    if curve is not None:
-        days = [_day_text(date_of_days(day)) for day in curve.days.tolist()]
-        past = curve.days.size - curve.days_ahead.size
-        fitted = zip(days[:past], curve.line[:past].tolist(), strict=True)
-        lines += [["fitted", day, value, "", "", ""] for day, value in fitted]
-        ahead = np.column_stack([curve.line[past:], curve.low, curve.high]).tolist()
-        band = list(zip(days[past:], ahead, strict=True))[::10]
-        lines += [["forecast", day, value, "", low, high] for day, (value, low, high) in band]
-    return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
-
-
 def tabulate_lobes(speed_rpm: Floats, depths: Mapping[str, Floats]) -> NumberTable:
     """Tabulate limiting depths (m, by name) over speed."""
     heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
@@ -78,10 +48,6 @@ def tabulate_response(frf: Frf) -> NumberTable:
     columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
     step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
     return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
-
-
-def _day_text(time: datetime) -> str:
-    return f"{time:%Y-%m-%d}"
 
 
 def _json_value(value: Any) -> Any:

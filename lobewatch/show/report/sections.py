@@ -3,41 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from acquisition import merge_remarks
 from dsm import format_with_error
-from lobewatch.history.history import ModeValues
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
+from lobewatch.monitoring.trend import date_of_days
 from lobewatch.show.figures.lobe_figures import plot_waterfall
 from lobewatch.show.figures.trend_figures import plot_frf
+from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, frequency_margin_text
-from lobewatch.show.programs.verdicts import (
-    VERDICT_STYLES,
-    band_text,
-    chatter_risk_text,
-    limit_text,
-    margin_text,
-    verdict_notes,
-    verdict_text,
-)
 from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, ValueTrend, make_value_trend
 from lobewatch.show.report.section import (
     DataTable,
     Fragment,
+    NumberTable,
     Paragraph,
     Section,
     TableCell,
     make_figure_section,
     tabulate_lobes,
     tabulate_response,
-    tabulate_value,
 )
 from lobewatch.show.report.tables import make_events, make_provenance, make_series, make_tap_tests, make_test_cuts
-from lobewatch.show.terminal.output import count_noun
+from lobewatch.show.terminal.output import count_noun, json_fields
 from lobewatch.show.trend import FORECAST_ASSUMPTIONS, forecast_date_rows, no_dates_text, trend_sentence
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
@@ -46,23 +38,36 @@ from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
 
 def make_figures(data: ReportData) -> list[Section]:
     """Make all figures that have data."""
-    makers = make_value_figures, make_lobe_figure, make_waterfall, make_frequency_response
-    return [section for make in makers for section in make(data)]
+    lobes = [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data)]
+    return [*lobes, *make_frequency_response(data)]
 
 
-def make_value_figures(data: ReportData) -> list[Section]:
+def make_value_figures(data: ReportData) -> Iterator[Section]:
     """Make a figure over time of each value that is known."""
-    trends = (make_value_trend(data, value) for value in (FREQUENCY_VALUE, BEARING_VALUE))
-    return [_value_section(trend) for trend in trends if trend is not None]
+    for value in (FREQUENCY_VALUE, BEARING_VALUE):
+        trend = make_value_trend(data, value)
+        if trend is not None:
+            texts = [value.text, *(["Dotted lines: what was done."] if trend.marks.events else [])]
+            texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
+            texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
+            yield make_figure_section(value.heading, " ".join(texts), trend.figure(), _tabulate_trend(trend))
 
 
-def _value_section(trend: ValueTrend) -> Section:
-    value, texts = trend.value, [trend.value.text]
-    texts += ["Dotted lines: what was done."] if trend.marks.events else []
-    texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
-    texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
-    numbers = tabulate_value(value.label, value.scale, trend.estimates, trend.excluded, trend.curve)
-    return make_figure_section(value.heading, " ".join(texts), trend.figure(), numbers)
+def _tabulate_trend(trend: ValueTrend) -> NumberTable:
+    """Tabulate a value over time: tests, excluded tests, the fitted line, and the 80 % band of the forecast."""
+    unit, scale, curve = trend.value.label, trend.value.scale, trend.curve
+    tests = [(time, estimate.value / scale, estimate.std / scale) for time, estimate in trend.estimates]
+    lines: list[list[Any]] = [["test", f"{time:%Y-%m-%d}", value, std, "", ""] for time, value, std in tests]
+    lines += [["does not count", f"{time:%Y-%m-%d}", value, "", "", ""] for time, value in trend.excluded]
+    if curve is not None:
+        days = [f"{date_of_days(day):%Y-%m-%d}" for day in curve.days.tolist()]
+        past = curve.days.size - curve.days_ahead.size
+        fitted = zip(days[:past], curve.line[:past].tolist(), strict=True)
+        lines += [["fitted", day, value, "", "", ""] for day, value in fitted]
+        ahead = np.column_stack([curve.line[past:], curve.low, curve.high]).tolist()
+        band = list(zip(days[past:], ahead, strict=True))[::10]
+        lines += [["forecast", day, value, "", low, high] for day, (value, low, high) in band]
+    return NumberTable(["what", "date", unit, f"standard error ({unit})", f"10 % ({unit})", f"90 % ({unit})"], lines)
 
 
 def make_lobe_figure(data: ReportData) -> list[Section]:
@@ -71,10 +76,10 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
     if diagram is None:
         return []
     cut, method, directions = diagram.cut, diagram.now.method, data.assembly.directions
+    sides = f"{' and '.join(directions)} direction{'s' if len(directions) > 1 else ' alone'}"
     text = (
-        f"Limit of the {cut} by {method}, {' and '.join(directions)} direction"
-        f"{'s' if len(directions) > 1 else ' alone'}; cuts above the band chatter. Marks: programs with this "
-        "same cut and their verdicts; boxes: settings recommended instead, as in the table above."
+        f"Limit of the {cut} by {method}, {sides}; cuts above the band chatter. Marks: programs with this same cut and "
+        "their verdicts; boxes: settings recommended instead, as in the table above."
     )
     if np.isinf(diagram.now.minimum.depth):
         text = f"The {cut} has no limit in this speed range ({method})."
@@ -137,31 +142,32 @@ def make_programs(data: ReportData) -> list[Section]:
     content = {
         "programs": [_program_row(program) for program in data.programs],
         "lines": [*lines, *map(str, speeds)],
-        "doubt": verdict_notes(checked, data.machine),
+        "doubt": verdicts.verdict_notes(checked, data.machine),
         "method": checked[0].method if checked else "",
     }
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
 
 
+PROGRAM_FIELDS = json_fields("name speed_rpm depth_mm")
+
+
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
-    return {
-        "name": verdict.program.name,
-        "speed_rpm": verdict.program.speed_rpm,
-        "depth_mm": verdict.program.depth_mm,
-        "limit": limit_text(verdict),
-        "band": band_text(verdict).replace("..", " to "),
-        "margin": margin_text(verdict),
-        "turning": chatter_risk_text(verdict),
+    return PROGRAM_FIELDS(verdict.program) | {
+        "limit": verdicts.limit_text(verdict),
+        "band": verdicts.band_text(verdict).replace("..", " to "),
+        "margin": verdicts.margin_text(verdict),
+        "turning": verdicts.chatter_risk_text(verdict),
         "left": frequency_margin_text(program.advice),
         "at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value),
-        "now": _verdict_cell(verdict.stability, verdict_text(verdict)),
+        "now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict)),
     }
 
 
 def _verdict_cell(word: Stability, text: str) -> TableCell:
-    return TableCell(f"{VERDICT_STYLES[word].symbol} {text}", VERDICT_STYLES[word].css_class)
+    style = verdicts.VERDICT_STYLES[word]
+    return TableCell(f"{style.symbol} {text}", style.css_class)
 
 
 def make_forecast(data: ReportData) -> list[Section]:
@@ -179,9 +185,8 @@ def make_notes(data: ReportData) -> list[Section]:
     """Make remarks on the newest test of the series, and on both directions of its tool."""
     of_tap = [remark for remark in data.last.remarks if remark.code not in DIRECTION_CODES]
     of_tool = [remark for remark in data.assembly.remarks if remark.code in DIRECTION_CODES]
-    return [
-        Section("", [Paragraph(f"Note: {remark}.")], is_framed=False) for remark in merge_remarks([*of_tap, *of_tool])
-    ]
+    merged = merge_remarks([*of_tap, *of_tool])
+    return [Section("", [Paragraph(f"Note: {remark}.")], is_framed=False) for remark in merged]
 
 
 def make_changes(data: ReportData) -> list[Section]:
@@ -209,39 +214,34 @@ def make_changes(data: ReportData) -> list[Section]:
     return [Section("What has changed", [table, *below])]
 
 
-def _measured_changes(history: SeriesHistory) -> list[list[str]]:
-    rows = []
+def _measured_changes(history: SeriesHistory) -> Iterator[list[str]]:
     for name, label, scale in CHANGE_VALUES:
         values = history.values[name]
         if values.change.is_known:
             newest = getattr(values.known_rows[-1], name)
             now, start = (format_with_error(estimate.value, estimate.std, scale) for estimate in (newest, values.start))
-            rows.append([label, start, now, f"{values.change.value:+z.2f} %"])
-    return rows
+            yield [label, start, now, f"{values.change.value:+z.2f} %"]
 
 
-def _model_changes(history: SeriesHistory) -> list[list[str]]:
-    rows = []
+def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
     for name, label in MODEL_CHANGE_VALUES:
         values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
         if values and np.isfinite(getattr(history.rows[-1], name)):
             start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
             change = f"{100 * (values[-1] / values[0] - 1):+z.2f} %"
-            rows.append([f"{label} tip stiffness, model (N/µm)", start, now, change])
-    return rows
+            yield [f"{label} tip stiffness, model (N/µm)", start, now, change]
 
 
 def make_modes(data: ReportData) -> list[Section]:
     """Make the table of the modes of the newest test."""
     heads = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"]
-    table = DataTable(heads, [_mode_row(mode) for mode in data.last.modes], if_empty="none was found")
+    rows = list[list[str]]()
+    for frequency, damping, stiffness, _ in data.last.modes:
+        shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
+        remark = "not a driving point" if stiffness < 0 else ""
+        rows.append([f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, remark])
+    table = DataTable(heads, rows, if_empty="none was found")
     return [Section("Modes of the newest test", [table], is_framed=False)]
-
-
-def _mode_row(mode: ModeValues) -> list[str]:
-    frequency, damping, stiffness, _ = mode
-    shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
-    return [f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, "not a driving point" if stiffness < 0 else ""]
 
 
 SECTIONS: tuple[SectionMaker, ...] = (

@@ -9,13 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from acquisition import Channel, TapTest
+from acquisition import Channel
 from lobewatch.history import HistoryRow
-from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.entries import MaintenanceEvent
-from lobewatch.machine.settings.machine_file import REFERENCE_CUT
-from lobewatch.measurement.estimate import Estimate
-from lobewatch.monitoring import SeriesStatus
+from lobewatch.machine import REFERENCE_CUT
 from lobewatch.monitoring.alarm import Alarm
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
@@ -40,63 +36,42 @@ COUNTING_TEXT = "Those that count, the newest first"
 
 def make_series(data: ReportData) -> list[Section]:
     """Make a table of the series, the largest drop first."""
-    heads = ["tool", "direction", "light", "points", "newest", "change", "rate"]
-    rows = [_series_row(series) for series in data.outlook.status.series]
+    heads, rows = ["tool", "direction", "light", "points", "newest", "change", "rate"], list[list[str | TableCell]]()
+    for series in data.outlook.status.series:
+        ordered, trend = sort_by_severity(series.remarks), series.trend
+        worst, early = worst_status(ordered), is_early_alarm(ordered)
+        light = TableCell(status_label(worst, early), status_css_class(worst, early))
+        points = "0" if trend is None else str(len(trend.points))
+        rate = "-" if trend is None else rate_text(trend) or f"from {MIN_FORECAST_POINTS} points on"
+        change = change_since_start_text(series)
+        rows.append([series.tool, series.direction, light, points, f"{series.time:%Y-%m-%d}", change, rate])
     return [Section("Tools and directions", [DataTable(heads, rows, "words")], is_framed=False)]
-
-
-def _series_row(series: SeriesStatus) -> list[str | TableCell]:
-    ordered = sort_by_severity(series.remarks)
-    worst, early = worst_status(ordered), is_early_alarm(ordered)
-    trend = series.trend
-    return [
-        series.tool,
-        series.direction,
-        TableCell(status_label(worst, early), status_css_class(worst, early)),
-        "0" if trend is None else str(len(trend.points)),
-        f"{series.time:%Y-%m-%d}",
-        change_since_start_text(series),
-        "-" if trend is None else rate_text(trend) or f"from {MIN_FORECAST_POINTS} points on",
-    ]
 
 
 def make_events(data: ReportData) -> list[Section]:
     """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
     files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
-    lines = [(event.time, event_day_text(event)) for event in files.events]
-    lines += [
-        (word.time, f"{word.time.astimezone():%Y-%m-%d}: {word.alarm_id} {word}") for word in files.acknowledgements
+    lines = [
+        (item.time, f"{item.text}{' (new baseline)' if item.new_baseline else ''}") for item in files.contents.events
     ]
-    lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in data.excluded_rows]
-    if not lines:
-        return []
-    heading = "What was done, and tests that do not count"
-    return [Section(heading, [BulletList([line for _, line in sorted(lines)])])]
-
-
-def event_day_text(event: MaintenanceEvent) -> str:
-    """Return day and text of an event."""
-    return f"{event.time.astimezone():%Y-%m-%d}: {event.text}{' (new baseline)' if event.new_baseline else ''}"
-
-
-def _excluded_line(row: HistoryRow, reason: str) -> str:
-    value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
-    return f"{row.time.astimezone():%Y-%m-%d}: tap test excluded ({reason}){value}"
+    lines += [(word.time, f"{word.alarm_id} {word}") for word in files.contents.acknowledgements]
+    for row in data.excluded_rows:
+        value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
+        lines.append((row.time, f"tap test excluded ({reasons[row.tap_id]}){value}"))
+    bullets = BulletList([f"{time.astimezone():%Y-%m-%d}: {text}" for time, text in sorted(lines)])
+    return [Section("What was done, and tests that do not count", [bullets])] if lines else []
 
 
 def make_test_cuts(data: ReportData) -> list[Section]:
     """Make the table of test cuts, the newest first."""
-    rows = [_cut_row(cut) for cut in reversed(data.analysis.cuts)]
-    if not rows:
-        return []
+    rows = list[list[str]]()
+    for cut in reversed(data.analysis.cuts):
+        about = [f"{cut.at.astimezone():%Y-%m-%d %H:%M}", cut.program or REFERENCE_CUT, cut.tool]
+        rows.append([*about, f"{cut.speed_rpm:.0f}", f"{1e3 * cut.depth:.4g}", cut_result_text(cut), cut.by])
     table = DataTable(["when", "cut", "tool", "rpm", "mm", "heard", "by"], rows, "words")
-    return [Section("Test cuts", [Paragraph(f"{COUNTING_TEXT}, as they were heard.", is_small=True), table])]
-
-
-def _cut_row(cut: CutEntry) -> list[str]:
-    time, name = f"{cut.at.astimezone():%Y-%m-%d %H:%M}", cut.program or REFERENCE_CUT
-    return [time, name, cut.tool, f"{cut.speed_rpm:.0f}", f"{1e3 * cut.depth:.4g}", cut_result_text(cut), cut.by]
+    note = Paragraph(f"{COUNTING_TEXT}, as they were heard.", is_small=True)
+    return [Section("Test cuts", [note, table])] if rows else []
 
 
 def make_tap_tests(data: ReportData) -> list[Section]:
@@ -110,22 +85,17 @@ def make_tap_tests(data: ReportData) -> list[Section]:
 
 def _tap_row(row: HistoryRow) -> list[str]:
     values = (row.frequency, row.damping_ratio, row.stiffness, row.bearing_stiffness)
-    cells = [_estimate_text(value, form, scale) for value, (form, scale) in zip(values, TAP_VALUE_FORMATS, strict=True)]
+    formats = zip(values, TAP_VALUE_FORMATS, strict=True)
+    cells = [form.format(value.value / scale) if value.is_known else "-" for value, (form, scale) in formats]
     words = [f"{name} {VERDICT_STYLES[ruling.stability].symbol}" for name, ruling in (row.verdicts or {}).items()]
     asked = [f"question {question.code}" for question in row.questions]
     return [f"{row.time.astimezone():%Y-%m-%d %H:%M}", row.tool, row.direction, *cells, "; ".join([*asked, *words])]
 
 
-def _estimate_text(value: Estimate, form: str, scale: float) -> str:
-    return form.format(value.value / scale) if value.is_known else "-"
-
-
 def _tap_values(row: HistoryRow) -> list[Any]:
     values = (row.frequency.value, row.damping_ratio.value / 0.01, row.stiffness.value / 1e6)
-    warmth = row.conditions.temperature_c
-    bearing = row.bearing_stiffness.value / 1e6
-    about = [row.time.isoformat(), row.tool, row.direction]
-    return [*about, *values, bearing, math.nan if warmth is None else float(warmth)]
+    warmth = math.nan if row.conditions.temperature_c is None else float(row.conditions.temperature_c)
+    return [row.time.isoformat(), row.tool, row.direction, *values, row.bearing_stiffness.value / 1e6, warmth]
 
 
 FAILURE_MODE = (
@@ -156,6 +126,7 @@ def make_provenance(data: ReportData) -> list[Section]:
     points = 0 if data.series.trend is None else len(data.series.trend.points)
     confidence = ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS
     tap = data.newest
+    channels = tap.hits[0].channels or () if tap.hits else ()
     rows = [
         ("machine", data.machine.machine.name),
         ("folder", data.analysis.folder.path.resolve().name),
@@ -163,7 +134,7 @@ def make_provenance(data: ReportData) -> list[Section]:
         ("newest tap test", f"{data.last.time.astimezone():%Y-%m-%d %H:%M}"),
         ("hammer held by", tap.circumstances.operator or "not said"),
         ("device", tap.circumstances.device or "not known: a recorded file"),
-        *((SENSOR_NAMES[channel.quantity], _sensor_text(channel)) for channel in _channels(tap)),
+        *((SENSOR_NAMES[channel.quantity], _sensor_text(channel)) for channel in channels),
         ("failure mode watched", FAILURE_MODE),
         ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
         *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
@@ -174,10 +145,6 @@ def make_provenance(data: ReportData) -> list[Section]:
 
 
 SENSOR_NAMES = {"force": "hammer", "acceleration": "accelerometer"}
-
-
-def _channels(tap: TapTest) -> Sequence[Channel]:
-    return tap.hits[0].channels or () if tap.hits else ()
 
 
 def _alarm_text(alarm: Alarm) -> str:

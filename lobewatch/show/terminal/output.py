@@ -12,8 +12,10 @@ import os
 import re
 import sys
 import webbrowser
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from itertools import starmap
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Protocol
 
 import typer
@@ -30,6 +32,10 @@ from lobewatch.show.terminal.option_names import with_option_names
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
+JsonObject = dict[str, Any]
+"""Object of the JSON output."""
+Texts = list[str | Table]
+"""Texts and tables of the output for people."""
 REPLACEMENT_CHARACTER = "\ufffd"
 """Character shown instead of a control character."""
 
@@ -48,14 +54,17 @@ class SafeTable(Table):
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
         """Add a row."""
-        super().add_row(*(_one_line(cell) if isinstance(cell, str) else cell for cell in cells), **options)
+        safe = (make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells)
+        super().add_row(*safe, **options)
 
     @property
     def min_table_width(self) -> int:
         """Smallest width (characters) that leaves a word for each column that wraps; 0 for any width."""
         breaking = sum(not column.no_wrap for column in self.columns)
-        wholes = (_max_cell_width([column.header, *column.cells]) for column in self.columns if column.no_wrap)
-        return sum(wholes) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
+        whole = ([column.header, *column.cells] for column in self.columns if column.no_wrap)
+        texts = ("\n".join(Text.from_markup(cell).plain for cell in cells if isinstance(cell, str)) for cells in whole)
+        widths = (max(map(cell_len, text.split("\n"))) for text in texts)
+        return sum(widths) + breaking * MIN_COLUMN_WIDTH + COLUMN_GAP * (len(self.columns) - 1) if breaking else 0
 
 
 MIN_COLUMN_WIDTH = 10
@@ -68,14 +77,14 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 """Console for results, wide enough for every table: a narrow terminal may wrap lines, but no number is cut off."""
 
 
-def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
+def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
         import msgspec  # only JSON output waits for it
 
-        plain = _json_value(msgspec.to_builtins(payload, enc_hook=_to_list))
-        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
-        exact = CONTROL_CHARACTERS.sub(_escape_control, exact)
+        plain = _json_value(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
+        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
+        exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
         else:
@@ -121,25 +130,10 @@ def count_noun(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' if count > 1 else ''}"
 
 
-def _max_cell_width(cells: Iterable[RenderableType]) -> int:
-    texts = (Text.from_markup(cell).plain for cell in cells if isinstance(cell, str))
-    return max(cell_len(line) for text in texts for line in text.split("\n"))
-
-
-def _one_line(cell: str) -> str:
-    return CONTROL_CHARACTERS.sub(REPLACEMENT_CHARACTER, with_option_names(cell))
-
-
-def make_printable(text: str) -> str:
-    """Replace control characters except newline and tab, and name options instead of library fields."""
-    return CONTROL_CHARACTERS.sub(
-        lambda match: match[0] if match[0] in "\n\t" else REPLACEMENT_CHARACTER, with_option_names(text)
-    )
-
-
-def _escape_control(match: re.Match[str]) -> str:
-    """Escape a control character as in JSON; newlines occur only between lines."""
-    return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
+def make_printable(text: str, kept: str = "\n\t") -> str:
+    """Replace control characters except those to keep, and name options instead of library fields."""
+    named = with_option_names(text)
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else REPLACEMENT_CHARACTER, named)
 
 
 def _json_value(value: Any) -> Any:
@@ -152,8 +146,52 @@ def _json_value(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _to_list(array: Any) -> Any:
-    return array.tolist()
+FIELD_PATTERN = re.compile(r"(\w+)(?:=([\w.-]+))?(?:([*/])([\d.e]+))?")
+"""Key, attribute path, and factor or divisor of a unit."""
+JsonFields = Callable[[Any], JsonObject]
+"""Function that makes the JSON object of a record."""
+
+
+def json_fields(table: str, encoders: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})) -> JsonFields:
+    """Return a function that makes the JSON object of a record, its keys in the order of the table.
+
+    An entry of the table is a key, `key=path.of.attribute`, or either of them with the factor or divisor of its unit;
+    the path `self` is the record, a number in a path an index. The value is None where a part of the path is None. An
+    encoder makes the value of its key from the attribute. Encoder and unit apply to each item of a list or tuple.
+
+    >>> from types import SimpleNamespace
+    >>> pocket = SimpleNamespace(speed_rpm=6000.0, tip=SimpleNamespace(depth=0.002), mode=None)
+    >>> json_fields("speed_rpm depth_mm=tip.depth*1e3 frequency_hz=mode.frequency", {"speed_rpm": round})(pocket)
+    {'speed_rpm': 6000, 'depth_mm': 2.0, 'frequency_hz': None}
+    """
+    fields = [_read_field(entry, encoders) for entry in table.split()]
+    return lambda record: {key: value(record) for key, value in fields}
+
+
+def _read_field(entry: str, encoders: Mapping[str, Callable[[Any], Any]]) -> tuple[str, Callable[[Any], Any]]:
+    match = FIELD_PATTERN.fullmatch(entry)
+    if match is None:
+        raise ValueError(f"{entry!r} is no key=path.of.attribute*factor")
+    key, path, operator, unit = match.groups()
+    names, size = [] if path == "self" else (path or key).split("."), float(unit or 1)
+    encode = encoders.get(key, lambda value: value)
+
+    def scale(number: Any) -> Any:
+        return number * size if operator == "*" else number / size
+
+    def value(record: Any) -> Any:
+        part = reduce(_follow, names, record)
+        is_list = isinstance(part, (list, tuple)) and not hasattr(part, "_fields")
+        convert = scale if operator else encode
+        return list(map(convert, part)) if is_list else None if part is None else convert(part)
+
+    return key, value
+
+
+def _follow(part: Any, name: str) -> Any:
+    if part is None:
+        return None
+    return part[int(name)] if name.lstrip("-").isdigit() else getattr(part, name)
 
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
@@ -190,15 +228,12 @@ def blank_nonfinite(value: Any) -> Any:
 
 
 Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
-Token = Annotated[
-    str | None, typer.Option(help="What a browser must know to see and alter anything; a new one where not given.")
-]
-WatchToken = Annotated[
-    str | None, typer.Option(help="What a browser must know only to see anything; a new one where not given.")
-]
+KNOWN = "What a browser must know"
+Token = Annotated[str | None, typer.Option(help=f"{KNOWN} to see and alter anything; a new one where not given.")]
+WatchToken = Annotated[str | None, typer.Option(help=f"{KNOWN} only to see anything; a new one where not given.")]
 
 
-class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
+class ServedScreen(contextlib.AbstractContextManager["ServedScreen"], Protocol):
     """Server of a screen that answers within its context."""
 
     @property
@@ -213,7 +248,7 @@ class ScreenServer(contextlib.AbstractContextManager["ScreenServer"], Protocol):
 
 
 @contextlib.contextmanager
-def serve_screen(server: ScreenServer) -> Iterator[None]:
+def serve_screen(server: ServedScreen) -> Iterator[None]:
     """Run a screen server, and print its address."""
     with server:
         show_address(server.url, server.watch_url)
@@ -226,8 +261,7 @@ def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
         results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
         results.file.flush()
     else:
-        notes.print(f"screen: {url}", markup=False)
-        notes.print(f"only to watch: {watch_url}", markup=False)
+        notes.print(f"screen: {url}\nonly to watch: {watch_url}", markup=False)
     display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.stdout.isatty() and display:
         webbrowser.open(url)

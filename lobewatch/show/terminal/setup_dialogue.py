@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lobewatch.machine.setup_questions.draft import DetectedDaq, MachineDraft, SetupQuestion, find_daqs
-from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS
-from lobewatch.machine.setup_questions.sensor_questions import DAQ_QUESTION
+from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
+from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
 from lobewatch.show.terminal.output import notes
 
 
@@ -19,19 +18,16 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
             if question is DAQ_QUESTION and draft.daq.problem:
                 _print_notes(f"note: {draft.daq.problem}")
     if draft.missing_sensors:
-        raise ValueError(
-            f"--{draft.missing_sensors[0]}: missing; a {draft.daq.driver} DAQ does not know its sensors: "
-            "give their input, sensitivity and range"
-        )
+        cure = f"a {draft.daq.driver} DAQ does not know its sensors: give their input, sensitivity and range"
+        raise ValueError(f"--{draft.missing_sensors[0]}: missing; {cure}")
     return draft
 
 
 def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
     """Ask a person the questions that `answers` of options do not cover; raise EOFError where nobody answers."""
     if questions == SETUP_QUESTIONS:
-        _print_notes(
-            "Enter takes what stands in [brackets], - leaves something open; nothing is written before the end."
-        )
+        keys = "Enter takes what stands in [brackets], - leaves something open"
+        _print_notes(f"{keys}; nothing is written before the end.")
     for question in questions:
         number = SETUP_QUESTIONS.index(question) + 1
         already = question.skip_reason(draft)
@@ -53,9 +49,8 @@ def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Map
 
 def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDraft:
     """Ask one question until its answer is valid."""
-    _print_notes(
-        f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}", f"    for example: {question.example}"
-    )
+    _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}")
+    _print_notes(f"    for example: {question.example}")
     while True:
         current = question.read_current(draft)
         notes.print(f"    [{current}] > " if current else "    > ", end="", markup=False)
@@ -66,9 +61,11 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
         try:
             answered = question.apply_answer(draft, answer).checked()
         except ValueError as error:
-            _print_notes(f"    {_strip_file_name(error)}")
+            _print_notes(f"    {str(error).removeprefix('machine.toml: ')}")
             continue
-        _print_notes(*(f"    {text}" for text in _daq_notes(answered) if question is DAQ_QUESTION))
+        look, again = answered.daq, "; the port is kept: lobewatch ports looks again"
+        if question is DAQ_QUESTION and (text := f"{look.problem}{again}" if look.problem else look.text):
+            _print_notes(f"    {text}")
         return answered
 
 
@@ -79,17 +76,6 @@ def _find_daqs(draft: MachineDraft) -> MachineDraft:
     if not looks:
         _print_notes("    none answers on a USB port; name its port, or - and give it later with --port")
     return replace(draft, detected_daqs={**draft.detected_daqs, **{look.port: look for look in looks}})
-
-
-def _daq_notes(draft: MachineDraft) -> list[str]:
-    look: DetectedDaq = draft.daq
-    if look.problem:
-        return [f"{look.problem}; the port is kept: lobewatch ports looks again"]
-    return [f"{look.text}"] if look.text else []
-
-
-def _strip_file_name(error: ValueError) -> str:
-    return str(error).removeprefix("machine.toml: ")
 
 
 def _print_notes(*texts: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lobewatch.monitoring.status_rules import StatusLevel
+from lobewatch.monitoring import StatusLevel
 
 STATUS_LABELS = {
     StatusLevel.ALARM: "✗ ALARM",

@@ -243,7 +243,7 @@ def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
         formats.add(body[11])
         return decode_data(body)
 
-    monkeypatch.setattr("acquisition.taps.source.decode_data", look)
+    monkeypatch.setattr("acquisition.taps.protocol.decode_data", look)
     fine = tuple(replace(channel, adc_bits=bits) for channel in channels)
     with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
         assert source.channels == fine

@@ -84,7 +84,7 @@ def test_the_power_of_a_cut_says_a_kt_at_the_speed_that_was_heard(shop: Shop, tm
     assert f"4 kW say Kt {heard.power.tangential / 1e6:.0f} N/mm2, machine.toml 1400" in text
     wrong = run(shop, *place, "--power", 4000)
     assert "--power 4000: with the Kt of 1400 N/mm2" in str(wrong.exception)
-    assert len(shop.logbook.files.cuts) == 2
+    assert len(shop.logbook.files.contents.cuts) == 2
 
 
 def test_a_quiet_cut_is_stable_and_nothing_is_kept_without_wish(shop: Shop, tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_a_quiet_cut_is_stable_and_nothing_is_kept_without_wish(shop: Shop, tmp_
     result = run(shop, "--cut", "reference cut", "--speed", 12000, "--depth", 1, "--file", file, "--dry-run")
     assert result.stdout.splitlines()[0] == "stable"
     assert "12077.0 rpm (+0.64 % of 12000)" in result.stdout
-    assert shop.logbook.files.cuts == ()
+    assert shop.logbook.files.contents.cuts == ()
 
 
 def test_a_recording_that_is_kept_says_the_same_again(shop: Shop, tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, t
     assert (told["word"], told["reason"]) == ("cannot tell", "no-cut")
     assert (told["speed_rpm"], told["chatter_frequency_hz"]) == (None, None)
     assert shop.logbook.cuts == ()
-    assert len(shop.logbook.files.cuts) == 1
+    assert len(shop.logbook.files.contents.cuts) == 1
 
 
 def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measurement import build_model_state
 from lobewatch.show.figures.spindle_figures import plot_model
 from lobewatch.tool import speed_grid
-from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.assembly import predict_assembly
 from lobewatch.verdicts import Stability
 from modal import Mode
 from tests.lobewatch.commands.invoke import invoke

@@ -17,7 +17,7 @@ from lobewatch.history.row_codec import decode_row, encode_row
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.tool import Assembly
-from lobewatch.tool.prediction import predict_assembly
+from lobewatch.tool.assembly import predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, compute_scatter
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, N_BAND_SAMPLES, compute_limit_band
 from lobewatch.verdicts.program_case import build_program

@@ -243,7 +243,7 @@ def test_corrections_are_taken_back_by_later_lines(shop: Shop) -> None:
     run("event", shop.path, "greased", "--date", "2026-02-01")
     logbook = shop.logbook
     assert [tap.id for tap in logbook.taps] == [tap_id]
-    assert [event.id for event in logbook.files.events] == ["e2"]
+    assert [event.id for event in logbook.files.contents.events] == ["e2"]
     kinds = [entry["kind"] for entry in shop.folder.journal.read().entries]
     assert kinds == ["tap", "exclude", "include", "event", "event", "event"]
     assert run("verify", shop.path).exit_code == 0
@@ -286,7 +286,7 @@ def test_two_events_on_a_day_count_both_and_the_newest_baseline_holds(shop: Shop
     shop.tap(20, 1713.0)
     first, last = shop.logbook.history.rows
     assert (first.baseline, last.baseline) == (day(shop, -10), day(shop, 10))
-    assert len(shop.logbook.files.events) == 3
+    assert len(shop.logbook.files.contents.events) == 3
 
 
 def test_a_folder_on_a_read_only_disk_is_reported_and_checked(

@@ -279,4 +279,4 @@ def test_what_cannot_be_told_teaches_nothing_and_is_kept(shop: Shop) -> None:
     store_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
     logbook = Logbook.open(shop.path)
     assert logbook.cuts == ()
-    assert len(logbook.files.cuts) == 1
+    assert len(logbook.files.contents.cuts) == 1

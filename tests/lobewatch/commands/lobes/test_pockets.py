@@ -16,7 +16,7 @@ from lobewatch.machine import drive_depth_limit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.lobe_figures import BAND_LABEL, plot_comparison
-from lobewatch.show.programs.lobes import comparison_json, comparison_texts
+from lobewatch.show.programs.advice import comparison_json, comparison_texts
 from lobewatch.tool import DynamicsSource, LobeMethod, compute_lobes
 from lobewatch.verdicts import Stability
 from lobewatch.verdicts.recommendation import find_stable_pockets

@@ -13,7 +13,7 @@ from acquisition import DataError, TapTest, new_tap_id
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.folder_updates import add_event
-from lobewatch.machine.journal.journal_scan import JournalFileState, scan_journal_file
+from lobewatch.machine.journal.journal import JournalFileState, scan_journal_file
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.verify_files import verify
 

@@ -20,7 +20,7 @@ from lobewatch.machine.settings.setting_questions import (
     find_program_questions,
     find_template_bearings,
 )
-from lobewatch.machine.settings.toml_text import TablePath, edit_toml
+from lobewatch.machine.settings.toml import TablePath, edit_toml
 
 ROOT = Path(__file__).parents[4]
 UNSEEN = set(re.findall(r"^\| `([^`]+)` \|", (ROOT / "docs/plausible.md").read_text("utf-8"), re.MULTILINE))

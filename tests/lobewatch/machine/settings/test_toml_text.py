@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import DataError
-from lobewatch.machine.settings.toml_text import TablePath, TomlValue, edit_toml
+from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml
 
 NEW, EXAMPLE = (
     resources.files("sim_data").joinpath(name).read_text("utf-8")

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import Remark
-from lobewatch.show.terminal.json_fields import json_fields
-from lobewatch.show.terminal.output import emit
+from lobewatch.show.terminal.output import emit, json_fields
 
 pytestmark = pytest.mark.quick
 

@@ -13,8 +13,7 @@ import pytest
 from rich.console import Console
 
 from acquisition import HitFlags
-from lobewatch.show.terminal.tap_printer import TapPrinter
-from lobewatch.show.terminal.terminal_screen import TerminalScreen, normalize_keys, render_state
+from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen, normalize_keys, render_state
 from lobewatch.tap.state import Check, Choice, ListedHit, Outcome, ProgramVerdict, TapState, TapStep
 
 GOOD = ListedHit(1, HitFlags.OK, "231 N")

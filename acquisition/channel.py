@@ -1,7 +1,5 @@
 """One input of the data acquisition device (DAQ), and a block of its samples."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal, cast, get_args
 

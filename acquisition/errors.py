@@ -6,8 +6,6 @@ ValueError
 └── DataError       a file that cannot be used, with the place and what to do
 """
 
-from __future__ import annotations
-
 import errno
 import re
 from collections.abc import Iterable

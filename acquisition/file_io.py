@@ -1,7 +1,5 @@
 """Write files atomically and read regular files of bounded size."""
 
-from __future__ import annotations
-
 import errno
 import os
 import secrets

@@ -1,7 +1,5 @@
 """Load records of other packages (drivers, file formats) from entry points."""
 
-from __future__ import annotations
-
 from importlib.metadata import EntryPoint
 from traceback import format_exception_only
 from typing import Protocol, TypeVar

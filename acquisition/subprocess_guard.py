@@ -1,7 +1,5 @@
 """Run fragile code in a subprocess with limits on time and memory."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

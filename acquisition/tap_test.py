@@ -1,7 +1,5 @@
 """One tap test: its conditions, all its hits and the averaged FRF."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import secrets

@@ -1,7 +1,5 @@
 """Receptance and static stiffness of a spindle, and tools coupled to it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

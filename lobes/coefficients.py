@@ -1,7 +1,5 @@
 """Cutting-force coefficients of one material."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Milling cut and program: geometry, conventions, torque and power."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -8,8 +8,6 @@ bytes 0..511           (HDF5 user block) "lobewatch-history 1 sha256 ..." of all
 /cuts/0/limiting_depth (n, m), m
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

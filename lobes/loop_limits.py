@@ -1,7 +1,5 @@
 """Stability limits of a chatter loop given over frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import partial
 

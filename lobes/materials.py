@@ -4,8 +4,6 @@ A material of materials.csv has the specific forces of its VDI 3323 group, of it
 specific_cutting_forces.csv, and the ratio Kr/Kt of force_ratios.csv of its VDI 3323 group, else of its ISO 513 group.
 """
 
-from __future__ import annotations
-
 import csv
 import difflib
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Modes of the tool tip as one system: directions, projections, frequency drop."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args

@@ -1,7 +1,5 @@
 """Unequal pitches as tool makers grind them, within limits of chip load and balance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Stable pockets between the lobes, and how they move."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Result of every stability method: limits over speed and over radial depth."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Receptance at the tool tip over frequency, from modes or from a measured FRF."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

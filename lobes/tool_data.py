@@ -5,8 +5,6 @@ material, and slots or side cuts. The finest group with rows counts. The range c
 and at least a quarter on both sides of its middle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args

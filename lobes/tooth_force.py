@@ -1,7 +1,5 @@
 """Directional force matrix H of the rotating cutter, and its integrals; conventions in `Cut`."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

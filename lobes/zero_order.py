@@ -1,7 +1,5 @@
 """Stability lobes by the zero-order approximation and by the average tooth angle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fit modes to FRFs or free decays by weighted least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

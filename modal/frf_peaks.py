@@ -1,7 +1,5 @@
 """Read peaks of an FRF directly: peak picking, mode indicator, truncated peaks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimate errors of modes from single hits: hammer noise, jackknife, linearity check."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Least-squares complex frequency domain (LSCF) poles and their stabilisation chart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise

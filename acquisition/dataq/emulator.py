@@ -1,7 +1,5 @@
 """Emulate a DATAQ device on a pseudo-terminal or a TCP port, byte for byte."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

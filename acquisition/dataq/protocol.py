@@ -5,8 +5,6 @@ of little-endian 16-bit words, one per entry of the scan list, without header, c
 Source: Data Acquisition Instrument Command Protocol, DATAQ Instruments. docs/devices.md says what is proven.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Mapping, Sequence

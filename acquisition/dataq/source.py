@@ -1,7 +1,5 @@
 """Read scans from a DATAQ device on its virtual serial port."""
 
-from __future__ import annotations
-
 import enum
 import time
 from collections import deque

@@ -5,8 +5,6 @@ that follows, so that another word appears in its place. The decoder then resume
 of whole scans moves nothing. A square wave on a digital input shows it by a period that is too short.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Scan serial ports and vendor libraries for devices that answer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast

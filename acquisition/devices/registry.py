@@ -1,7 +1,5 @@
 """Find, load, query and check device drivers, including those of other packages."""
 
-from __future__ import annotations
-
 import queue
 import threading
 from collections.abc import Callable, Iterator

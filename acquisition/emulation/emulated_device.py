@@ -1,7 +1,5 @@
 """Building blocks of an emulated device: signal function, wire and server thread."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select

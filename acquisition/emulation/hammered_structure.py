@@ -5,8 +5,6 @@ form: a forced and a free part during the pulse, a free part after it. Hence the
 A static residual flexibility represents the modes left out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Acceleration of the spindle housing during an emulated cut."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

@@ -16,8 +16,6 @@ surface is stored by its angle, not by its time.
 Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation with run-out and loss of contact).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A milling cut, and the tables of its modes and teeth for time stepping."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Estimate the averaged FRF of hits, its running mean and its errors from force noise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, get_args
 

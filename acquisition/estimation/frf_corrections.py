@@ -1,7 +1,5 @@
 """Apply and correct exponential windows, and remove the mass of the sensor."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

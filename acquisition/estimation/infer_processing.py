@@ -1,7 +1,5 @@
 """Infer unstated processing of an FRF: averages, window, zero padding and smoothing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

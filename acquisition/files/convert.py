@@ -1,7 +1,5 @@
 """Convert a recorded file to a format of other programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

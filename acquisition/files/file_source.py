@@ -1,7 +1,5 @@
 """Source that replays recorded hits like a live device."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import deque

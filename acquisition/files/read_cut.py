@@ -1,7 +1,5 @@
 """Read the recording of a cut by accelerometers or a microphone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

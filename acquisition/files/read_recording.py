@@ -1,7 +1,5 @@
 """Detect the format of a recorded file and read its hits or its FRF."""
 
-from __future__ import annotations
-
 import functools
 import logging
 import math

@@ -1,7 +1,5 @@
 """Write an FRF or hits as text table, MATLAB file, SEP005 JSON or universal file."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Detect double hits in the force pulse and in the free decay."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from statistics import NormalDist
 

@@ -1,7 +1,5 @@
 """Detect clipped signals and mains hum in a hit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

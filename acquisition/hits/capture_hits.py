@@ -4,8 +4,6 @@ A hit starts at a crossing of the trigger level, with hysteresis and real pre-tr
 when the structure is at rest.
 """
 
-from __future__ import annotations
-
 import functools
 import operator
 from collections import deque

@@ -1,7 +1,5 @@
 """Extract the free decay after a hit and estimate its time constant."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from acquisition.arrays import Floats

@@ -1,7 +1,5 @@
 """Find the force pulse of a hit and window the force around it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 

@@ -1,7 +1,5 @@
 """List, find and open serial ports, and explain why one cannot be opened."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select

@@ -1,7 +1,5 @@
 """Measure the sample rate and the channel skew of a DAQ."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Check hammer and accelerometer together: a hung mass must obey F = m a."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any

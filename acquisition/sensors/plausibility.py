@@ -1,7 +1,5 @@
 """Remarks on implausible sensitivities, units, calibration dates and stiffnesses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import date
 

@@ -1,7 +1,5 @@
 """Serve any device as a TAPS/1 device on TCP, so that a host elsewhere can read it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Emulate a TAPS/1 device and its faults on a pseudo-terminal or TCP port."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from dataclasses import dataclass, replace

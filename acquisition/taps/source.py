@@ -1,7 +1,5 @@
 """Read scans from a TAPS/1 device on a serial port or TCP."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import struct

@@ -4,8 +4,6 @@ The payload of a frame is a scan: the counter (u16), if there is one, and a valu
 checksum is the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
 

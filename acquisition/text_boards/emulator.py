@@ -1,7 +1,5 @@
 """Emulate a board that prints a counter and the values of its sensors."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Read scans from a board that prints its samples."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence

@@ -5,8 +5,6 @@ The name of a Modal Shop device holds its calibration: model, format, serial num
 Source: The Modal Shop, MAN-0343, USB audio interface guide, 2021.
 """
 
-from __future__ import annotations
-
 import queue
 import re
 from collections.abc import Sequence

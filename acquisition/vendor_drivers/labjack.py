@@ -3,8 +3,6 @@
 They do not power IEPE sensors, and sample their inputs one after the other.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Devices read through the Python library of their vendor."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence

@@ -4,8 +4,6 @@ The MCC 172 has two IEPE inputs on a Raspberry Pi, read through daqhats. USB dev
 read through uldaq and do not power IEPE sensors.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack

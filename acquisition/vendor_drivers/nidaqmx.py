@@ -1,7 +1,5 @@
 """NI devices, such as the IEPE modules NI 9234 and 9230, through NI-DAQmx."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace

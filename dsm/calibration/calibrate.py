@@ -1,7 +1,5 @@
 """Calibrate bearing stiffness to one measured natural frequency."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

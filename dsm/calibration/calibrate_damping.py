@@ -1,7 +1,5 @@
 """Calibrate the damping of bearings to one measured damping ratio."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

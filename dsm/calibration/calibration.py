@@ -1,7 +1,5 @@
 """Result of a stiffness calibration, with the remaining preload."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

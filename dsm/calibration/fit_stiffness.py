@@ -1,7 +1,5 @@
 """Fit several bearing and joint stiffnesses to several measured natural frequencies."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Receptance for many bearing stiffnesses at once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Remarks and rounded values of calibration reports."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Result of a stiffness fit, and the prediction of further modes from it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Groups of bearings and joints that are calibrated together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

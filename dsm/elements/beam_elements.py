@@ -1,7 +1,5 @@
 """Nodes of a shaft, and the beam elements between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

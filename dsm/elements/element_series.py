@@ -1,7 +1,5 @@
 """Power series of beam elements: stiffness, transfer matrix, rotary inertia."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 from functools import cache
 from math import comb, factorial

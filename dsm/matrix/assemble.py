@@ -1,7 +1,5 @@
 """Assemble the dynamic stiffness matrix of a spindle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Condense a shaft to the stiffness at one node, with or without damping."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

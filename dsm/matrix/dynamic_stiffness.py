@@ -1,7 +1,5 @@
 """Dynamic stiffness matrix of a whole shaft, its factor, and the count of modes below a frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Finite-element start values and Newton iteration for modes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Strain energy of a mode in segments, bearings, housings and joints."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

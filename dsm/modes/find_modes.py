@@ -1,7 +1,5 @@
 """Find the lowest natural modes of a spindle, proved complete."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

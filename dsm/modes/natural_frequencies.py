@@ -1,7 +1,5 @@
 """Natural frequencies, mode shapes and modal stiffness of a spindle."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """Whirl frequencies over speed (Campbell diagram) and critical speeds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

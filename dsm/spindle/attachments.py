@@ -1,7 +1,5 @@
 """Bearings, joints and masses on a shaft, and bearings in series with their housings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Cross-sections along a shaft."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Shaft segments and their materials."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

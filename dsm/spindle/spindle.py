@@ -1,7 +1,5 @@
 """The spindle as plain data, and the same spindle with another tool."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace

@@ -1,7 +1,5 @@
 """Natural frequencies of a spinning beam, proved complete by counting."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.linalg import eig, eigh
 

@@ -1,7 +1,5 @@
 """Stability of a program, and the largest stable depth at its speed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

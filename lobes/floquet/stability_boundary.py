@@ -1,7 +1,5 @@
 """Stability boundary over speed by semi-discretisation, and its chatter frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Assess the machines of a folder and refresh those whose files have changed."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Summarize the status of one machine and keep the summary in standing.json."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 from datetime import datetime, timedelta

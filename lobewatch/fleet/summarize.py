@@ -3,8 +3,6 @@
 This module imports the logbook and numpy. Modules that must start fast use it through `lobewatch.fleet`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

@@ -1,7 +1,5 @@
 """Read the tap tests of machines as columns, straight from the bytes of their histories."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence

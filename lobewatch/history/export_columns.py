@@ -1,7 +1,5 @@
 """Columns and lobes of a history for export."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any

@@ -1,7 +1,5 @@
 """Cache of the history in history.rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import zip_longest

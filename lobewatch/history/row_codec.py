@@ -1,7 +1,5 @@
 """Encode and decode a history row."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from datetime import datetime
 from typing import Any

@@ -4,8 +4,6 @@ A result depends on its own file, on the followed mode before it, and in the oth
 taken from. So after an old tap test is added or excluded, only its neighbours are analysed again.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence

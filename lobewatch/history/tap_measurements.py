@@ -1,7 +1,5 @@
 """Measurements and history rows of all tap tests of a machine."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Usable tap tests of a machine; a test with a damaged file is left out from then on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import UTC, datetime
 

@@ -1,7 +1,5 @@
 """Analyze the usable tap tests of one machine, and cache each result."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime

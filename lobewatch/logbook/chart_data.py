@@ -1,7 +1,5 @@
 """Collect the data of charts: stability lobes then and now, and the spindle model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

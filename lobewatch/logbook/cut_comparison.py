@@ -1,7 +1,5 @@
 """Compare recorded cuts with the prediction of the tap tests, and store them in the journal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime

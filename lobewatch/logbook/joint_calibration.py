@@ -1,7 +1,5 @@
 """Calibrate joints and bearings of the model from tap tests of several tools."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Forecast when programs become doubtful or not stable and when limits are reached."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

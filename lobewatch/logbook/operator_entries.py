@@ -1,7 +1,5 @@
 """Store operator entries: acknowledged alarms and modes edited by hand."""
 
-from __future__ import annotations
-
 import getpass
 from collections.abc import Sequence
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Rebuild history.rows from the tap tests, with the verdict on every program after each test."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Preview what a replay would make of recorded files, without storing anything."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Evaluate requested cuts: verdicts, recommended settings and unequal pitches."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

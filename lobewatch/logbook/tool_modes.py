@@ -1,7 +1,5 @@
 """Match the modes of the newest tap tests of several tools to modes of the model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Measured sample rates of the DAQs of a machine (daq.json)."""
 
-from __future__ import annotations
-
 import time
 import zlib
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Machine folder: machine.toml, taps/, journal.jsonl, spool/ and history.rows."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Name, watch and create the files of a machine folder without heavy imports."""
 
-from __future__ import annotations
-
 import json
 import os
 from importlib import resources

@@ -1,7 +1,5 @@
 """Lock of a machine folder, and disk space reserved in it."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

@@ -1,7 +1,5 @@
 """Write events, exclusions, test cuts, mode edits, programs and accepted settings to a machine folder."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """Rebuild a damaged machine folder from its sound files."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

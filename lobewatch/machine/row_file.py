@@ -4,8 +4,6 @@ The file begins with a line that names its format. Each row is its length and it
 and its bytes. The rest of a row after a crash is ignored, and the next row overwrites it.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterable, Sequence

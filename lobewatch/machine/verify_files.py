@@ -1,7 +1,5 @@
 """Verify every file of a machine folder against its checksums."""
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 import json

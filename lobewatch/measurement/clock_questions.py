@@ -3,8 +3,6 @@
 The fleet overview imports this module, so it needs neither numpy nor tap files.
 """
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta

@@ -1,7 +1,5 @@
 """Exponential windows on responses: correct, apply and detect them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self

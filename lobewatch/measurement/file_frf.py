@@ -1,7 +1,5 @@
 """Read the FRF of a recorded file with its hits."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

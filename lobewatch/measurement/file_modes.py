@@ -1,7 +1,5 @@
 """Fit the modes of a recorded file and match them with other files."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

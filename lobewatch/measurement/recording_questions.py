@@ -1,7 +1,5 @@
 """Questions on implausible tap tests, and their answers."""
 
-from __future__ import annotations
-
 import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence

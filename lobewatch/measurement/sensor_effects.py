@@ -1,7 +1,5 @@
 """Correct FRFs for sensor mass, and extract modes from decays without force."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Share tasks among processes or the workers of a Dask cluster."""
 
-from __future__ import annotations
-
 import asyncio
 import ipaddress
 import logging

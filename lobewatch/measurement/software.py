@@ -1,7 +1,5 @@
 """Versions of the software that results depend on."""
 
-from __future__ import annotations
-
 import platform
 from importlib.metadata import version
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Spindle model with calibrated bearings: FRF, summary and calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

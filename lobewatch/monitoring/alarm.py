@@ -3,8 +3,6 @@
 Imported with every look at a plant, so without numpy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import datetime

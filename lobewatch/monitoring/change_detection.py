@@ -12,8 +12,6 @@ would begin it at their highest points, and a third of them would end as a drop.
 evaluated by its own monitor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model se
 random numbers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

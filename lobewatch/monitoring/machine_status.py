@@ -3,8 +3,6 @@
 Pure: rows in, records out.
 """
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterator, Sequence

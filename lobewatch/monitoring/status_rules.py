@@ -3,8 +3,6 @@
 Imported with every look at a plant, so without numpy.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 The one form in which dates go to people, files and other programs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from datetime import date, timedelta

@@ -1,7 +1,5 @@
 """Shapes that a trend may have, and their fits by least squares."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Send retained MQTT 5 messages and keep undelivered ones in an outbox."""
 
-from __future__ import annotations
-
 import contextlib
 import threading
 import time

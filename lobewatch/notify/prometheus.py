@@ -1,7 +1,5 @@
 """Format the status of machines for Prometheus (text format 0.0.4)."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain

@@ -1,7 +1,5 @@
 """Comparison of numbers of the paper with ours, and of its claims with the evidence."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """The paper's spinning element A B^-1, equations (13) to (25), compared with the pole-free one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Finite-element validation of the paper, repeated with textbook elements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

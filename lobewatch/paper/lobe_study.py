@@ -1,7 +1,5 @@
 """Stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Shaft of Figs. 3 and 7 to 9: frequencies, calibrated bearings, critical speeds, tip stiffness."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from importlib import resources

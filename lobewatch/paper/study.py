@@ -1,7 +1,5 @@
 """Comparison with the paper from one run: all numbers and claims."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from lobewatch.paper import printed

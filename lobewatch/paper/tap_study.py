@@ -1,7 +1,5 @@
 """Tap test of Figs. 5 and 6: the mode of the paper, peak picking by (28) and (29), emulated hits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice

@@ -4,8 +4,6 @@ Without a limit, anyone who reaches the port could use up the descriptors of the
 neither store a hit nor reopen the device.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hmac

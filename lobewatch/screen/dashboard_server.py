@@ -1,7 +1,5 @@
 """Serve the dashboard: machines, their reports and live tap tests."""
 
-from __future__ import annotations
-
 import asyncio
 import ctypes
 import gc

@@ -1,7 +1,5 @@
 """Keep the table of all machines for the dashboard, with the changes since a request."""
 
-from __future__ import annotations
-
 import math
 import os
 import secrets

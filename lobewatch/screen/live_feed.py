@@ -1,7 +1,5 @@
 """Stream the states of a live test to a page over a WebSocket."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """Serve pages, live feeds and session routes from a thread."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import socket

@@ -1,7 +1,5 @@
 """Check the computer for a tap test: ports, rights, clock, disk, packages, browser."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re

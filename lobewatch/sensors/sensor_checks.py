@@ -1,7 +1,5 @@
 """Check the sensors of a machine: sample rate, known mass, and channel skew."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime

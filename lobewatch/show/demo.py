@@ -1,7 +1,5 @@
 """Show the tap tests of the demo: true and measured values."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import astuple
 from datetime import datetime

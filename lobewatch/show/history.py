@@ -1,7 +1,5 @@
 """Show the history of a machine: tap tests, events and test cuts, as table, CSV and JSON."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

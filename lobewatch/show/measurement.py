@@ -1,7 +1,5 @@
 """Show what one tap test measured, and the results at the end of tap tests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime
 

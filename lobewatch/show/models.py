@@ -1,7 +1,5 @@
 """Show spindle models and their calibrations, from one tool or from several."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

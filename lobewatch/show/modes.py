@@ -1,7 +1,5 @@
 """Show the modes of a tap test or of a recorded file."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence

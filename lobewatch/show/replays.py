@@ -1,7 +1,5 @@
 """Show replays, replay previews and rebuilds, with their progress."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Show serial ports and the devices that answer, their sensors with checks, and what was found of the computer."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Show the trend of a series: chart, sentences, forecast dates, CSV and JSON."""
 
-from __future__ import annotations
-
 import math
 from datetime import datetime
 from typing import Any

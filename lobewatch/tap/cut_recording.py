@@ -1,7 +1,5 @@
 """Record a cut with the accelerometer on the spindle housing and evaluate it live."""
 
-from __future__ import annotations
-
 import contextlib
 import enum
 import time

@@ -1,7 +1,5 @@
 """Open, watch and reconnect the device of a live test."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 

@@ -3,8 +3,6 @@
 Spindle and cut differ from the tapped machine and from machine.toml by a hidden truth.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Emulated DAQ on a spindle whose modes, from the spindle model, are known."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Evaluated hits of a live test, their mean, and the published state."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

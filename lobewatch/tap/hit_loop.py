@@ -1,7 +1,5 @@
 """Run the phases of a live test: self-check, trial hits and counted hits."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Curves of the last hit and of the mean, reduced for display."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

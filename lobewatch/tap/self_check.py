@@ -1,7 +1,5 @@
 """Check sensors, noise, hum and detectable band before the first hit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from datetime import UTC, date, datetime

@@ -1,7 +1,5 @@
 """Live tap test from the self-check to the result."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime

@@ -3,8 +3,6 @@
 A hit file ends with its SHA-256 and the set-up holds a CRC-32, so that no damaged data reaches HDF5 or the test.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import zlib

@@ -1,7 +1,5 @@
 """State of a tap test as the operator sees it, the same for browser and terminal."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A tap test in progress: its hits, set-up and cross FRF."""
 
-from __future__ import annotations
-
 import errno
 import shutil
 from collections.abc import Callable, Sequence

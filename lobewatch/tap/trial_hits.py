@@ -1,7 +1,5 @@
 """Choose trigger level and record length from trial hits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

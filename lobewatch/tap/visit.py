@@ -1,7 +1,5 @@
 """Visit to a machine: tap tests in x, in y, then as the operator chooses."""
 
-from __future__ import annotations
-
 import queue
 from collections.abc import Callable, Sequence
 from dataclasses import replace

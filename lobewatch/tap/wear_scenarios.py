@@ -1,7 +1,5 @@
 """Wear scenarios of an emulated spindle: bearing stiffness, reclamping and temperature."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """Stability lobes by a chosen method and source of dynamics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum

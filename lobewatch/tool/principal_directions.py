@@ -4,8 +4,6 @@ Direct taps show of a mode its residues Rx and Ry; of its cross residue they lea
 at one frequency, one in x and one in y, are one mode (+-sqrt(Rx Ry)) or the two of a round spindle (0).
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Series of tap tests: mounting, order, scatter and frequency drop."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Largest drop of the natural frequency before a program chatters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Evaluate a program on all Monte Carlo samples: limits, band of limits, samples that chatter."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -5,8 +5,6 @@ after Altintas, Engin & Budak, over few samples, says how deep they may go; the 
 which of each kind is best; and what is said of that is the evaluation's, sample by sample beside equal pitch.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 

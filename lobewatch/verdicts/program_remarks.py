@@ -1,7 +1,5 @@
 """Remarks on a program: tool limits, assumed defaults, and the decisive cause of uncertainty."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Recommend settings for a program or a cut, or say why there are none."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Zero order narrows; where it is not exact, the multipliers of the median estimat
 that what it does not see (low immersion, flip) counts. Nothing is evaluated yet.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ The depth that only just is safe is so at one speed alone: the tip of a pocket h
 where there is room on all sides, and no nearer to an edge.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ throughout, and the same samples are stable around it and as the spindle will be
 Where no speed of the grid has such a depth, nothing is recommended.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,6 @@
 A stiffness stretches all limits alike and moves none of them along the speeds, as long as one mode decides.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

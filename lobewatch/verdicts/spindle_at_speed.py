@@ -1,7 +1,5 @@
 """Spindle at speed as learned from test cuts, used in verdicts with the tool as tapped."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace

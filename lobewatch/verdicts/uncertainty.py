@@ -3,8 +3,6 @@
 Half-widths of independent uniform distributions, or posterior samples where test cuts have been learned from.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Causes of uncertainty with their names, labels and remedies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER

@@ -1,7 +1,5 @@
 """Verdict on a cutting program: stability, limits, chatter risk and frequency margins."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

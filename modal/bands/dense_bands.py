@@ -1,7 +1,5 @@
 """Search a fitted band for modes without a peak of their own and for close pairs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

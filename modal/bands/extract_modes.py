@@ -1,7 +1,5 @@
 """Extract all modes of one or several FRFs, band by band."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Result of a modal extraction, and stabilisation charts of all its lines."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Find the resonances of an FRF: mobility peaks above the noise whose phase turns as that of a mode."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Group resonances into bands, fit the peaks of each band, and iterate until all bands agree."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

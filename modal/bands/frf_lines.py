@@ -1,7 +1,5 @@
 """Prepare the lines of an FRF for a fit: usable band, noise weights, drift."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

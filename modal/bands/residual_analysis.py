@@ -1,7 +1,5 @@
 """Test the residual of a band fit: whiteness, model comparison, systematic errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Result of a band fit: modal constants at given poles, their errors, and residual terms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property

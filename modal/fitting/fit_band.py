@@ -3,8 +3,6 @@
 Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
 """
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Match modes between measurements: MAC, followed mode, predominant mode."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

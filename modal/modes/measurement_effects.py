@@ -1,7 +1,5 @@
 """Effects of the measurement on modes: exponential window, channel delay, added mass."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

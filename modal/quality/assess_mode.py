@@ -1,7 +1,5 @@
 """Add quality figures and remarks to a fitted mode."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain

@@ -1,7 +1,5 @@
 """Decide which modes are trusted, and select those used for lobes."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

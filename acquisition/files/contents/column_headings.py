@@ -1,7 +1,5 @@
 """Infer name, unit and role of columns from their headings or from user input."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Callable, Sequence

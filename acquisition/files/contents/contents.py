@@ -1,7 +1,5 @@
 """Signals of a recorded file, and the record of functions that reads a format."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Resolve the FRF in the contents of a recorded file."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence

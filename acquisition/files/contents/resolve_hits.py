@@ -1,7 +1,5 @@
 """Resolve the hits in the contents of a recorded file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Resolve units and sensor sensitivities of responses, forces and FRFs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

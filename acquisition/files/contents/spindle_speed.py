@@ -1,7 +1,5 @@
 """Spindle speed from a speed column or the pulses of a tachometer."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

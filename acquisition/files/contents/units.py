@@ -1,7 +1,5 @@
 """Parse units of recorded files and convert them to SI."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

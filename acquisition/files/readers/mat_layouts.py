@@ -6,8 +6,6 @@ structs of Test.Lab (`x_values`, `y_values`), and our own. An FRF is taken befor
 of the hits, they are one of them. `Description.columns` can take them all the same.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ The subprocess returns them as MessagePack: structs as maps, cells as lists, arr
 for what no layout reads. A text in their place states why the file cannot be read.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import subprocess

@@ -4,8 +4,6 @@ A number shows what a comma or a point is for where it can be only one thing: `0
 `1,234.5` and `1,234,567` have commas between thousands. `1,234` may be either.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files. Known names show what they are."""
 
-from __future__ import annotations
-
 import json
 import re
 import struct

@@ -3,8 +3,6 @@
 WAV is read by scipy, FLAC and MP3 by soundfile where that is installed (`pip install "lobewatch[sound]"`).
 """
 
-from __future__ import annotations
-
 import io
 import warnings
 from pathlib import Path

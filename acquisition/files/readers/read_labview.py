@@ -4,8 +4,6 @@ LVM has a header, a decimal comma or point, and one time column, one for each ch
 where that is installed (`pip install "lobewatch[tdms]"`).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

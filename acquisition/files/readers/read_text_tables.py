@@ -10,8 +10,6 @@ B&K PULSE exports a header of keys and values, then blocks of rows: index, absci
 complex. The header names the function and its unit, the unit of the abscissa, and the number of rows of a block.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

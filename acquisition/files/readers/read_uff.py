@@ -4,8 +4,6 @@ FRFs, coherence and signals over time are read. Source: SDRC Universal File Form
 Cincinnati, SDRL).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

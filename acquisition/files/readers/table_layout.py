@@ -1,7 +1,5 @@
 """Detect separators, number columns and headings of a text table."""
 
-from __future__ import annotations
-
 import itertools
 import re
 import statistics

@@ -1,7 +1,5 @@
 """Read data set 58 of a universal file: eleven lines of header, then the values as text or as bytes."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Find the cuts in a recording, and the air before and after them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 (docs/cuts.md, How often it is right).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

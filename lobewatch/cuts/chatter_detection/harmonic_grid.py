@@ -1,7 +1,5 @@
 """Fit a grid of spindle harmonics and sidebands to spectral peaks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

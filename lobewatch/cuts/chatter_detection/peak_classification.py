@@ -1,7 +1,5 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

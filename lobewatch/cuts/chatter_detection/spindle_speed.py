@@ -1,7 +1,5 @@
 """Find the true spindle speed of a cut, with or without a tachometer."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 

@@ -1,7 +1,5 @@
 """Find the comb of spindle harmonics in spectral peaks, or by a harmonic sum."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Predict what a cut does on each sample, and the likelihood of its label."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Find test cuts whose label, frequency or power contradicts the other cuts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

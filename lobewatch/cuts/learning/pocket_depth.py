@@ -1,7 +1,5 @@
 """Depths of stable pockets by test cuts only, for tap tests without a force sensor."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

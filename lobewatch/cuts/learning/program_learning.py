@@ -1,7 +1,5 @@
 """Learn from the test cuts of a program, and find its next test cut."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 

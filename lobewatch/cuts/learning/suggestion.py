@@ -1,7 +1,5 @@
 """Suggest the next test cut by its expected gain and risk."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Verdicts and lobes of a program with the spindle at speed, as learned from test cuts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 Each file is independent of all others, so that workers can share the files. Their results are identical.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import tempfile

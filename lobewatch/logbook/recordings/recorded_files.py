@@ -1,7 +1,5 @@
 """Find recorded files and read each as a tap test of a machine."""
 
-from __future__ import annotations
-
 import glob
 import re
 from collections.abc import Sequence

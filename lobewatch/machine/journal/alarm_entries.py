@@ -1,7 +1,5 @@
 """Journal lines for acknowledged alarms and fleet scatter, without numpy for a fast start."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any

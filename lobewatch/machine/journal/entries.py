@@ -1,7 +1,5 @@
 """Journal lines for events, exclusions and mode edits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta

@@ -5,8 +5,6 @@ written to journal.jsonl, which is the commit, then to journal.copy.jsonl: after
 short, never longer.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import hashlib

@@ -4,8 +4,6 @@ A file with a valid checksum is read here. HDF5 may crash or hang on any other d
 time limit reads it.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Tables of machine.toml on cutting: reference cut, programs, materials, drive and uncertainty."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Power and torque of the spindle drive: depth limit, and cutting coefficients from measured power."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

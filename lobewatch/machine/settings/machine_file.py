@@ -1,7 +1,5 @@
 """Machine file machine.toml: all tables, in the units of the shop."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import tomllib

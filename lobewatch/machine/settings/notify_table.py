@@ -1,7 +1,5 @@
 """Table [notify] of machine.toml: the MQTT broker for alarms."""
 
-from __future__ import annotations
-
 import os
 from typing import NamedTuple
 from urllib.parse import quote, unquote, urlsplit

@@ -4,8 +4,6 @@ All ranges are chosen: what shops have, with room beside it, and where that can 
 so that a slip of 1000 leaves them. docs/plausible.md says which slips are not seen.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from enum import StrEnum

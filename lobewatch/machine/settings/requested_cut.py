@@ -1,7 +1,5 @@
 """Cuts that a user requests: by program name, or by values of their own."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Collection, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Questions about implausible settings of machine.toml."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Tables of machine.toml on the machine, its tap test, its sensors and its DAQ."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from datetime import date
 from math import hypot, isfinite

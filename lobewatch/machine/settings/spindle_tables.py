@@ -1,7 +1,5 @@
 """Tables of machine.toml on the spindle model and the tools."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Sequence

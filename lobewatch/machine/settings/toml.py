@@ -1,7 +1,5 @@
 """Text and tables of machine.toml: read, parse, check and edit."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import difflib

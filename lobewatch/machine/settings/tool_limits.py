@@ -1,7 +1,5 @@
 """Limits of a tool: speed range, feed range and depth from its [[tool]] or published tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Draft of machine.toml during setup: detected DAQs, questions and parsed answers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Setup questions on machine, DAQ, sensors, tool and cutting."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any, get_args

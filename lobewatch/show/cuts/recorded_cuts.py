@@ -1,7 +1,5 @@
 """Show recorded cuts with verdict and evidence, the next test cut, and the results of the test cuts so far."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Plot the spectrum of recorded cuts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Plot stability lobes: diagram, waterfall over time, map over radial depth."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime

@@ -1,7 +1,5 @@
 """Plot measured modes and the spindle model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Plot series over time with events, and frequency responses then and now."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime
 from textwrap import shorten

@@ -1,7 +1,5 @@
 """Export tap tests of many machines to SQLite, CSV or Parquet files."""
 
-from __future__ import annotations
-
 import glob
 import gzip
 import os

@@ -1,7 +1,5 @@
 """Export tap tests of many machines to a PostgreSQL table (extra `postgres`)."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager

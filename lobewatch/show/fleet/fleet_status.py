@@ -1,7 +1,5 @@
 """Show the status of many machines: rows for dashboard and report, text and CSV."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime

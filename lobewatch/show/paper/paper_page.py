@@ -1,7 +1,5 @@
 """Write a page of the comparison with the paper, with its figures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path

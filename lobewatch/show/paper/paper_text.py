@@ -1,7 +1,5 @@
 """Show the comparison with the paper as text and JSON."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Show verdicts with advice, for `lobewatch check` and the report, and stability lobes with recommended pockets."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence

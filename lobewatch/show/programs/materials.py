@@ -1,7 +1,5 @@
 """Show materials with their cutting coefficients, and the measured power of a cut."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

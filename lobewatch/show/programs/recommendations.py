@@ -1,7 +1,5 @@
 """Show recommended speeds and depths, and unequal pitches."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterator, Sequence

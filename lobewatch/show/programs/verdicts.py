@@ -1,7 +1,5 @@
 """Show verdicts on cutting programs and the uncertainty they were evaluated for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple

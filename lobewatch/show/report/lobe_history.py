@@ -1,7 +1,5 @@
 """Stability lobes of the report: the newest diagram, and diagrams over time."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence

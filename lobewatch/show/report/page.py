@@ -1,7 +1,5 @@
 """Render an HTML page that holds everything it needs, and write it to disk."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

@@ -1,7 +1,5 @@
 """Write the report of one machine with its summary, and the report of a fleet."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """Collect the data that the sections of the report share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Parts of a report section, and the numbers that go with its figures and tables."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Make the sections of the report below its summary, in their order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 What such a report says: ISO 17359 (condition monitoring) and ISO 13381-1 (prognostics).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -4,8 +4,6 @@ The library does not know the command line: its errors and remarks name a field 
 (`Logbook.verdicts`). A person at the terminal, and a program that reads the JSON, needs the option or the command.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 Names and texts may come from anywhere: no control character of theirs reaches the terminal.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math

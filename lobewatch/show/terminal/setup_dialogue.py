@@ -1,7 +1,5 @@
 """Ask the questions of `lobewatch init` in the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

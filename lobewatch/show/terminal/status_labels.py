@@ -1,7 +1,5 @@
 """Labels and style sheet classes of a machine status."""
 
-from __future__ import annotations
-
 from lobewatch.monitoring import StatusLevel
 
 STATUS_LABELS = {

@@ -1,7 +1,5 @@
 """Show a tap test in a terminal: a screen that reads keys, or lines of text for logs and pipes."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

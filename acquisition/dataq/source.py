@@ -4,7 +4,7 @@ import enum
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 
 from acquisition.channel import Block, SensorInput
 from acquisition.dataq import protocol
@@ -111,9 +111,8 @@ class DataqSource(ClosedOnExit):
     def close(self) -> None:
         """Stop the device if it still answers, and close the port."""
         self.status = DataqStatus.STOPPED
-        with suppress(DeviceError):
+        with closing(self._link), suppress(DeviceError):
             self._link.write(protocol.encode_command("stop"))
-        self._link.close()
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged.

@@ -179,9 +179,8 @@ class TapsSource(ClosedOnExit):
 
     def close(self) -> None:
         """Stop the device if it still answers, and close the port."""
-        with contextlib.suppress(DeviceError):
+        with contextlib.closing(self._link), contextlib.suppress(DeviceError):
             self._link.write(self._encode(MessageType.STOP))
-        self._link.close()
 
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged."""

@@ -117,6 +117,7 @@ def test_an_acknowledged_alarm_says_so_on_the_first_screen(worn: Shop) -> None:
     assert first.count("Eva") == 1
 
 
+@pytest.mark.quick
 def test_a_gauge_tells_a_small_fall_from_a_large_one() -> None:
     small, large = (make_gauge(fall, 5.0, 10.0) for fall in (0.15, 10.0))
     assert large.length == large.alarm == 2 * large.warn
@@ -172,12 +173,14 @@ def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> No
     assert run("report", tmp_path / "empty").exit_code != 0
 
 
+@pytest.mark.quick
 def test_a_course_falls_on_paper_as_it_does() -> None:
     assert spark_points([(0.0, 0.0)]) == ""
     assert spark_points([(0.0, 0.0), (10.0, -2.0)]) == "0.0,0.0 140.0,32.0"
     assert spark_points([(5.0, 0.0), (5.0, 0.0)]) == "0.0,0.0 0.0,0.0"
 
 
+@pytest.mark.quick
 def test_a_name_cannot_end_the_style_sheet() -> None:
     html = render_fleet([], 'x"; } </style><script>alert(1)</script>', datetime(2026, 1, 1, tzinfo=UTC))
     assert "alert(1)</script>" not in html

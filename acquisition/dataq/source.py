@@ -105,6 +105,7 @@ class DataqSource(ClosedOnExit):
         self.status = DataqStatus.SCANNING
 
     def stop(self) -> None:
+        """Stop scanning."""
         self.status = DataqStatus.STOPPED
         self._commands.halt()
 

@@ -99,6 +99,7 @@ class SimulatedSource(ClosedOnExit):
         self.stop()
 
     def blocks(self) -> Iterator[Block]:
+        """Yield the signal in blocks, without gaps."""
         first = 0
         while first < self._n_scans:
             yield Block(first, quantise(self._signal(first, self._block), self.channels))
@@ -284,6 +285,7 @@ class EmulatorThread(ABC):
         self._thread = threading.Thread(target=self._serve, name=type(self).__name__, daemon=True)
 
     def serve(self) -> None:
+        """Start to answer."""
         self._thread.start()
 
     def unplug(self) -> None:

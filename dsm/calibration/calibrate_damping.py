@@ -39,6 +39,7 @@ class UnreachableDampingError(ValueError):
     def __init__(self, message: str, limit: float) -> None:
         super().__init__(message)
         self.limit = limit
+        """Limit of the damping ratio (-)."""
 
 
 @dataclass(frozen=True)

@@ -89,6 +89,7 @@ class UnreachableFrequencyError(ValueError):
     def __init__(self, message: str, reachable: tuple[float, float]) -> None:
         super().__init__(message)
         self.reachable = reachable
+        """Lowest and highest frequency that a bearing stiffness gives (Hz)."""
 
 
 @dataclass(frozen=True)

@@ -197,6 +197,7 @@ class StiffnessFitError(ArithmeticError):
     def __init__(self, message: str, best: StiffnessFit) -> None:
         super().__init__(message)
         self.best = best
+        """Best estimate; not reliable."""
 
 
 MAX_LOG_FACTOR_CHANGE = math.log(30.0)

@@ -190,8 +190,11 @@ class UnstableSpinError(ArithmeticError):
     def __init__(self, message: str, frequency: Floats, unstable: int, proved: int) -> None:
         super().__init__(message)
         self.frequency = frequency
+        """Lowest frequencies of the other modes (Hz)."""
         self.unstable = unstable
+        """Number of growing modes."""
         self.proved = proved
+        """Number of proved growing modes."""
 
 
 def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Floats:

@@ -1,5 +1,7 @@
 """Command `lobewatch calibrate`: fit bearing and joint stiffness to measured natural frequencies."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated

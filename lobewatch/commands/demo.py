@@ -1,5 +1,7 @@
 """Command `lobewatch demo`: tap tests of an aging simulated spindle."""
 
+from __future__ import annotations
+
 import itertools
 from pathlib import Path
 from typing import Annotated

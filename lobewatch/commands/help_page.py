@@ -1,5 +1,7 @@
 """Format help pages as plain text, with examples that can be copied."""
 
+from __future__ import annotations
+
 import shutil
 import textwrap
 from collections.abc import Collection, Iterator, Mapping

@@ -1,5 +1,7 @@
 """Command `lobewatch materials`: list materials with their cutting coefficients."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import typer

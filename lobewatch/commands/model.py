@@ -1,5 +1,7 @@
 """Command `lobewatch model`: modes and stiffness of the spindle model."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Annotated
 

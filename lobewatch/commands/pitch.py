@@ -1,5 +1,7 @@
 """Command `lobewatch pitch`: propose unequal pitches for a cutter."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import typer

@@ -1,5 +1,7 @@
 """Command `lobewatch ports`: list serial ports and the devices on them."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import typer

@@ -1,5 +1,7 @@
 """Command `lobewatch recommend`: recommend speed and depth for a tool and a material."""
 
+from __future__ import annotations
+
 from typing import Annotated, Literal
 
 import typer

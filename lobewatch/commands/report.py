@@ -1,5 +1,7 @@
 """Command `lobewatch report`: write an HTML report."""
 
+from __future__ import annotations
+
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated

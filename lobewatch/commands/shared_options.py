@@ -1,5 +1,7 @@
 """Options shared by several commands: facts about a file, edited modes, cuts and numbers."""
 
+from __future__ import annotations
+
 import functools
 import inspect
 import re

@@ -1,5 +1,7 @@
 """Command `lobewatch suggest`: suggest the next test cut."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import typer

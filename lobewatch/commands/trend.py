@@ -1,5 +1,7 @@
 """Command `lobewatch trend`: trend and forecast of a series."""
 
+from __future__ import annotations
+
 from typing import Annotated
 
 import typer

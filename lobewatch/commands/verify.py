@@ -1,5 +1,7 @@
 """Command `lobewatch verify`: verify the files of a machine folder."""
 
+from __future__ import annotations
+
 import typer
 
 from lobewatch.commands.shared_options import Machine

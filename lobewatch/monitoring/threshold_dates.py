@@ -5,7 +5,7 @@ The one form in which dates go to people, files and other programs.
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import date, timedelta
+from datetime import UTC, date, datetime, timedelta
 
 import msgspec
 
@@ -96,3 +96,8 @@ def build_limit_row(limit: tuple[float, ThresholdDates] | None) -> dict[str, flo
 
 def _iso_date(days: float | None) -> str | None:
     return None if days is None else (UNIX_EPOCH + timedelta(days=days)).isoformat()
+
+
+def date_of_days(days: float) -> datetime:
+    """Return the date of a number of days since 1970."""
+    return datetime.fromtimestamp(86400 * days, UTC)

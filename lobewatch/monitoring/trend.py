@@ -6,7 +6,7 @@ import math
 from bisect import bisect
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import cached_property
 from typing import NamedTuple
 
@@ -243,8 +243,3 @@ def point_days(points: Sequence[TrendPoint]) -> Floats:
 def days_since_epoch(time: datetime) -> float:
     """Return the days since 1970."""
     return time.timestamp() / 86400
-
-
-def date_of_days(days: float) -> datetime:
-    """Return the date of a number of days since 1970."""
-    return datetime.fromtimestamp(86400 * days, UTC)

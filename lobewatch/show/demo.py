@@ -5,7 +5,7 @@ from dataclasses import astuple
 from datetime import datetime
 from pathlib import Path
 
-from lobewatch.monitoring.trend import date_of_days
+from lobewatch.monitoring.threshold_dates import date_of_days
 from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
 from lobewatch.show.trend import reach_text
 from lobewatch.tap.demo import DemoTap, LevelForecast

@@ -12,8 +12,8 @@ from lobewatch.logbook.machine_forecast import MachineForecast
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
-from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows
-from lobewatch.monitoring.trend import Trend, date_of_days, days_since_epoch, point_days
+from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
+from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
 from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, json_fields, new_table
 

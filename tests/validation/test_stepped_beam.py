@@ -73,7 +73,7 @@ def test_modes_are_right_when_the_iteration_goes_astray(monkeypatch: pytest.Monk
         w2 = (2 * np.pi * expected.frequency) ** 2
         return w2[[1, 1, 2, 4, 4]], shape + 1e-3
 
-    monkeypatch.setattr(import_module("dsm.modes.find_modes"), "_refine", astray)
+    monkeypatch.setattr(import_module("dsm.modes.find_modes"), "_refine_modes", astray)
     found = find_modes(spindle, 5)
     assert found.frequency == pytest.approx(expected.frequency, rel=1e-9)
     assert found.stiffness_at(0.0)[[0, 3]] == pytest.approx(expected.stiffness_at(0.0)[[0, 3]], rel=1e-6)

@@ -8,8 +8,13 @@ from typing import Any
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
-from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, build_limit_row, find_next_limit
-from lobewatch.monitoring.trend import date_of_days
+from lobewatch.monitoring.threshold_dates import (
+    ThresholdDates,
+    build_forecast_rows,
+    build_limit_row,
+    date_of_days,
+    find_next_limit,
+)
 from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 

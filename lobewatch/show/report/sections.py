@@ -9,7 +9,7 @@ import numpy as np
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
-from lobewatch.monitoring.trend import date_of_days
+from lobewatch.monitoring.threshold_dates import date_of_days
 from lobewatch.show.figures.lobe_figures import plot_waterfall
 from lobewatch.show.figures.trend_figures import plot_frf
 from lobewatch.show.programs import verdicts

@@ -233,7 +233,7 @@ def test_a_window_that_nobody_named_is_said_with_its_time_constant(tmp_path: Pat
     silent = fit_file_modes(path)
     (said,) = [remark for remark in silent.remarks if remark.code == "window-suspected"]
     assert "an exponential window of 0.05 s" in said.text
-    assert "--window" in said.cure
+    assert "Window.time_constant" in said.cure
     assert stiffness_at(FREQUENCY, silent.fitted) / STIFFNESS > 1.2
     named = fit_file_modes(path, window=Window(0.05))
     assert "window-suspected" not in [remark.code for remark in named.remarks]

@@ -21,6 +21,7 @@ import pytest
 from numpy.typing import ArrayLike
 from typer.testing import CliRunner, Result
 
+import lobes
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, Program, ProgramLimit, program_limit, zero_order_lobes
 from lobes.cut import DirectionModes
@@ -272,7 +273,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
         asked.append(program)
         return program_limit(program, x, y, cuts, vectors)
 
-    monkeypatch.setattr("lobewatch.verdicts.program_samples.program_limit", counting)
+    monkeypatch.setattr(lobes, "program_limit", counting)
     for day in range(5):
         tap(path, day, 1713.0 - day)
     tap(path, 4.1, 1690.0, "y")

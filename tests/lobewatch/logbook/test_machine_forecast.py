@@ -18,8 +18,8 @@ from dsm import calibrate
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.machine_forecast import forecast_machine
-from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ThresholdDates
-from lobewatch.monitoring.trend import date_of_days, days_since_epoch
+from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ThresholdDates, date_of_days
+from lobewatch.monitoring.trend import days_since_epoch
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.trend import forecast_date_rows, reach_text
 from lobewatch.verdicts import Stability

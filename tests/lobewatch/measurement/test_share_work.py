@@ -190,7 +190,7 @@ def test_a_scheduler_with_tls_as_the_page_says(tmp_path: Path) -> None:
         with pytest.raises(DataError, match=r"TLS configuration.*certificates: docs/performance-replay\.md"):
             [*share_work(abs, [-1], Workers(scheduler=address))]
         program = (
-            "import sys; from lobewatch.measuring.workers.share_work import Workers, share_work\n"
+            "import sys; from lobewatch.measurement.share_work import Workers, share_work\n"
             "if __name__ == '__main__': print(*share_work(abs, [-1, -2], Workers(scheduler=sys.argv[1])))"
         )
         known = {name: str(files[file]) for name, file in named.items()}

@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
 
@@ -70,7 +70,7 @@ class EmulateOptions:
     """True to print the result as JSON."""
 
 
-Emulation = tuple[acquisition.EmulatorThread, Mapping[str, float | None], str, str, str]
+Emulation: TypeAlias = "tuple[acquisition.EmulatorThread, Mapping[str, float | None], str, str, str]"
 """Emulator, which serves while its context lasts; its true values by JSON key, and as text; the next command and its
 options without the port."""
 

@@ -33,7 +33,7 @@ def counted(call):
     return run
 for name in ("fsync", "replace", "rename", "mkdir", "unlink"):
     setattr(os, name, counted(getattr(os, name)))
-sys.exit(typer.testing.invoke(sys.argv[1:]).exit_code)
+sys.exit(typer.testing.CliRunner().invoke(app, sys.argv[1:], catch_exceptions=False).exit_code)
 """
 """An export that is ended without warning before it has altered the disk so many times."""
 

@@ -1,4 +1,4 @@
-"""From the DAQ to hits, averaged FRF and HDF5 files."""
+"""Data acquisition: devices, hits, averaged FRFs, HDF5 files and imported recordings."""
 
 from .channel import CROSS_TAP, Block, Channel, SensorInput, TapDirection, parse_direction
 from .dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits

@@ -1,4 +1,4 @@
-"""Milling stability: lobes from modes or FRFs, stable pockets, published cutting data, and a history of lobes."""
+"""Milling stability: lobes, stable pockets, published cutting data and SLD history."""
 
 from .coefficients import CuttingCoefficients, SpecificForce, tangential_and_radial
 from .cut import Cut, Direction, Program, max_depth_for_drive, mean_torque

@@ -1,4 +1,4 @@
-"""What an emulated device is made of: a hammered structure or a milling cut, a wire, a thread that serves it."""
+"""Emulated devices: hammered structure, milling cut, signal function, wire and server thread."""
 
 from .emulated_device import (
     EmulationSetup,

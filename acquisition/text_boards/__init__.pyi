@@ -1,4 +1,4 @@
-"""Boards that print their samples, as lines of text or as simple frames: format, source, probe, emulator."""
+"""Boards that print their samples as lines of text or simple frames: decoders, source, emulator."""
 
 from .decoders import FrameFormat, OutputFormat
 from .emulator import TextBoardEmulator, TextBoardTraits

@@ -1,4 +1,4 @@
-"""High-order semi-discretization: milling over one tooth period, its largest multiplier, and stability limits."""
+"""High-order semi-discretization of milling: Floquet multipliers and stability limits."""
 
 from .milling_rows import MillingRows, count_pieces, join_rows, rows_at_speeds
 from .multipliers import growth_rate, largest_multipliers

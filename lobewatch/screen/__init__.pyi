@@ -1,4 +1,4 @@
-"""Operator's screen in a browser: pages of live tap tests and cut recordings, and a dashboard of machines."""
+"""Browser pages: live tap tests, cut recordings, and a dashboard of machines."""
 
 from .dashboard_server import DashboardServer
 from .web_server import CutScreenServer, ScreenServer

@@ -48,7 +48,7 @@ class JournalFileState:
     """State of one journal file on the disk."""
 
     exists: bool
-    """Whether the file exists."""
+    """True if the file exists."""
     chain: tuple[bytes, ...] = ()
     """Lines from the first one on, each proved by the next, without line ends."""
     chain_bytes: bytes = b""

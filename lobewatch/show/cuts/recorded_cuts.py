@@ -197,7 +197,7 @@ def _known_mm(depth: float) -> float | None:
 speed_pocket_json = json_fields(
     "speed_rpm window_rpm depth_mm=self over_lowest_limit=gain", {"depth_mm": lambda _: None}
 )
-"""Function that returns one pocket, whose depth is not known."""
+"""Function that returns one pocket of unknown depth."""
 TRIED_FIELDS = json_fields(
     "cut_at_rpm=speed_rpm cuts heard_stable_mm=stable_depth heard_chatter_mm=chatter_depth",
     {"cuts": attrgetter("id"), "heard_stable_mm": _known_mm, "heard_chatter_mm": _known_mm},

@@ -42,7 +42,7 @@ FIGURE_STYLE: dict[Any, Any] = {
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a picture in the format that the ending names; ValueError for one that is not known."""
+    """Write a figure in the format of its file ending. ValueError for an unknown ending."""
     if path.suffix.lower() not in (".svg", ".png", ".pdf"):
         cure = "name a file that ends in .svg, .png or .pdf"
         raise ValueError(f"{path}: a picture cannot end in {path.suffix!r}; {cure}")

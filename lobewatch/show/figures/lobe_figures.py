@@ -223,7 +223,7 @@ def save_lobe_figures(
     radial: Path | None,
     waterfall: Path | None,
 ) -> list[Remark]:
-    """Write the pictures that have a file, all or none; returns what is to be said of them."""
+    """Write the figures that have a file, all or none, and return remarks on them."""
     pictures, remarks = list[tuple[Figure, Path]](), list[Remark]()
     if figure is not None:
         pictures.append((plot_comparison(logbook.machine, comparison, logbook.cuts), figure))

@@ -17,7 +17,7 @@ from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, P
 from lobewatch.verdicts.recommendation import Recommendation
 
 UNIT_FEED_MM = 0.1
-"""Feed per tooth (mm) of the removal rate where the feed is not known."""
+"""Feed per tooth (mm) of the removal rate if the feed is unknown."""
 
 
 PROGRAM_FIELDS = json_fields("name tool material teeth tool_diameter_mm radial_depth_mm")

@@ -44,7 +44,7 @@ def test_one_that_computes_for_longer_than_it_may_is_ended(program: Path) -> Non
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux limits the memory of a program")
-def test_one_that_takes_more_memory_than_it_may_is_refused_it(program: Path) -> None:
+def test_one_that_takes_more_memory_than_it_may_is_denied_it(program: Path) -> None:
     program.write_text(
         "from acquisition.subprocess_guard import limit_resources\nlimit_resources(60, 200e6)\n"
         "few = bytes(100_000_000)\n"

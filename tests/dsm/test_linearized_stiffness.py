@@ -77,17 +77,17 @@ def test_linearised_at_a_natural_frequency_it_keeps_that_frequency() -> None:
 
 
 @pytest.mark.parametrize("wbar", [-1.0, math.nan, math.inf])
-def test_refuses_a_frequency_that_is_none(wbar: float) -> None:
+def test_rejects_a_frequency_that_is_none(wbar: float) -> None:
     with pytest.raises(ValueError, match="wbar"):
         linearized_stiffness(cantilever(), wbar)
 
 
 @pytest.mark.parametrize("coefficients", [3.0, np.zeros((2, 2, 0))])
-def test_refuses_coefficients_without_powers(coefficients: float) -> None:
+def test_rejects_coefficients_without_powers(coefficients: float) -> None:
     with pytest.raises(ValueError, match="last axis"):
         linearized_stiffness(coefficients, 1.0)
 
 
-def test_refuses_coefficients_that_are_not_finite() -> None:
+def test_rejects_coefficients_that_are_not_finite() -> None:
     with pytest.raises(ValueError, match="not finite"):
         linearized_stiffness([1.0, math.nan], 1.0)

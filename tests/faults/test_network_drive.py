@@ -69,7 +69,7 @@ def failing(number: int, real: Callable[..., Any], when: Callable[..., bool]) ->
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EIO, errno.ESTALE])
 @pytest.mark.parametrize("left_over", [False, True], ids=["new", "locked before"])
-def test_without_locks_reading_goes_on_and_writing_is_refused(
+def test_without_locks_reading_goes_on_and_writing_is_rejected(
     tapped: Shop, monkeypatch: pytest.MonkeyPatch, number: int, left_over: bool
 ) -> None:
     if left_over:

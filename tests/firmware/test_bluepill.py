@@ -51,7 +51,7 @@ def test_a_host_finds_a_serial_port_with_the_number_of_the_chip(host: UsbHost) -
     assert host.chip.registers[DADDR] == 0x87
 
 
-def test_scans_are_as_converted_and_a_missed_one_is_told(host: UsbHost) -> None:
+def test_scans_are_as_converted_and_a_missed_one_is_reported(host: UsbHost) -> None:
     host.enumerate()
     host.give(2, encode_frame(Frame(MessageType.HELLO)))
     (info,) = frames(b"".join(host.packets()))

@@ -94,7 +94,7 @@ def test_a_board_whose_host_is_late_tells_what_it_lost(board: Any, codes: Codes)
 
 
 @pytest.mark.parametrize("events", [[(2000, "O"), (2001, "o"), (5000, "B"), (7000, "b")]])
-def test_overload_and_button_are_told_with_their_scan(board: Any) -> None:
+def test_overload_and_button_are_reported_with_their_scan(board: Any) -> None:
     with TapsSource(board.port) as source:
         source.start()
         blocks = list(islice(source.blocks(), 60))

@@ -187,7 +187,7 @@ def test_commands_longer_than_there_is_room_are_dropped(plain: Core, length: int
     ],
 )
 @pytest.mark.parametrize("separators", [(", ", ": "), (",", ":")])
-def test_a_config_is_taken_or_refused_by_the_name_of_its_key(
+def test_a_config_is_taken_or_rejected_by_the_name_of_its_key(
     plain: Core, change: dict[str, Any], refused: str | None, separators: tuple[str, str]
 ) -> None:
     plain.begin()

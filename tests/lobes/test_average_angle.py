@@ -225,27 +225,27 @@ def test_speeds_keep_their_order() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, -100.0, np.nan, np.inf, [], [[1000.0]]])
-def test_bad_speeds_are_refused(speed: Any) -> None:
+def test_bad_speeds_are_rejected(speed: Any) -> None:
     with pytest.raises(ValueError, match="speed_rpm"):
         average_angle_lobes(X, None, CUT, speed)
 
 
-def test_two_rigid_directions_are_refused() -> None:
+def test_two_rigid_directions_are_rejected() -> None:
     with pytest.raises(ValueError, match="x and y are both None"):
         average_angle_lobes(None, None, CUT, SPEEDS)
 
 
-def test_no_modes_are_refused() -> None:
+def test_no_modes_are_rejected() -> None:
     with pytest.raises(ValueError, match="y has no modes"):
         average_angle_lobes(X, [], CUT, SPEEDS)
 
 
-def test_a_mode_of_no_driving_point_is_refused() -> None:
+def test_a_mode_of_no_driving_point_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"3671 Hz of x has stiffness -1e\+07 N/m.*driving point"):
         average_angle_lobes([Mode(3671.0, 0.002, -1e7)], None, CUT, SPEEDS)
 
 
-def test_frfs_without_a_common_band_are_refused() -> None:
+def test_frfs_without_a_common_band_are_rejected() -> None:
     low, high = frf(X, 1.0).in_band((1, 500)), frf(Y, 1.0).in_band((600, 900))
     with pytest.raises(ValueError, match="no band in common: one ends at 500 Hz, the other begins at 600 Hz"):
         average_angle_lobes(low, high, CUT, SPEEDS)

@@ -75,7 +75,7 @@ def test_up_and_down_are_mirror_images(immersion: float) -> None:
         ({"radial": math.nan}, "radial=nan Pa"),
     ],
 )
-def test_what_is_no_cut_is_refused(change: dict[str, Any], message: str) -> None:
+def test_what_is_no_cut_is_rejected(change: dict[str, Any], message: str) -> None:
     good = {"teeth": 4, "immersion": 0.5, "direction": "up", "tangential": 600e6, "radial": 200e6}
     with pytest.raises(ValueError, match=message):
         Cut(**{**good, **change})

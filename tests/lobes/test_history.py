@@ -121,7 +121,7 @@ def test_a_history_begins_with_no_rows(tmp_path: Path) -> None:
         ({"time": "t", "natural_frequency": [1.0], "bearing_stiffness": 2e8}, "'natural_frequency' has shape \\(1,\\)"),
     ],
 )
-def test_rows_of_another_form_are_refused(change: dict[str, Any], message: str) -> None:
+def test_rows_of_another_form_are_rejected(change: dict[str, Any], message: str) -> None:
     depth = {name: np.ones(3) for name in history().depth}
     with pytest.raises(ValueError, match=message):
         history().append(change, depth)
@@ -144,7 +144,7 @@ def test_rows_of_another_form_are_refused(change: dict[str, Any], message: str) 
         ({"speed_rpm": np.array([0.0, 2.0, 4.0])}, "speed_rpm\\[0\\]=0.0"),
     ],
 )
-def test_what_is_no_history_is_refused(change: dict[str, Any], message: str) -> None:
+def test_what_is_no_history_is_rejected(change: dict[str, Any], message: str) -> None:
     good: dict[str, Any] = {name: getattr(history(), name) for name in ("speed_rpm", "columns", "depth")}
     with pytest.raises(ValueError, match=message):
         SldHistory("hash", "software", **{**good, **change})
@@ -189,12 +189,12 @@ def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pyt
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_missing_file_is_told_from_a_bad_one(tmp_path: Path) -> None:
+def test_a_missing_file_is_distinguished_from_a_bad_one(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         read_history(tmp_path / "history.h5")
 
 
-def test_other_files_are_refused(tmp_path: Path) -> None:
+def test_other_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "history.h5"
     path.write_text("speed,depth\n")
     with pytest.raises(ValueError, match=r"history\.h5: damaged, or no lobewatch-history file.*rebuild it"):
@@ -207,7 +207,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(place=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
-def test_damage_is_refused(place: float, bit: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_damage_is_rejected(place: float, bit: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """A flipped bit and a cut, anywhere."""
     path = tmp_path_factory.mktemp("damage") / "history.h5"
     write_history(path, history())

@@ -82,7 +82,7 @@ def test_rules_for_k() -> None:
         ((math.nan, "model", None), "ratio=nan"),
     ],
 )
-def test_bad_aging_is_refused(arguments: Any, message: str) -> None:
+def test_bad_aging_is_rejected(arguments: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         age_mode(SPINDLE, *arguments)
 
@@ -98,7 +98,7 @@ def test_an_island_above_the_limit_is_no_place_to_work() -> None:
 
 
 @pytest.mark.parametrize(("speed", "depth"), [(0.0, 1e-3), (math.nan, 1e-3), (1e4, 0.0), (1e4, math.inf)])
-def test_bad_programs_are_refused(speed: float, depth: float) -> None:
+def test_bad_programs_are_rejected(speed: float, depth: float) -> None:
     with pytest.raises(ValueError, match=r"speed_rpm=|depth="):
         Program(SLOT, speed, depth)
 
@@ -168,7 +168,7 @@ def test_depth_for_power_and_torque() -> None:
 
 
 @pytest.mark.parametrize("change", [{"diameter": 0.0}, {"feed_per_tooth": -1.0}, {"edge": math.nan}, {"power": 0.0}])
-def test_bad_drive_limits_are_refused(change: dict[str, float]) -> None:
+def test_bad_drive_limits_are_rejected(change: dict[str, float]) -> None:
     good = {"diameter": 0.02, "feed_per_tooth": 1e-4}
     with pytest.raises(ValueError, match=next(iter(change))):
         max_depth_for_drive(SLOT, 3000.0, **{**good, **change})
@@ -196,12 +196,12 @@ def test_specific_force_and_angle_there_and_back() -> None:
 
 
 @pytest.mark.parametrize(("force", "angle"), [(0.0, 1.0), (math.nan, 1.0), (1e9, 0.0), (1e9, 2.0), (1e9, math.nan)])
-def test_bad_specific_forces_are_refused(force: float, angle: float) -> None:
+def test_bad_specific_forces_are_rejected(force: float, angle: float) -> None:
     with pytest.raises(ValueError, match=r"specific_force=|force_angle="):
         tangential_and_radial(force, angle)
 
 
 @pytest.mark.parametrize(("tangential", "radial"), [(0.0, 1.0), (1e9, -1.0), (math.inf, 1.0), (1e9, math.nan)])
-def test_bad_coefficients_are_refused(tangential: float, radial: float) -> None:
+def test_bad_coefficients_are_rejected(tangential: float, radial: float) -> None:
     with pytest.raises(ValueError, match=r"tangential=|radial="):
         CuttingCoefficients("unobtainium", tangential, radial)

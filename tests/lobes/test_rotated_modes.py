@@ -98,7 +98,7 @@ def test_zero_order_knows_cross_frfs_as_it_knows_their_modes() -> None:
     assert zero_order_lobes(x, y, CUT, SPEEDS, cross).depth == pytest.approx(of_modes.depth, rel=1e-3)
 
 
-def test_a_mode_askew_can_halve_what_direct_taps_alone_promise() -> None:
+def test_a_rotated_mode_can_halve_what_direct_taps_alone_promise() -> None:
     """At a/D 0.1 and 35 degrees: leaving the cross term out states 3.6 times the limit at 5000 rpm."""
     low = replace(CUT, immersion=0.1, direction="up")
     shown = project_modes(PAIR, turned_by(35))
@@ -122,12 +122,12 @@ def test_the_system_shows_the_receptance_of_its_vectors() -> None:
         ([[1.0, 0.0], [np.nan, 1.0]], "vectors holds a value that is not finite"),
     ],
 )
-def test_vectors_that_fit_no_modes_are_refused(vectors: list[list[float]], problem: str) -> None:
+def test_vectors_that_fit_no_modes_are_rejected(vectors: list[list[float]], problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         stability_boundary(PAIR, None, CUT, SPEEDS, 0.02, vectors)
 
 
-def test_a_cross_frf_without_both_directions_is_refused() -> None:
+def test_a_cross_frf_without_both_directions_is_rejected() -> None:
     with pytest.raises(ValueError, match="cross is known, x or y is not"):
         zero_order_lobes(PAIR, None, CUT, SPEEDS, PAIR)
     with pytest.raises(ValueError, match="cross has no modes"):

@@ -33,7 +33,7 @@ def test_depth_between_speeds_is_linear_and_takes_the_finite_neighbour() -> None
 
 
 @pytest.mark.parametrize("speed", [999.0, 4001.0, NAN])
-def test_depth_outside_the_chart_is_refused(speed: float) -> None:
+def test_depth_outside_the_chart_is_rejected(speed: float) -> None:
     with pytest.raises(ValueError, match=f"{speed:g} rpm is outside the chart \\(1000..4000 rpm\\)"):
         chart().depth_at([2000.0, speed])
 
@@ -64,6 +64,6 @@ def test_cuts_below_the_limit_are_stable() -> None:
         ({"speed_rpm": np.array([1.0, 2.0, 3.0, 0.0])}, "speed_rpm\\[3\\]=0.0"),
     ],
 )
-def test_what_is_no_chart_is_refused(change: dict[str, Any], message: str) -> None:
+def test_what_is_no_chart_is_rejected(change: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         chart(**change)

@@ -56,7 +56,7 @@ def test_each_row_is_a_range_with_its_source() -> None:
             assert len(row["source"]) > 20, row
 
 
-def test_the_range_lies_over_all_sources_of_the_group() -> None:
+def test_the_range_covers_all_sources_of_the_group() -> None:
     speed = published_cutting_speed(named("42CrMo4"), "coated carbide", "side")
     assert m_min(speed) == pytest.approx((70, 300))
     assert speed is not None
@@ -94,7 +94,7 @@ def test_no_tool_is_faster_than_the_fastest() -> None:
             assert fastest.low == 0.0
 
 
-def test_a_feed_lies_on_a_line_between_the_diameters_of_a_source_and_on_one_to_zero_below_them() -> None:
+def test_a_feed_is_on_a_line_between_the_diameters_of_a_source_and_on_one_to_zero_below_them() -> None:
     steel = named("42CrMo4")
 
     def feed(diameter: float) -> tuple[float, float]:

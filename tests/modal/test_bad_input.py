@@ -42,7 +42,7 @@ def test_band_without_lines(extract: Extraction, band: tuple[float, float]) -> N
 
 @both
 @pytest.mark.parametrize("modes", [[Mode(1722.0, 0.03, 3.5e7)], [Mode(700.0, 0.005, -3e7), Mode(1722.0, 0.03, 3.5e7)]])
-def test_conjugated_frf_is_refused(extract: Extraction, modes: list[Mode]) -> None:
+def test_conjugated_frf_is_rejected(extract: Extraction, modes: list[Mode]) -> None:
     frf = synthesize_frf(modes, LINES)
     with pytest.raises(ValueError, match=r"phase rises .* conjugate of receptance"):
         extract(Frf(LINES, frf.receptance.conj()))
@@ -57,12 +57,12 @@ def test_frf_without_resonance_gives_an_empty_list(extract: Extraction, receptan
 
 @both
 @pytest.mark.parametrize("lost", [np.abs, np.real])
-def test_magnitude_or_real_part_alone_is_refused(extract: Extraction, lost: Callable[..., Any]) -> None:
+def test_magnitude_or_real_part_alone_is_rejected(extract: Extraction, lost: Callable[..., Any]) -> None:
     with pytest.raises(ValueError, match="phase is missing"):
         extract(Frf(LINES, lost(GOOD.receptance)))
 
 
-def test_values_that_are_none_are_refused_by_the_frf() -> None:
+def test_values_that_are_none_are_rejected_by_the_frf() -> None:
     with pytest.raises(ValueError, match=f"not finite at {LINES.size} lines"):
         Frf(LINES, np.full(LINES.size, np.nan))
     with pytest.raises(ValueError, match="coherence must lie between 0 and 1"):

@@ -90,13 +90,13 @@ def test_a_held_mode_has_its_frequency_and_damping_without_error_and_k_with_one(
     assert "by-hand" in codes(held)
 
 
-def test_a_held_mode_beside_others_is_fitted_with_them() -> None:
+def test_a_held_mode_next_to_others_is_fitted_with_them() -> None:
     strong, weak = edited(measured([STRONG, WEAK], noise=0.02), fix=("1600:0.02",))
     assert weak.frequency == 1600.0
     assert strong.interval()[2, 0] < STRONG.stiffness < strong.interval()[2, 1]
 
 
-def test_nothing_said_changes_nothing() -> None:
+def test_nothing_stated_changes_nothing() -> None:
     state = measured([STRONG])
     assert edit_modes(state, ModeEdits()) is state
 
@@ -113,7 +113,7 @@ def test_nothing_said_changes_nothing() -> None:
         ({"drop": ("1500", "1501")}, "drop 1501 Hz: no mode within 1 %"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_what_is_there(said: dict[str, tuple[str, ...]], words: str) -> None:
+def test_what_cannot_be_done_is_rejected_with_what_is_there(said: dict[str, tuple[str, ...]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         edited(measured([OTHER, STRONG]), **said)
 
@@ -134,12 +134,12 @@ def test_what_cannot_be_done_is_refused_with_what_is_there(said: dict[str, tuple
         ({"add": ("298",), "drop": ("298",)}, "298 Hz: add and drop"),
     ],
 )
-def test_what_makes_no_sense_is_refused(said: dict[str, tuple[str, ...]], words: str) -> None:
+def test_what_makes_no_sense_is_rejected(said: dict[str, tuple[str, ...]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_mode_edits(**said)
 
 
-def test_edits_read_as_they_were_said() -> None:
+def test_edits_read_as_they_were_reported() -> None:
     assert str(parse_mode_edits(("298",), ("412.5",), ("1500:0.03",))) == "add 298, drop 412.5, fix 1500:0.03"
 
 

@@ -102,7 +102,7 @@ def test_a_stray_line_in_one_of_the_frfs_is_left_out() -> None:
     assert abs(found.frequency - without.frequency) < without.standard_error[0]
 
 
-def test_what_speaks_against_a_mode_is_said() -> None:
+def test_what_speaks_against_a_mode_is_reported() -> None:
     clean = points(1e-3, 0, SHAPES[:1], MODES[:1])
     (mode,) = fit_common_modes(clean)
     assert mode.remarks == ()
@@ -111,7 +111,7 @@ def test_what_speaks_against_a_mode_is_said() -> None:
     assert [(remark.code, remark.about) for remark in cut.remarks] == [("cut-by-edge", f"{cut.frequency:.0f} Hz")]
 
 
-def test_a_driving_point_near_a_node_is_said() -> None:
+def test_a_driving_point_near_a_node_is_reported() -> None:
     still = np.array([SHAPES[0], [0.004, 1.0, -1.0]])
     modes = [MODES[0], Mode(2600.0, 0.03, 2e5)]
     sure, unsure = fit_common_modes(points(5e-3, 0, still, modes))
@@ -166,13 +166,13 @@ def test_a_slow_change_is_followed_past_a_stronger_neighbour() -> None:
         assert not found.remarks
 
 
-def test_the_neighbour_in_place_of_a_mode_that_was_not_found_is_said() -> None:
+def test_the_neighbour_in_place_of_a_mode_that_was_not_found_is_reported() -> None:
     found = follow_mode(LAST, [NEIGHBOUR])
     assert found.mode is NEIGHBOUR
     assert [(remark.code, remark.about) for remark in found.remarks] == [("large-change", "1850 Hz")]
 
 
-def test_two_that_are_equally_like_it_are_said() -> None:
+def test_two_that_are_equally_like_it_are_reported() -> None:
     found = follow_mode(LAST, [Mode(1660.0, 0.03, 3.5e7), Mode(1745.0, 0.03, 3.5e7)])
     (remark,) = found.remarks
     assert found.mode is not None

@@ -128,7 +128,7 @@ def test_95_percent_intervals_of_tap_tests_without_force_hold_the_truth(hits: in
         (np.ones((2, 3, 64)), "shape"),
     ],
 )
-def test_what_is_no_decay_is_refused(decays: NDArray[np.float64], why: str) -> None:
+def test_what_is_no_decay_is_rejected(decays: NDArray[np.float64], why: str) -> None:
     with pytest.raises(ValueError, match=why):
         fit_decays(decays, RATE)
 

@@ -72,7 +72,7 @@ def test_many_modes_without_noise() -> None:
 
 
 @pytest.mark.parametrize("ratio", [1.1, 1.2, 1.3, 1.5])
-def test_close_modes_are_told_apart(ratio: float) -> None:
+def test_close_modes_are_distinguished(ratio: float) -> None:
     modes = [Mode(1722.0, 0.03, 3.5e7), Mode(1722.0 * ratio, 0.03, 5e7)]
     error = errors(fit_modes(from_accelerance(LINES, accelerance(modes, LINES))), modes)
     assert significant_digits(error[:, 0]) > 7

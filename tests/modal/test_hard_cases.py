@@ -109,13 +109,13 @@ def test_a_weak_mode_on_the_flank_of_a_strong_one_is_found() -> None:
         assert_found(fit_modes(measured(pair, LINES, 1, seed)), pair)
 
 
-def test_a_ripple_of_a_percent_beside_a_mode_is_no_mode() -> None:
+def test_a_ripple_of_a_percent_next_to_a_mode_is_no_mode() -> None:
     pair = [Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 3e9)]
     for seed in range(5):
         assert len(fit_modes(measured(pair, LINES, 1, seed))) == 1
 
 
-def test_lines_of_hum_beside_a_mode_are_no_modes() -> None:
+def test_lines_of_hum_next_to_a_mode_are_no_modes() -> None:
     """Taken for modes they would narrow its band, and K be less certain."""
     lines, true = np.arange(1.0, 4000.0), SPINDLE[2:]
     for seed in range(3):
@@ -136,7 +136,7 @@ def test_a_peak_a_few_lines_from_the_edge_is_found_and_flagged(ends: tuple[float
 
 
 @pytest.mark.parametrize("ends", [(1496.0, 4000.0), (1520.0, 4000.0), (4.0, 1506.0), (4.0, 1482.0)])
-def test_a_peak_on_the_edge_or_just_beyond_is_said(ends: tuple[float, float]) -> None:
+def test_a_peak_on_the_edge_or_just_beyond_is_reported(ends: tuple[float, float]) -> None:
     lines = np.arange(*ends, 4.0)
     frf = measured([Mode(1500.0, 0.03, 3e7), Mode(700.0, 0.02, 3e8), Mode(2900.0, 0.02, 3e8)], lines, 1)
     found = fit_modes(frf)
@@ -165,7 +165,7 @@ def test_the_line_of_a_mass_is_no_peak() -> None:
     )
 
 
-def test_a_strong_mode_beside_the_band_does_not_bend_a_weak_one_in_it_unsaid() -> None:
+def test_a_strong_mode_next_to_the_band_does_not_bend_a_weak_one_in_it_unreported() -> None:
     weak = Mode(3300.0, 0.03, 1.4e9)
     strong = [SPINDLE[1], Mode(3900.0, 0.03, 2.6e8)]
     for seed in range(5):

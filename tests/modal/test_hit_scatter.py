@@ -124,7 +124,7 @@ def test_two_hits_have_no_jackknife(n_hits: int) -> None:
 
 
 @pytest.mark.parametrize("n_hits", [1, 3])
-def test_hits_of_another_record_are_refused(n_hits: int) -> None:
+def test_hits_of_another_record_are_rejected(n_hits: int) -> None:
     hits = tap(0, n_hits)
     short = [Hit(hit.force[:4096], hit.acceleration[:4096], EMULATED_SAMPLE_RATE, PRE_TRIGGER) for hit in hits]
     with pytest.raises(ValueError, match="differ in their frequency lines"):

@@ -39,7 +39,7 @@ def said(hits: list[Hit]) -> list[str]:
 
 
 @pytest.mark.parametrize("percent", [-0.5, -0.1, 0.2])
-def test_the_slope_is_said_with_its_error(percent: float) -> None:
+def test_the_slope_is_reported_with_its_error(percent: float) -> None:
     for seed in range(5):
         (text,) = said(softening(seed, percent / 100))
         slope, error = map(float, re.findall(r"([-+.\d]+) ± ([.\d]+) %", text)[0])
@@ -47,12 +47,12 @@ def test_the_slope_is_said_with_its_error(percent: float) -> None:
         assert text.startswith("softens" if percent < 0 else "stiffens")
 
 
-def test_without_such_a_joint_nothing_is_said() -> None:
+def test_without_such_a_joint_nothing_is_reported() -> None:
     assert [said(tap(seed)) for seed in range(20)] == [[]] * 20
 
 
 @pytest.mark.long
-def test_in_100_tests_nothing_is_said_without_such_a_joint() -> None:
+def test_in_100_tests_nothing_is_reported_without_such_a_joint() -> None:
     remarks = [
         remark.code
         for seed in range(100)

@@ -40,7 +40,7 @@ def beside_the_limit(rng: np.random.Generator) -> list[DelayedCase]:
 
 
 @pytest.mark.parametrize(("seed", "spindles"), [(5, 8), pytest.param(6, 120, marks=pytest.mark.long)])
-def test_limits_of_random_askew_spindles_are_those_of_a_simulation(seed: int, spindles: int) -> None:
+def test_limits_of_random_rotated_spindles_are_those_of_a_simulation(seed: int, spindles: int) -> None:
     rng = np.random.default_rng(seed)
     cases = list[DelayedCase]()
     while len(cases) < 2 * spindles:

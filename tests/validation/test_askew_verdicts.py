@@ -20,7 +20,7 @@ def say(text: str) -> None:
 @pytest.mark.parametrize(
     "count", [3, pytest.param(120, marks=[pytest.mark.long, pytest.mark.timeout(14400)])], ids=["few", "all"]
 )
-def test_limits_of_askew_spindles_are_not_below_what_is_said(count: int, across: bool) -> None:
+def test_limits_of_rotated_spindles_are_not_below_what_is_reported(count: int, across: bool) -> None:
     said = sayings(count, seed=1, across=across)
     holds = hold(said, 0.95)
     stable = np.mean([saying.verdict.stability is Stability.STABLE for saying in said])

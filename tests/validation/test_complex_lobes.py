@@ -99,7 +99,7 @@ def test_limits_are_those_of_the_simulation_in_time(
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(100, marks=pytest.mark.long)])
-def test_random_programs_of_complex_modes_are_judged_as_by_the_simulation(count: int) -> None:
+def test_random_programs_of_complex_modes_are_evaluated_as_by_the_simulation(count: int) -> None:
     """One to six modes in x and y, phases of -40 to 40 degrees, with and without helix, along x."""
     rng = np.random.default_rng(count)
     cases, growth = list[Case](), list[float]()

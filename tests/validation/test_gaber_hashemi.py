@@ -77,13 +77,13 @@ def test_calibration_inverts_natural_frequencies(mode: int) -> None:
     assert calibrate(surrogate(5e8), frequency, mode=mode).bearing_stiffness == pytest.approx(1.28e9, rel=1e-9)
 
 
-def test_frequency_above_the_rigid_limit_is_refused_with_the_range() -> None:
+def test_frequency_above_the_rigid_limit_is_rejected_with_the_range() -> None:
     with pytest.raises(UnreachableFrequencyError, match=r"2400 Hz.* 0\.0 Hz .* 2301\.1 Hz") as error:
         calibrate(surrogate(1.28e9), 2400.0)
     assert error.value.reachable == pytest.approx((0.0, 2301.09), abs=0.01)
 
 
-def test_frequency_below_the_free_limit_is_refused_with_the_range() -> None:
+def test_frequency_below_the_free_limit_is_rejected_with_the_range() -> None:
     with pytest.raises(UnreachableFrequencyError, match=r"mode 4 at 500 Hz.* 2316\.5 Hz"):
         calibrate(surrogate(1.28e9), 500.0, mode=4)
 

@@ -46,6 +46,6 @@ def test_list_is_short_enough_to_read(beam: Frf) -> None:
     assert len(fit_modes(beam, (300.0, 6500.0))) == 5
 
 
-def test_conjugate_is_refused(beam: Frf) -> None:
+def test_conjugate_is_rejected(beam: Frf) -> None:
     with pytest.raises(ValueError, match="phase rises"):
         fit_modes(Frf(beam.frequency, beam.receptance.conj(), measured_as="accelerance", usable_band=beam.usable_band))

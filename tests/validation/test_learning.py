@@ -26,7 +26,7 @@ def test_the_limit_of_a_slot_is_that_of_one_mode_in_closed_form() -> None:
     assert np.min(limits) == pytest.approx(lowest, rel=0.002)
 
 
-def test_the_judge_hears_chatter_above_the_optimum_and_none_below() -> None:
+def test_the_evaluation_detects_chatter_above_the_optimum_and_none_below() -> None:
     truths = [ForeignTruth(number) for number in range(4)]
     at = [(one, one.optimum[0], one.limits[list(one.speeds).index(one.optimum[0])]) for one in truths]
     below, above = (
@@ -59,7 +59,7 @@ def test_the_power_of_a_truth_says_its_kt_within_the_error_that_is_reckoned_with
 
 
 @pytest.mark.timeout(600)
-def test_a_few_spindles_reach_most_of_their_optimum_with_and_without_a_word_that_is_wrong() -> None:
+def test_a_few_spindles_reach_most_of_their_optimum_with_and_without_a_wrong_label() -> None:
     right, wrong = [ForeignTruth(number) for number in range(4)], [ForeignTruth(2, mislabelled=2)]
     make_cuts([*right, *wrong])
     assert reached(right)[0] >= 0.8
@@ -79,7 +79,7 @@ def test_five_cuts_find_most_of_what_a_foreign_spindle_can_do() -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(3000)
-def test_one_wrong_word_of_five_leaves_most_of_it() -> None:
+def test_one_wrong_label_of_five_leaves_most_of_it() -> None:
     """0.86 and 0.65 are wanted, and not reached."""
     truths = [ForeignTruth(number, mislabelled=2) for number in range(100)]
     make_cuts(truths)
@@ -91,7 +91,7 @@ def test_one_wrong_word_of_five_leaves_most_of_it() -> None:
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize(("mislabelled", "median", "tenth"), [(0, 0.92, 0.78), (2, 0.84, 0.65)])
-def test_five_cuts_whose_power_is_read_find_more_with_a_wrong_word_too(
+def test_five_cuts_whose_power_is_read_find_more_with_a_wrong_label_too(
     mislabelled: int, median: float, tenth: float
 ) -> None:
     """0.86 is wanted in the median with a wrong word."""

@@ -156,7 +156,7 @@ def test_a_push_of_a_hundredth_of_the_feed_dies_below_the_limit() -> None:
     "change",
     [{"x": (), "y": ()}, {"x": ((500.0, 1.0, 1e7),)}, {"immersion": 1.2}, {"direction": "both"}, {"depth": 0.0}],
 )
-def test_what_cannot_be_simulated_is_refused(change: dict[str, Any]) -> None:
+def test_what_cannot_be_simulated_is_rejected(change: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"need frequency|is no cut|must be > 0"):
         replace(unequal(7000.0, 1e-3), **change)
 
@@ -212,10 +212,10 @@ def compare(seed: int, number: int) -> None:
     assert judged.growth == pytest.approx(np.ravel(growth), rel=0.02, abs=3e-3)
 
 
-def test_random_programs_are_judged_as_by_semi_discretisation() -> None:
+def test_random_programs_are_evaluated_as_by_semi_discretisation() -> None:
     compare(seed=1, number=16)
 
 
 @pytest.mark.long
-def test_many_random_programs_are_judged_as_by_semi_discretisation() -> None:
+def test_many_random_programs_are_evaluated_as_by_semi_discretisation() -> None:
     compare(seed=2, number=200)

@@ -28,7 +28,7 @@ def test_advice_pockets_and_recommendation_are_one_answer_that_holds_when_it_is_
 
 @pytest.mark.long
 @pytest.mark.timeout(14400)
-def test_of_1000_random_cuts_no_two_answers_contradict_each_other_and_none_is_refused() -> None:
+def test_of_1000_random_cuts_no_two_answers_contradict_each_other_and_none_is_rejected() -> None:
     counts = answers(range(1000), seed=6, dense=False)
     sys.stdout.write(summary(counts))
     assert counts.cuts >= 600
@@ -58,7 +58,7 @@ def search_of(number: int, depth_mm: float = 1.0) -> SettingSearch:
 
 
 @pytest.mark.parametrize(("number", "depth_mm"), [(19, 1.0), (234, 1.0), (348, 14.36)])
-def test_a_setting_is_found_where_draws_chatter_below_a_depth_at_which_they_are_stable_again(
+def test_a_setting_is_found_where_samples_chatter_below_a_depth_at_which_they_are_stable_again(
     number: int, depth_mm: float
 ) -> None:
     """Few depths are looked at on the way, and step over such islands."""
@@ -76,7 +76,7 @@ def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
     assert isinstance(search.verify(24000.0, search.cut_range.round_down_depth(less)), Setting)
 
 
-def test_one_look_at_a_depth_at_which_draws_chatter_in_a_cut_passed_over_says_how_deep_is_safe() -> None:
+def test_one_look_at_a_depth_at_which_samples_chatter_in_a_cut_skipped_says_how_deep_is_safe() -> None:
     """The feed directions in which the median is near its limit are checked first."""
     search = search_of(71, 0.4388)
     less = search.verify(15600.0, 1.25)

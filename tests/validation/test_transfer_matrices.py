@@ -144,7 +144,7 @@ def assert_exact(shaft: Spindle) -> None:
 
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
 @pytest.mark.parametrize("offset_mm", [1e-6, 0.002, 0.01, 0.13, 0.5])
-def test_parts_beside_the_end_of_a_segment(offset_mm: float, theory: Theory) -> None:
+def test_parts_next_to_the_end_of_a_segment(offset_mm: float, theory: Theory) -> None:
     assert_exact(spindle(offset_mm / 1e3, theory))
 
 
@@ -195,7 +195,7 @@ def test_modes_of_a_stiff_shaft_on_soft_bearings() -> None:
     assert_exact(Spindle([Segment(0.03, 0.06), Segment(0.03, 0.1)], [Bearing(0.01, 1e5), Bearing(0.05, 3e4)]))
 
 
-def test_calibration_beside_the_end_of_a_segment_inverts_the_frequency() -> None:
+def test_calibration_next_to_the_end_of_a_segment_inverts_the_frequency() -> None:
     shaft = spindle(1e-5, "euler-bernoulli")
     found = calibrate(shaft, float(natural_frequencies(shaft, 2)[1]), mode=2)
     assert found.factor == pytest.approx(1, rel=1e-8)

@@ -64,7 +64,7 @@ def test_a_machine_tapped_in_one_direction_is_never_called_stable(count: int) ->
 
 @pytest.mark.long
 @pytest.mark.timeout(7200)
-def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_stable() -> None:
+def test_what_is_stable_in_the_whole_uncertainty_with_5_percent_to_spare_is_called_stable() -> None:
     """2000 draws at 1.05 times the depth, by other random numbers."""
     called = []
     for rng in np.random.default_rng(4).spawn(120):

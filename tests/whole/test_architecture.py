@@ -42,7 +42,7 @@ def test_the_layers_are_those_that_are_checked(contract: dict[str, list[str]]) -
     assert f"* {where}: `{' > '.join(contract['layers'])}`\n" in PAGE
 
 
-def test_the_nouns_are_public_names_of_where_they_are_said_to_be() -> None:
+def test_the_nouns_are_public_names_of_where_they_are_reported_to_be() -> None:
     nouns = re.findall(r"^\| `(\w+)` \| `([\w.]+)` \| .+ \| .+ \|$", PAGE, re.MULTILINE)
     assert {"TapTest", "Logbook", "Assembly", "Verdict", "MachineStatus"} <= {name for name, _ in nouns}
     for name, package in nouns:

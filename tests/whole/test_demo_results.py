@@ -139,7 +139,7 @@ def port_of_a_cut() -> Iterator[str]:
 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", QUESTIONS)
-def test_the_answer_is_the_one_that_was_looked_at(demo: dict[str, str], name: str, tmp_path: Path) -> None:
+def test_the_answer_is_the_one_that_was_inspected(demo: dict[str, str], name: str, tmp_path: Path) -> None:
     seen, new = SEEN / f"{name}.txt", tmp_path / f"{name}.txt"
     new.write_text(demo[name], "utf-8")
     expected = seen.read_text("utf-8") if seen.exists() else ""
@@ -159,7 +159,7 @@ def test_tables_fit_eighty_columns_and_no_number_has_an_exponent(demo: dict[str,
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", PICTURES)
 @pytest.mark.usefixtures("demo")
-def test_the_picture_is_the_one_that_was_looked_at(name: str, tmp_path: Path) -> None:
+def test_the_picture_is_the_one_that_was_inspected(name: str, tmp_path: Path) -> None:
     seen, new = SEEN / f"{name}.png", tmp_path / f"{name}.png"
     with Image.open(f"{name}.png") as drawn:
         drawn.convert("RGB").reduce(SMALLER).save(new, optimize=True)

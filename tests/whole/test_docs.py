@@ -59,7 +59,7 @@ def test_the_page_of_all_commands_is_what_they_say() -> None:
     assert written == page, "run: .venv/bin/python docs/make_commands.py"
 
 
-def test_every_command_and_option_stands_in_the_docs_and_no_other_in_readme() -> None:
+def test_every_command_and_option_is_in_the_docs_and_no_other_in_readme() -> None:
     group = typer.main.get_command(app)
     assert isinstance(group, typer.core.TyperGroup)
     known = dict(commands(group))

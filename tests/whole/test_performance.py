@@ -25,7 +25,7 @@ def test_the_page_is_that_of_the_last_run() -> None:
     assert list(stated.results) == list(BENCHES)
 
 
-def test_what_got_slower_is_said_and_nothing_else() -> None:
+def test_what_got_slower_is_reported_and_nothing_else() -> None:
     before = [result("a", 4.0), result("b", 4.0), result("gone", 1.0)]
     (line,) = worse([result("a", 2.9), result("b", 3.1), result("new", 0.1)], before)
     assert line == "got slower: a: 2.9 times as fast as a peer, stated 4"
@@ -56,7 +56,7 @@ def test_the_textbook_loop_comes_to_the_same_multipliers(modes: tuple[Modes, Mod
         assert np.max(np.abs(batched(speeds, depths, 640) / ours - 1)) < 1e-3
 
 
-def test_a_race_runs_and_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_race_runs_and_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(sys, "argv", ["performance.py", "--quick", "Tap files"])
     before = PAGE.read_bytes(), STATED.read_bytes()
@@ -65,7 +65,7 @@ def test_a_race_runs_and_is_told(monkeypatch: pytest.MonkeyPatch, capsys: pytest
     assert (PAGE.read_bytes(), STATED.read_bytes()) == before
 
 
-def test_a_peer_that_is_not_installed_is_said(
+def test_a_peer_that_is_not_installed_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "sdypy", None)

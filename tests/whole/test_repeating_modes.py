@@ -37,7 +37,7 @@ def test_a_mode_of_half_of_the_points_repeats(
 
 
 @pytest.mark.parametrize(("count", "beside"), [(2, "0.00"), (3, "1.00")])
-def test_each_file_is_read_beside_all_others_where_there_are_two(
+def test_each_file_is_read_next_to_all_others_where_there_are_two(
     count: int, beside: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def read(file: Path, words: list[str]) -> public_files.Reading:

@@ -54,7 +54,7 @@ def test_run_py_is_grammar_that_an_old_python_understands() -> None:
         assert word not in source, word
 
 
-def test_neither_pip_nor_uv_is_said_in_one_sentence_with_the_cure(
+def test_neither_pip_nor_uv_is_reported_in_one_sentence_with_the_cure(
     run_py: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(run_py.subprocess, "call", lambda *_, **__: 1)

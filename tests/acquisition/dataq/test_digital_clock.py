@@ -69,7 +69,7 @@ EDGE_ERROR = 1 + 2 / CLOCK_TRAINING_PERIODS
 @example(period=17.543, packets=9, at=2252, inside=2, cuts=[])  # so does the edge after it
 @example(period=30.5, packets=6, at=2338, inside=4, cuts=[])  # three scans beyond whole periods, in two parts
 @example(period=10.24, packets=6, at=2413, inside=2, cuts=[])
-def test_whole_scans_that_are_lost_are_told_with_their_number(
+def test_whole_scans_that_are_lost_are_reported_with_their_number(
     period: float, packets: int, at: int, inside: int, cuts: list[int]
 ) -> None:
     """Lose three packets of 64 bytes, 32 scans of 6 bytes. A jump of the wave at the cut separates two parts."""
@@ -89,7 +89,7 @@ def test_whole_scans_that_are_lost_are_told_with_their_number(
     assert error <= EDGE_ERROR + 0.5 * len(found) + jumps_up * CLOCK_PERIOD_TOLERANCE
 
 
-def test_bytes_that_are_lost_are_told_once() -> None:
+def test_bytes_that_are_lost_are_reported_once() -> None:
     stream = scans(50.0).tobytes()
     ((place, number),) = gaps(decoded(stream[:12_000] + stream[12_064:], []))
     assert place == 2000
@@ -97,19 +97,19 @@ def test_bytes_that_are_lost_are_told_once() -> None:
 
 
 @pytest.mark.parametrize("period", [3.0, 150.0, np.inf])
-def test_a_wave_that_cannot_be_followed_is_refused(period: float) -> None:
+def test_a_wave_that_cannot_be_followed_is_rejected(period: float) -> None:
     with pytest.raises(DeviceError, match=r"digital input 0 of the DAQ has no even square wave.*6 to 100 scans"):
         decoded(scans(period).tobytes(), [])
 
 
-def test_a_generator_that_is_unplugged_is_told() -> None:
+def test_a_generator_that_is_unplugged_is_reported() -> None:
     words = scans(50.0)
     words[2000:, 2] |= 0x0100
     with pytest.raises(DeviceError, match="connect the generator again"):
         decoded(words.tobytes(), [])
 
 
-def test_an_uneven_wave_is_refused() -> None:
+def test_an_uneven_wave_is_rejected() -> None:
     words = scans(50.0)
     high = np.repeat(np.random.default_rng(2).random(N // 10) < 0.5, 10)
     words[:, 2] = 0x7E00 + 0x0100 * high

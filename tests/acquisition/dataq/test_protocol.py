@@ -126,7 +126,7 @@ def test_a_command_without_its_echo_is_sent_three_times() -> None:
     "answer",
     [b"Invalid Parameter\r", b"Command not found\r", b"Command not available\r", b"slist 1 1027 Invalid Parameter\r"],
 )
-def test_a_refused_command_is_told_with_the_words_of_the_device(answer: bytes) -> None:
+def test_a_rejected_command_is_reported_with_the_words_of_the_device(answer: bytes) -> None:
     script = [*IDENTITY, *SET_UP[:2], *[(b"slist 1 1027\r", answer)] * 3]
     words = answer.decode().strip()
     with pytest.raises(DeviceError, match=rf"COM9 does not take 'slist 1 1027' \(3 tries\); it says '{words}'"):
@@ -151,14 +151,14 @@ def test_a_silent_device_gets_the_hint_to_cdc_mode() -> None:
         (5, b"info 9 fast\r", "is none that this driver knows"),
     ],
 )
-def test_a_device_that_cannot_be_used_is_refused(at: int, answer: bytes, message: str) -> None:
+def test_a_device_that_cannot_be_used_is_rejected(at: int, answer: bytes, message: str) -> None:
     script = list(IDENTITY)
     script[at] = (script[at][0], answer)
     with pytest.raises(DeviceError, match=message):
         connect(script)
 
 
-def test_a_range_that_the_model_does_not_have_is_refused() -> None:
+def test_a_range_that_the_model_does_not_have_is_rejected() -> None:
     script = list(IDENTITY)
     script[2] = (b"info 1\r", b"info 1 DI-4208\r")
     with pytest.raises(ValueError, match=r"range_v=0.5 is no range of the DI-4208; it has \+-100, 50, 20, 10, 5, 2 V"):
@@ -182,7 +182,7 @@ def test_rates_follow_the_formula(wanted: float, setting: tuple[int, int, int], 
     assert chosen.rate(60_000_000) == pytest.approx(rate, rel=1e-7)
 
 
-def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_refused() -> None:
+def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_rejected() -> None:
     for wanted in (0.001, 0.1, 3.3, 77.7, 1234.5, 9_999.0, 40_000.0):
         chosen = choose_rate(wanted, 60_000_000)
         assert chosen.rate(60_000_000) == pytest.approx(wanted, rel=1e-3)

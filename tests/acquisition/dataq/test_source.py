@@ -193,7 +193,7 @@ def test_a_buffer_that_ran_over_is_found_and_scanning_starts_again(emulated: Mak
     assert gap > 0.1 * RATE  # no less than the silence after which it was looked for
 
 
-def test_the_hit_in_which_the_buffer_ran_over_is_refused(emulated: Make) -> None:
+def test_the_hit_in_which_the_buffer_ran_over_is_rejected(emulated: Make) -> None:
     with emulated(overflow_after=14_000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         hits = list(islice(capture_hits(source, TRIGGER), 2))
@@ -241,7 +241,7 @@ def test_a_device_that_scans_already_is_taken_over(emulated: Make) -> None:
         assert all(np.abs(block.codes).max() < 100 for block in blocks)  # noise: nobody taps so early
 
 
-def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_device_that_never_stops_is_rejected(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.dataq.protocol.DATAQ_STOP_SILENCE", 0.5)
     monkeypatch.setattr("acquisition.dataq.protocol.MAX_DRAIN_TIME", 0.2)
     with (
@@ -251,7 +251,7 @@ def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytes
         DataqSource(device.port, INPUTS, RATE)
 
 
-def test_old_firmware_is_refused(emulated: Make) -> None:
+def test_old_firmware_is_rejected(emulated: Make) -> None:
     with emulated(firmware="1.34") as device, pytest.raises(DeviceError, match=r"firmware 1\.34; 1\.35 or newer"):
         DataqSource(device.port, INPUTS, RATE)
 
@@ -264,14 +264,14 @@ def test_a_silent_device_is_given_up(emulated: Make, monkeypatch: pytest.MonkeyP
             list(source.blocks())
 
 
-def test_hanging_up_is_said_in_one_sentence(emulated: Make) -> None:
+def test_hanging_up_is_reported_in_one_sentence(emulated: Make) -> None:
     with emulated(unplug_after=9000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         with pytest.raises(DeviceError, match="unplugged or switched off"):
             list(source.blocks())
 
 
-def test_digital_inputs_that_do_not_hold_still_are_told(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_digital_inputs_that_do_not_hold_still_are_reported(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.dataq.source.DATAQ_SILENCE_TIMEOUT", 0.3)
     with emulated(digital_word=0x0001) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
@@ -353,7 +353,7 @@ def test_every_model_takes_the_set_up(signal_at: SignalAt) -> None:
             assert take(source, 100)[0].first_scan == 0
 
 
-def test_wrong_commands_are_refused_in_the_words_of_the_device(emulated: Make) -> None:
+def test_wrong_commands_are_rejected_in_the_words_of_the_device(emulated: Make) -> None:
     def answers(handle: int, commands: bytes, count: int) -> list[bytes]:
         os.write(handle, commands)
         said = b""
@@ -380,7 +380,7 @@ def test_wrong_commands_are_refused_in_the_words_of_the_device(emulated: Make) -
         os.close(handle)
 
 
-def test_a_port_in_use_is_refused_with_the_cure(emulated: Make) -> None:
+def test_a_port_in_use_is_rejected_with_the_cure(emulated: Make) -> None:
     with (
         emulated() as device,
         DataqSource(device.port, INPUTS, RATE),
@@ -404,7 +404,7 @@ def test_a_clock_shows_the_loss_of_whole_scans(emulated: Make, signal_at: Signal
         assert hits[0].lost_scans in ((32, 31, 33) if clock else (0,))
 
 
-def test_a_clock_that_is_not_there_is_told(emulated: Make) -> None:
+def test_a_clock_that_is_not_there_is_reported(emulated: Make) -> None:
     with emulated() as device, DataqSource(device.port, INPUTS, RATE, digital_clock=True) as source:
         source.start()
         with pytest.raises(DeviceError, match="digital input 0 of the DAQ has no even square wave"):

@@ -53,7 +53,7 @@ def test_a_stream_cut_anywhere_gives_the_same_scans(seed: int, digital: bool, cu
     lost=st.sampled_from([1, 3, 5, 64, 128]),
     cuts=st.lists(st.integers(0, 3500), max_size=10),
 )
-def test_lost_bytes_are_found_and_the_scans_after_them_stand_in_their_place(
+def test_lost_bytes_are_found_and_the_scans_after_them_are_in_their_place(
     seed: int, at: int, lost: int, cuts: list[int]
 ) -> None:
     words = noise(600, seed)

@@ -145,7 +145,7 @@ def test_ports_goes_on_without_a_package_that_ends_the_program_when_loaded(port:
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
-def test_settings_that_make_a_driver_fail_are_refused_with_its_package(bad_daq: None, error: BaseException) -> None:
+def test_settings_that_make_a_driver_fail_are_rejected_with_its_package(bad_daq: None, error: BaseException) -> None:
     with pytest.raises(DataError, match=r"driver 'bad': the package bad-daq fails when checking \[daq\] \(.*update or"):
         check_settings(driver("bad", lambda _: None, check=raising(error)), DeviceSettings())
 

@@ -63,7 +63,9 @@ def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPa
         ("acquisition.devices.drivers:BUILT_IN_DRIVERS.__class__", "of the package bad is no acquisition.Driver"),
     ],
 )
-def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Install, target: str, message: str) -> None:
+def test_what_is_no_driver_is_rejected_with_the_name_of_its_package(
+    install: Install, target: str, message: str
+) -> None:
     install("bad", target)
     with pytest.raises(DataError) as caught:
         find_driver("odd")
@@ -75,7 +77,7 @@ def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Inst
     assert (remark.code, str(remark)) == ("package-not-loaded", str(caught.value))
 
 
-def test_a_driver_under_another_name_is_refused(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_under_another_name_is_rejected(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
     install("liar", "lobewatch_dummy_device:DRIVER")
     with pytest.raises(DataError, match="driver 'odd': the package liar calls it 'dummy' elsewhere"):

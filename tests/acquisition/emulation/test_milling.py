@@ -232,12 +232,12 @@ def test_a_cut_among_others_is_the_same_as_alone() -> None:
         {"x": None, "y": None},
     ],
 )
-def test_what_is_no_cut_is_refused(change: dict[str, Any]) -> None:
+def test_what_is_no_cut_is_rejected(change: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"teeth|angles|depth|radial|runout|rigid"):
         replace(cut_of(HALF_UP, 7000.0, 1e-3), **change)
 
 
-def test_a_passage_without_a_cut_is_refused() -> None:
+def test_a_passage_without_a_cut_is_rejected() -> None:
     with pytest.raises(ValueError, match="ramp or steady"):
         Passage(ramp=0.0, steady=0.0)
 
@@ -269,6 +269,6 @@ def test_uneven_teeth_chatter_beyond_their_limit_and_not_below(pitch: tuple[floa
 
 
 @pytest.mark.parametrize("pitch", [(1.0, 2.0), (2.0, 2.0, 2.0), (-1.0, 3.0, 2 * math.pi - 2.0)])
-def test_pitches_that_are_none_are_refused(pitch: tuple[float, ...]) -> None:
+def test_pitches_that_are_none_are_rejected(pitch: tuple[float, ...]) -> None:
     with pytest.raises(ValueError, match=r"pitch=.* one above 0 for each of 3 teeth, a turn in all"):
         cut_of(HALF_UP, 7000.0, 1e-3, pitch=pitch)

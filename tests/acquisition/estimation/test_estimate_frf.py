@@ -150,7 +150,7 @@ def test_zero_hertz_is_left_out_and_forms_agree() -> None:
     assert frf.mobility == pytest.approx(frf.accelerance / (2j * np.pi * frf.frequency))
 
 
-def test_bad_calls_are_refused(tapper: Tapper, channels: Pair) -> None:
+def test_bad_calls_are_rejected(tapper: Tapper, channels: Pair) -> None:
     (hit,) = hits(tapper, channels, 1)
     with pytest.raises(ValueError, match="no hit to average"):
         estimate_frf([])
@@ -176,11 +176,11 @@ def test_bad_calls_are_refused(tapper: Tapper, channels: Pair) -> None:
         (([1.0, 2.0], [1.0, 1.0], None, 1, "compliance"), "measured_as='compliance'"),
     ],
 )
-def test_an_frf_that_is_none_is_refused(arguments: tuple[object, ...], message: str) -> None:
+def test_an_frf_that_is_none_is_rejected(arguments: tuple[object, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Frf(*arguments)  # type: ignore[arg-type]
 
 
-def test_a_band_outside_the_axis_is_refused() -> None:
+def test_a_band_outside_the_axis_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"band 10\.\.20 Hz holds 0 lines"):
         Frf(np.array([1.0, 2.0]), np.array([1.0, 1.0])).in_band((10.0, 20.0))

@@ -50,7 +50,7 @@ def test_whole_records_have_none() -> None:
     assert infer_recorded_share(Frf(np.geomspace(10, 3000, 799), exact.receptance)) == 1.0
 
 
-def test_what_rings_at_the_end_of_the_true_record_is_said() -> None:
+def test_what_rings_at_the_end_of_the_true_record_is_reported() -> None:
     mode = min(fit_modes(filled_up(0.1, 4)), key=lambda mode: abs(mode.frequency - 1500))
     assert mode.remaining_decay == pytest.approx(0.1, rel=0.3)
     assert assess_trust(mode) is Trust.DOUBTFUL

@@ -33,7 +33,7 @@ def test_hits_without_a_window_show_none() -> None:
     assert [infer_window([hit]) for hit in humming] == [None] * 10
 
 
-def test_what_cannot_be_told_is_not() -> None:
+def test_what_cannot_be_classified_is_not() -> None:
     (hit,) = tap(0, 1)
     padded = np.append(hit.acceleration[:-2000], np.zeros(2000))
     assert infer_window([replace(hit, acceleration=padded)]) is None

@@ -85,6 +85,6 @@ def test_covariance_is_that_of_simulated_averages() -> None:
         assert np.max(np.abs(found - expected) / scale) < 0.15
 
 
-def test_hit_without_pulse_is_refused() -> None:
+def test_hit_without_pulse_is_rejected() -> None:
     with pytest.raises(ValueError, match="no force pulse"):
         list(propagate_force_noise([Hit(np.zeros(SIZE), np.zeros(SIZE), RATE)], LINES))

@@ -57,7 +57,7 @@ def assert_same(mean: RunningMean, hits: list[Hit]) -> None:
     assert (mean.frf.n_averages, mean.frf.usable_band) == (expected.n_averages, expected.usable_band)
 
 
-def test_it_is_the_estimate_from_all_hits_also_after_one_was_taken_back(hits: list[Hit]) -> None:
+def test_it_is_the_estimate_from_all_hits_also_after_one_was_withdrawn(hits: list[Hit]) -> None:
     mean = mean_of(hits)
     assert_same(mean, hits)
     others = [*hits[:2], *hits[3:]]
@@ -116,7 +116,7 @@ def test_noise_keeps_it_from_settling() -> None:
     assert errors[0] > 100 * errors[1]
 
 
-def test_what_cannot_join_or_leave_is_refused() -> None:
+def test_what_cannot_join_or_leave_is_rejected() -> None:
     mean = mean_of([pulse(1.0)])
     other = Hit(np.r_[pulse(1.0).force, 0.0], np.r_[pulse(1.0).acceleration, 0.0], 1024.0)
     with pytest.raises(ValueError, match="1025 samples at 1024 Hz cannot join a mean of hits of 1024 samples"):

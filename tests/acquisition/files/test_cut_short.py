@@ -123,7 +123,7 @@ def assert_begins(found: Frf | None, whole: Frf | None, *, may_be_shorter: bool)
 
 
 @pytest.mark.parametrize("name", ["frf.csv", "hit.csv"])
-def test_our_table_cut_at_each_byte_is_refused(tmp_path: Path, name: str) -> None:
+def test_our_table_cut_at_each_byte_is_rejected(tmp_path: Path, name: str) -> None:
     MADE[name](tmp_path / name)
     content, cut = (tmp_path / name).read_bytes(), tmp_path / "cut.csv"
     for end in range(len(content)):
@@ -132,7 +132,7 @@ def test_our_table_cut_at_each_byte_is_refused(tmp_path: Path, name: str) -> Non
             inspect_file(cut)
 
 
-def test_a_table_of_ours_with_other_rows_than_it_says_is_refused_with_the_place(tmp_path: Path) -> None:
+def test_a_table_of_ours_with_other_rows_than_it_says_is_rejected_with_the_place(tmp_path: Path) -> None:
     of_frf(".csv")(tmp_path / "a.csv")
     whole = (tmp_path / "a.csv").read_text().splitlines(keepends=True)
     for lines, place in (
@@ -145,7 +145,7 @@ def test_a_table_of_ours_with_other_rows_than_it_says_is_refused_with_the_place(
             inspect_file(tmp_path / "a.csv")
 
 
-def test_rows_that_another_program_counts_are_not_ours_to_judge(tmp_path: Path) -> None:
+def test_rows_that_another_program_counts_are_not_ours_to_evaluate(tmp_path: Path) -> None:
     of_frf(".csv")(tmp_path / "a.csv")
     text = (tmp_path / "a.csv").read_text().replace("written by: lobewatch", "written by: another")
     (tmp_path / "a.csv").write_text(text.replace("# rows: 40", "# rows: 41").rstrip())

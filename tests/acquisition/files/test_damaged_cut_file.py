@@ -59,11 +59,11 @@ def refused(recording: Path, rounds: int) -> int:
 
 
 @pytest.mark.timeout(60)
-def test_damaged_recordings_are_refused(recording: Path) -> None:
+def test_damaged_recordings_are_rejected(recording: Path) -> None:
     assert refused(recording, 150) >= 130
 
 
 @pytest.mark.long
 @pytest.mark.timeout(600)
-def test_five_thousand_damaged_recordings_are_refused(recording: Path) -> None:
+def test_five_thousand_damaged_recordings_are_rejected(recording: Path) -> None:
     assert refused(recording, 5000) >= 4500

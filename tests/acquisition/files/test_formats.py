@@ -66,7 +66,7 @@ def test_a_format_of_another_package_is_read_by_modes_and_replay(hit: Path, tmp_
     assert second["modes"][0]["stiffness_n_per_m"] == pytest.approx(2e7, rel=0.01)
 
 
-def test_without_the_package_its_files_are_refused(hit: Path) -> None:
+def test_without_the_package_its_files_are_rejected(hit: Path) -> None:
     said = run(["modes", hit])
     assert said.returncode == 2
     assert "what its columns are (column 1, " in said.stderr
@@ -134,7 +134,7 @@ def test_a_format_that_fails_on_a_file_is_left_out_or_named(tmp_path: Path, beam
     assert "cannot be read as bad format (KeyError: 'rows')" in said.stderr
 
 
-def test_recordings_are_told_by_content_whatever_their_name(beam: Path, tmp_path: Path) -> None:
+def test_recordings_are_recognized_by_content_whatever_their_name(beam: Path, tmp_path: Path) -> None:
     assert [one.name for one in list_formats()] == [
         *("tap-file", "uff", "mat", "lvm", "tdms", "wav", "sep005", "numpy", "hdf5", "pulse", "table")
     ]

@@ -29,7 +29,7 @@ def test_an_analysers_mat_file_with_frf_and_coherence() -> None:
     assert frf.n_averages == 10
 
 
-def test_the_hit_beside_it_is_taken_by_its_names() -> None:
+def test_the_hit_next_to_it_is_taken_by_its_names() -> None:
     columns = ("time [s]=Time_domain", "force [N]=Time_chan_1", "acceleration [g]=Time_chan_2")
     (hit,) = read_hits(DATA / "vibrationtesting" / "case1.mat", Description(columns=columns))
     assert hit.force.size == 4096

@@ -45,7 +45,7 @@ def axes_table(path: Path) -> Path:
     return path
 
 
-def test_several_accelerations_are_all_heard_and_one_is_where_it_is_named(tmp_path: Path) -> None:
+def test_several_accelerations_are_all_detected_and_one_is_where_it_is_named(tmp_path: Path) -> None:
     path = axes_table(tmp_path / "cut.csv")
     sound = read_cut_recording(path)
     assert np.allclose(sound.acceleration, [WAVE, 2 * WAVE, -9.80665 * WAVE], atol=1e-4)
@@ -61,7 +61,7 @@ def test_several_accelerations_come_back_from_a_recording_of_ours(tmp_path: Path
     assert np.array_equal(read_cut_recording(tmp_path / "c1.h5").acceleration, signal.acceleration)
 
 
-def test_a_column_is_named_as_its_heading_stands_in_the_file(tmp_path: Path) -> None:
+def test_a_column_is_named_as_its_heading_is_in_the_file(tmp_path: Path) -> None:
     said = Description(columns=("time=Time (s)", "acceleration=Accel Y (m/s^2)"))
     assert np.allclose(read_cut_recording(axes_table(tmp_path / "cut.csv"), said).acceleration, 2 * WAVE, atol=1e-5)
 
@@ -84,7 +84,7 @@ def test_a_microphone_needs_neither_unit_nor_full_scale(tmp_path: Path, name: st
 
 
 @pytest.mark.parametrize("head", [b"fLaC" + bytes(60), b"ID3" + bytes(60), b"\xff\xfb\x90\x44" + bytes(60)])
-def test_a_damaged_flac_or_mp3_is_refused_and_so_it_is_without_soundfile(
+def test_a_damaged_flac_or_mp3_is_rejected_and_so_it_is_without_soundfile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, head: bytes
 ) -> None:
     path = tmp_path / "cut.bin"
@@ -116,13 +116,13 @@ def test_a_recording_of_ours_comes_back_with_its_codes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "content"), [("a.csv", b"x"), ("b.h5", b"\x89HDF\r\n\x1a\n"), ("c.bin", b"\x00\x01")])
-def test_what_holds_no_acceleration_is_refused_in_a_sentence(tmp_path: Path, name: str, content: bytes) -> None:
+def test_what_holds_no_acceleration_is_rejected_in_a_sentence(tmp_path: Path, name: str, content: bytes) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(DataError, match=name):
         read_cut_recording(tmp_path / name)
 
 
-def test_a_velocity_and_a_missing_file_are_refused(tmp_path: Path) -> None:
+def test_a_velocity_and_a_missing_file_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="velocity"):
         read_cut_recording(table(tmp_path / "cut.csv", "time [s],velocity [m/s]"))
     with pytest.raises(DataError, match="no such file"):
@@ -163,7 +163,7 @@ def test_a_column_in_turns_a_minute_is_the_speed(tmp_path: Path, heading: str) -
     assert part.shape == (256,)
 
 
-def test_pulses_and_turns_a_second_are_told_by_the_unit(tmp_path: Path) -> None:
+def test_pulses_and_turns_a_second_are_reported_by_the_unit(tmp_path: Path) -> None:
     pulses = turning(tmp_path / "tacho.csv", "Tacho [V]", SPEED)
     for said in (Description(), Description(tacho="3"), Description(tacho="Tacho", pulses=1)):
         speed = read_cut_recording(pulses, said).speed_rpm
@@ -224,7 +224,7 @@ def test_a_channel_of_a_sound_file_is_the_tachometer_and_needs_no_full_scale(tmp
         ),
     ],
 )
-def test_a_tachometer_that_says_nothing_is_refused(
+def test_a_tachometer_that_says_nothing_is_rejected(
     tmp_path: Path, heading: str, values: np.ndarray, said: Description, text: str
 ) -> None:
     with pytest.raises(DataError) as refused:

@@ -35,7 +35,7 @@ def test_real_lvm_with_decimal_comma_is_read_in_si(beam: Path) -> None:
     assert f"{inspect_file(beam).created:%Y-%m-%d %H:%M:%S}" == "2018-12-17 10:18:21"
 
 
-def test_real_cnc_table_is_refused_with_all_its_faults(cnc_csv: Path) -> None:
+def test_real_cnc_table_is_rejected_with_all_its_faults(cnc_csv: Path) -> None:
     with pytest.raises(DataError) as caught:
         read_recording(cnc_csv)
     message = str(caught.value)
@@ -64,7 +64,7 @@ def test_tables_with_any_separator_and_decimal_sign(
     assert hit.acceleration == pytest.approx(ACCELERATION, abs=1e-5)
 
 
-def test_columns_are_told_apart_by_their_units_not_their_order(tmp_path: Path) -> None:
+def test_columns_are_distinguished_by_their_units_not_their_order(tmp_path: Path) -> None:
     path = table(tmp_path / "hit.csv", "time_s,acc_g,force_N", TIME, ACCELERATION / 9.80665, FORCE)
     assert np.max(read_hits(path)[0].force) == pytest.approx(np.max(FORCE))
 
@@ -85,7 +85,7 @@ def test_a_computed_hit_that_rests_at_exactly_zero_is_good(tmp_path: Path) -> No
     assert check_hit(read_hits(path)[0]) == HitFlags.OK
 
 
-def test_swapped_columns_are_refused(tmp_path: Path) -> None:
+def test_swapped_columns_are_rejected(tmp_path: Path) -> None:
     path = table(tmp_path / "hit.csv", "time_s,force_N,acc_m_s2", TIME, ACCELERATION, FORCE)
     with pytest.raises(DataError, match="swapped channels"):
         read_frf(path)
@@ -128,14 +128,14 @@ def write(path: Path, text: str) -> Path:
         ),
     ],
 )
-def test_broken_tables_are_refused_with_file_and_place(tmp_path: Path, text: str, message: str) -> None:
+def test_broken_tables_are_rejected_with_file_and_place(tmp_path: Path, text: str, message: str) -> None:
     path = write(tmp_path / "broken.csv", text)
     with pytest.raises(DataError, match=message) as caught:
         read_recording(path)
     assert "broken.csv" in str(caught.value)
 
 
-def test_nan_in_a_hit_is_refused_with_the_file(tmp_path: Path) -> None:
+def test_nan_in_a_hit_is_rejected_with_the_file(tmp_path: Path) -> None:
     broken = FORCE.copy()
     broken[77] = np.nan
     path = table(tmp_path / "nan.csv", "time_s,force_N,acc_g", TIME, broken, ACCELERATION)
@@ -152,7 +152,7 @@ def test_an_lvm_that_was_saved_in_another_encoding_is_the_same(beam: Path, tmp_p
     np.testing.assert_array_equal(first.force, second.force)
 
 
-def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
+def test_a_truncated_lvm_is_rejected(beam: Path, tmp_path: Path) -> None:
     lines = beam.read_text(encoding="latin-1").splitlines()
     with pytest.raises(DataError, match="9977 of 50030 samples are there; the file is cut short"):
         read_hits(write(tmp_path / "cut.lvm", "\n".join(lines[:10000])))
@@ -165,7 +165,7 @@ def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
         read_hits(write(tmp_path / "garbled.lvm", "\n".join(garbled)))
 
 
-def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_path: Path) -> None:
+def test_an_lvm_in_an_unknown_unit_or_without_force_is_rejected(beam: Path, tmp_path: Path) -> None:
     text = beam.read_text(encoding="latin-1")
     with pytest.raises(DataError, match="Force is in 'Pascal', which is not known here as its unit"):
         read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Pascal")))

@@ -168,7 +168,7 @@ def test_hits_in_progress_of_two_set_ups_keep_each_their_own(tap: TapTest, tmp_p
 
 
 @pytest.mark.parametrize("place", [0, 100, 4000, -200, -30])
-def test_an_altered_hit_in_progress_is_told_before_hdf5_sees_it(
+def test_an_altered_hit_in_progress_is_reported_before_hdf5_sees_it(
     tap: TapTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: int
 ) -> None:
     path = tmp_path / "0000.h5"
@@ -188,7 +188,7 @@ def test_identities_are_unique_file_names_that_sort_by_time() -> None:
 
 
 @pytest.mark.parametrize("keep", [0, 4, 1000, -200])
-def test_a_truncated_file_is_refused_by_name(tap: TapTest, tmp_path: Path, keep: int) -> None:
+def test_a_truncated_file_is_rejected_by_name(tap: TapTest, tmp_path: Path, keep: int) -> None:
     path = tmp_path / "tap.h5"
     path.write_bytes(write_tap(path, tap)[:keep])
     with pytest.raises(DataError, match=r"tap\.h5"):
@@ -196,7 +196,7 @@ def test_a_truncated_file_is_refused_by_name(tap: TapTest, tmp_path: Path, keep:
 
 
 @pytest.mark.parametrize("what", ["long", "in one chunk"])
-def test_a_small_file_that_unpacks_to_much_is_refused_unread(tap: TapTest, tmp_path: Path, what: str) -> None:
+def test_a_small_file_that_unpacks_to_much_is_rejected_unread(tap: TapTest, tmp_path: Path, what: str) -> None:
     """Zeros shrink a thousandfold: 800 MB fit into less than 1 MB."""
     write_tap(tmp_path / "bomb.h5", tap)
     count = 400_000_000
@@ -237,7 +237,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
+def test_a_direction_that_is_none_and_a_time_without_zone_are_rejected() -> None:
     with pytest.raises(ValueError, match="direction='z'"):
         replace(ABOUT, direction="z")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no time zone"):
@@ -247,7 +247,7 @@ def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
 @pytest.mark.parametrize(
     "beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND, HitFlags.NOT_EVALUATED]
 )
-def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
+def test_hits_rejected_for_what_their_signals_do_not_show_stay_out_of_a_replay(
     tap: TapTest, tmp_path: Path, beyond: HitFlags
 ) -> None:
     flags = (beyond, *tap.flags[1:])

@@ -40,11 +40,11 @@ def test_single_hits_hard_or_soft_tipped_are_good(width: float) -> None:
 
 
 @pytest.mark.parametrize(("gap", "share"), [(3e-3, 0.05), (12e-3, 0.18), (60e-3, 0.9)])
-def test_second_touch_is_a_double_hit(gap: float, share: float) -> None:
+def test_second_contact_is_a_double_hit(gap: float, share: float) -> None:
     assert check_hit(hit(pulse(200) + pulse(200 * share, gap))) == HitFlags.DOUBLE_HIT
 
 
-def test_a_second_touch_below_three_percent_is_let_pass() -> None:
+def test_a_double_hit_below_three_percent_is_let_pass() -> None:
     assert check_hit(hit(pulse(200) + pulse(200 * 0.02, 12e-3))) == HitFlags.OK
 
 
@@ -58,11 +58,11 @@ def test_a_response_that_is_cut_off_is_not_decayed() -> None:
     assert check_hit(hit(pulse(200), slow)) == HitFlags.NOT_DECAYED
 
 
-def test_lost_scans_are_told() -> None:
+def test_lost_scans_are_reported() -> None:
     assert check_hit(hit(pulse(200), lost_scans=3)) == HitFlags.LOST_SCANS
 
 
-def test_swapped_cables_are_told() -> None:
+def test_swapped_cables_are_reported() -> None:
     right = hit(pulse(200))
     assert check_hit(Hit(right.acceleration, right.force, RATE, 512)) == HitFlags.SWAPPED_CHANNELS
 
@@ -125,7 +125,7 @@ def test_faults_of_the_tapper_are_found(
         assert expected in verdict
 
 
-def test_real_clean_hit_is_good_and_real_clipped_hit_is_refused(beam: Path, clipped_beam: Path) -> None:
+def test_real_clean_hit_is_good_and_real_clipped_hit_is_rejected(beam: Path, clipped_beam: Path) -> None:
     assert check_hit(read_hits(beam)[0]) == HitFlags.OK
     (clipped,) = read_hits(clipped_beam)
     assert check_hit(clipped) == HitFlags.OVERLOAD_RESPONSE
@@ -146,14 +146,14 @@ def test_flags_print_as_words_with_the_cure() -> None:
 @pytest.mark.parametrize(
     ("broken", "flaw"), [(np.nan, "not finite"), (np.inf, "not finite"), (-1e60, r"larger than 1e\+50")]
 )
-def test_a_record_with_nan_or_inf_or_what_no_sensor_measures_is_refused(broken: float, flaw: str) -> None:
+def test_a_record_with_nan_or_inf_or_what_no_sensor_measures_is_rejected(broken: float, flaw: str) -> None:
     force = pulse(200)
     force[700] = broken
     with pytest.raises(ValueError, match=rf"force is {flaw} at 1 samples, first at sample 700"):
         Hit(force, force, RATE)
 
 
-def test_records_of_different_length_and_wrong_rates_are_refused() -> None:
+def test_records_of_different_length_and_wrong_rates_are_rejected() -> None:
     with pytest.raises(ValueError, match="equal length"):
         Hit(np.zeros(100), np.zeros(99), RATE)
     with pytest.raises(ValueError, match="sample_rate=0"):

@@ -61,7 +61,7 @@ def test_a_good_hit_has_no_reason() -> None:
 
 
 @pytest.mark.parametrize(("start", "when"), [(12e-3, "12 ms after"), (-8e-3, "8 ms before")])
-def test_a_second_touch_is_told_with_its_time_and_size(start: float, when: str) -> None:
+def test_a_double_hit_is_reported_with_its_time_and_size(start: float, when: str) -> None:
     verdict = evaluate_hit(hit((200, 0, 0.6e-3), (36, start, 0.6e-3)))
     assert verdict.flags == HitFlags.DOUBLE_HIT
     told = re.fullmatch(
@@ -78,7 +78,7 @@ def test_one_soft_pulse_is_one(width: float, noise: float) -> None:
     assert evaluate_hit(hit((200, 0, width), noise=noise)).flags == HitFlags.OK
 
 
-def test_drift_and_hum_are_no_second_touch_and_hide_none() -> None:
+def test_drift_and_hum_are_no_double_hit_and_hide_none() -> None:
     for second in (0.0, 40.0):
         one = hit((200, 0, 0.6e-3), (second, 15e-3, 0.6e-3))
         wandering = 5 * np.sin(2 * np.pi * 50 * TIME + 1) + 80 * TIME
@@ -86,7 +86,7 @@ def test_drift_and_hum_are_no_second_touch_and_hide_none() -> None:
         assert check_hit(replace(one, force=one.force + wandering)) == expected
 
 
-def test_noise_alone_is_no_second_touch_however_long_the_record() -> None:
+def test_noise_alone_is_no_double_hit_however_long_the_record() -> None:
     random = np.random.default_rng(5)
     for _ in range(20):
         force = 5 * random.normal(size=65536)
@@ -94,7 +94,7 @@ def test_noise_alone_is_no_second_touch_however_long_the_record() -> None:
         assert HitFlags.DOUBLE_HIT not in check_hit(Hit(force, random.normal(size=65536), RATE, 1990))
 
 
-def test_strength_is_judged_against_the_range() -> None:
+def test_strength_is_evaluated_against_the_range() -> None:
     assert evaluate_hit(coded(hit((200, 0, 0.6e-3)), 230)).flags == HitFlags.OK
     hard = evaluate_hit(coded(hit((200, 0, 0.6e-3)), 205))
     assert hard.flags == HitFlags.TOO_HARD
@@ -193,7 +193,7 @@ def test_a_hit_with_another_fault_is_not_called_inconsistent_too(hits: list[Hit]
     assert evaluate_hit(other, estimate_frf(hits[:3])).flags == HitFlags.LOST_SCANS
 
 
-def test_a_mean_of_another_set_up_is_refused(hits: list[Hit]) -> None:
+def test_a_mean_of_another_set_up_is_rejected(hits: list[Hit]) -> None:
     mean = estimate_frf(hits[:3])
     shorter = Frf(mean.frequency[:-1], mean.receptance[:-1], np.ones(mean.frequency.size - 1), 3)
     with pytest.raises(ValueError, match="compare hits of one set-up only"):

@@ -30,7 +30,7 @@ def tally(setting: Setting, sessions: int, seed: int) -> tuple[list[str], list[s
 
 
 @pytest.mark.parametrize(("setting", "seed"), [(SET, 11), (HOLD_OUT, 12)])
-def test_bad_hits_are_refused_and_good_ones_pass(setting: Setting, seed: int) -> None:
+def test_bad_hits_are_rejected_and_good_ones_pass(setting: Setting, seed: int) -> None:
     passed, refused, misnamed, bad, good = tally(setting, 8, seed)
     assert (bad, good) == (152, 80)
     assert len(passed) <= binom.isf(0.01, bad, TOLERATED), passed
@@ -40,7 +40,7 @@ def test_bad_hits_are_refused_and_good_ones_pass(setting: Setting, seed: int) ->
 
 @pytest.mark.long
 @pytest.mark.parametrize(("setting", "seed"), [(SET, 1), (HOLD_OUT, 2)])
-def test_of_thousands_of_hits_one_in_two_hundred_is_judged_wrongly_at_most(setting: Setting, seed: int) -> None:
+def test_of_thousands_of_hits_one_in_two_hundred_is_evaluated_wrongly_at_most(setting: Setting, seed: int) -> None:
     passed, refused, misnamed, bad, good = tally(setting, 100, seed)
     assert len(passed) <= TOLERATED * bad, passed
     assert len(refused) <= TOLERATED * good, refused

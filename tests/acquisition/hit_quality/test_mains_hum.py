@@ -37,7 +37,7 @@ def test_hits_in_hum_are_good_however_little_stands_before_them(before: int, mai
 
 @pytest.mark.parametrize("frequency", [50.0, 100.2, 151.0, 180.0, 240.0, 300.0])
 @pytest.mark.parametrize("before", [16, 64, 512])
-def test_what_rings_beside_the_mains_is_refused(frequency: float, before: int) -> None:
+def test_what_rings_next_to_the_mains_is_rejected(frequency: float, before: int) -> None:
     structure = Structure(np.array([frequency]), np.array([3e-4]), np.array([1e5]))
     assert check_hit(hit(structure, before)) & HitFlags.NOT_DECAYED
     assert check_hit(hit(structure, before, 0.2)) & HitFlags.NOT_DECAYED

@@ -40,7 +40,7 @@ def recorded(one: Hit, bits: int, force_range: float = 2200.0) -> Hit:
 
 
 @pytest.mark.parametrize(("width", "high_pass"), [(0.5e-3, 50.0), (2e-3, 16.0), (5e-3, 5.0)])
-def test_a_force_that_sinks_below_zero_behind_a_high_pass_is_no_second_touch(width: float, high_pass: float) -> None:
+def test_a_force_that_sinks_below_zero_behind_a_high_pass_is_no_double_hit(width: float, high_pass: float) -> None:
     one = hit(width, high_pass=high_pass)
     assert np.min(one.force) < -0.05 * np.max(one.force)
     assert check_hit(one) == HitFlags.OK

@@ -35,14 +35,14 @@ def test_good_hits_are_good() -> None:
 
 @pytest.mark.parametrize("share", [0.1, 0.4])
 @pytest.mark.parametrize("delay", [5e-3, 8e-3, 25e-3])
-def test_a_second_touch_is_told_and_when_it_came(delay: float, share: float) -> None:
+def test_a_double_hit_is_reported_and_when_it_came(delay: float, share: float) -> None:
     for seed in range(3):
         verdict = evaluate_hit(hit_of(response(seed, ((delay, share),))))
         assert verdict.flags == HitFlags.DOUBLE_HIT
         assert float(verdict.text.split(" ms after")[0].split()[-1]) == pytest.approx(1e3 * delay, abs=1.5)
 
 
-def test_a_real_decay_that_is_not_linear_is_no_second_touch() -> None:
+def test_a_real_decay_that_is_not_linear_is_no_double_hit() -> None:
     for name in ("acceleration", "camera"):
         (hit,) = read_hits(f"tests/data/ladisk_beam/{name}.lvm")
         alone = Hit(np.empty(0), hit.acceleration, hit.sample_rate, 30)
@@ -50,7 +50,7 @@ def test_a_real_decay_that_is_not_linear_is_no_second_touch() -> None:
         assert find_second_input(extract_free_decay(alone), hit.sample_rate, noise) is None
 
 
-def test_faults_of_the_response_are_told() -> None:
+def test_faults_of_the_response_are_reported() -> None:
     clipped = np.clip(response(1), -400, 400)
     assert check_hit(hit_of(clipped)) == HitFlags.OVERLOAD_RESPONSE
     assert check_hit(hit_of(0.01 * response(1, noise=0.0) + noise_alone())) == HitFlags.TOO_SOFT

@@ -80,7 +80,7 @@ def test_hits_are_cut_at_the_crossing_whatever_the_blocks(block: int, first: int
     assert all(hit.force.size == 50 and hit.pre_trigger == 10 and hit.force[10] == 150 for hit in hits)
 
 
-def test_a_hit_without_enough_real_samples_before_it_is_passed_over() -> None:
+def test_a_hit_without_enough_real_samples_before_it_is_skipped() -> None:
     assert [int(hit.acceleration[0]) for hit in capture_hits(Recorded(force(5, 200)), TRIGGER)] == [192]
 
 
@@ -136,7 +136,7 @@ def test_one_force_and_one_acceleration_channel_are_needed(quantities: tuple[str
         list(capture_hits(Recorded(force(100), channels=channels), TRIGGER))
 
 
-def test_swapped_inputs_are_told_by_what_they_measure() -> None:
+def test_swapped_inputs_are_detected_by_what_they_measure() -> None:
     (hit,) = capture_hits(_Swapped(), TRIGGER)
     assert np.max(hit.force) == 300
 
@@ -148,7 +148,7 @@ class _Swapped(Recorded):
 
 
 @pytest.mark.parametrize(("level", "n", "before"), [(0.0, 50, 10), (np.nan, 50, 10), (1.0, 50, 50), (1.0, 50, 0)])
-def test_a_trigger_that_cannot_work_is_refused(level: float, n: int, before: int) -> None:
+def test_a_trigger_that_cannot_work_is_rejected(level: float, n: int, before: int) -> None:
     with pytest.raises(ValueError, match=r"trigger level|pre_trigger"):
         Trigger(level, n, before)
 
@@ -166,7 +166,7 @@ def searched(source: Recorded, trigger: Trigger = RESTING) -> tuple[list[float],
     return [float(np.sum(hit.force)) for hit in hits], search, armed
 
 
-def test_a_hit_while_the_structure_rings_is_passed_over_and_told() -> None:
+def test_a_hit_while_the_structure_rings_is_skipped_and_reported() -> None:
     signal = force(100, 250, 600, n=1000)
     source = Ringing(signal, 102, 252, 602)
     assert len(searched(source, TRIGGER)[0]) == 3
@@ -177,7 +177,7 @@ def test_a_hit_while_the_structure_rings_is_passed_over_and_told() -> None:
     assert [armed[i - 1] for i in at] == [True, False, True, True]
 
 
-def test_a_hit_on_a_structure_that_was_moved_after_arming_is_passed_over() -> None:
+def test_a_hit_on_a_structure_that_was_moved_after_arming_is_skipped() -> None:
     hits, search, _ = searched(Ringing(force(300, 700, n=1000), 250, level=50.0, tau=100.0))
     assert len(hits) == 1
     assert search.too_early == 1

@@ -173,7 +173,7 @@ def test_a_port_that_cannot_be_opened_says_why(error: Exception, cure: str, monk
         SerialLink("/dev/ttyACM0")
 
 
-def test_a_host_without_an_address_is_said_in_the_words_of_the_system() -> None:
+def test_a_host_without_an_address_is_reported_in_the_words_of_the_system() -> None:
     error = socket.gaierror(-2, "Name or service not known")
     assert "(" + str(error) + ")" in explain_open_error("socket://daq.invalid:5", error).text
 

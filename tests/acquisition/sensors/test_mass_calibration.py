@@ -125,7 +125,7 @@ def test_the_ratio_is_that_of_the_sensitivities(force: float, acceleration: floa
 HITS = hits_on(hung_mass(MASS), 3)
 
 
-def test_opposite_signs_are_said(true_hits: list[Hit]) -> None:
+def test_opposite_signs_are_reported(true_hits: list[Hit]) -> None:
     turned = [replace(hit, acceleration=-hit.acceleration) for hit in true_hits]
     found = calibrate_by_mass(turned, MASS)
     assert found.inverted
@@ -172,14 +172,14 @@ def test_unit_mistakes_are_named(true_hits: list[Hit], force: float, acceleratio
     assert words in str(found)
 
 
-def test_a_skewed_phase_is_said(true_hits: list[Hit]) -> None:
+def test_a_skewed_phase_is_reported(true_hits: list[Hit]) -> None:
     skewed = [replace(hit, channels=(TRUE[0], replace(TRUE[1], skew=60e-6))) for hit in true_hits]
     (remark,) = calibrate_by_mass(skewed, MASS).remarks
     assert remark.code == "phase-not-rigid"
     assert "is not that of a rigid mass; measure the skew" in str(remark)
 
 
-def test_bad_calls_are_refused(true_hits: list[Hit]) -> None:
+def test_bad_calls_are_rejected(true_hits: list[Hit]) -> None:
     for mass in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="is not > 0; give the total moving mass"):
             calibrate_by_mass(true_hits, mass)

@@ -131,14 +131,14 @@ def test_a_stall_of_the_host_changes_nothing() -> None:
     assert measured(stalled).rate == pytest.approx(25600, rel=1e-6)
 
 
-def test_chaos_is_refused() -> None:
+def test_chaos_is_rejected() -> None:
     arrival = even(25600.0)
     chaos = measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
     with pytest.raises(DeviceError, match=r"arrive too unevenly .* close other programs"):
         check_rate(chaos, 25600.0)
 
 
-def test_too_few_blocks_a_stream_that_ends_and_no_time_are_refused() -> None:
+def test_too_few_blocks_a_stream_that_ends_and_no_time_are_rejected() -> None:
     with pytest.raises(DeviceError, match=r"sent 6 blocks of samples in 5 s; .* at least 10 over 5 s are needed"):
         measured(even(512.0, seconds=7.0))
     with pytest.raises(DeviceError, match=r"sent 50 blocks of samples in 0\.98 s"):
@@ -149,7 +149,7 @@ def test_too_few_blocks_a_stream_that_ends_and_no_time_are_refused() -> None:
         measured(even(25600.0), seconds=0)
 
 
-def test_half_the_rate_is_refused_with_the_error_of_every_frequency() -> None:
+def test_half_the_rate_is_rejected_with_the_error_of_every_frequency() -> None:
     check_rate(MeasuredRate(25600 * 1.0019, 0.5, 128000, 5.0), 25600.0)
     check_rate(MeasuredRate(25600 * 0.9981, 0.5, 128000, 5.0), 25600.0)
     with pytest.raises(DeviceError, match=r"12800\.00 ± 0\.50 .*not 25600: every frequency would be 100\.0% too high"):
@@ -204,7 +204,7 @@ def test_another_serial_number_and_another_rate_are_measured_too(folder: Machine
     ]
 
 
-def test_a_wrong_rate_is_refused_and_measured_again_next_time(folder: MachineFolder) -> None:
+def test_a_wrong_rate_is_rejected_and_measured_again_next_time(folder: MachineFolder) -> None:
     for _ in range(2):
         halved = Stream(even(12800.0))
         with pytest.raises(
@@ -253,7 +253,7 @@ def test_what_the_first_versions_kept_without_a_checksum_is_known(folder: Machin
 
 
 @pytest.mark.parametrize("content", [b"{", b'[{"model": 1}]', b"\xff"])
-def test_a_damaged_memory_is_said(folder: MachineFolder, content: bytes) -> None:
+def test_a_damaged_memory_is_reported(folder: MachineFolder, content: bytes) -> None:
     (folder.path / "daq.json").write_bytes(content)
     with pytest.raises(DataError, match=r"daq\.json: .*delete this file"):
         check(folder, Stream(even(25600.0)))
@@ -307,7 +307,7 @@ def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(fo
     assert (quiet.starts, len(remarks)) == (1, 1)
 
 
-def test_a_wrong_rate_is_refused_on_a_busy_computer_too_and_never_worked_with(folder: MachineFolder) -> None:
+def test_a_wrong_rate_is_rejected_on_a_busy_computer_too_and_never_worked_with(folder: MachineFolder) -> None:
     with pytest.raises(DeviceError, match="not 25600"):
         check(accepting(folder), Stream(busy(12800.0)))
     assert not (folder.path / "daq.json").exists()

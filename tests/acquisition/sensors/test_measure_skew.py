@@ -67,7 +67,7 @@ def test_exchanged_channels_have_the_opposite_skew() -> None:
     assert back.skew == pytest.approx(-there.skew, rel=1e-9)
 
 
-def test_different_signals_a_hum_and_an_inverted_channel_are_refused() -> None:
+def test_different_signals_a_hum_and_an_inverted_channel_are_rejected() -> None:
     first, second = SIGNALS
     random = np.random.default_rng(1)
     with pytest.raises(ValueError, match=r"do not carry one broad-band signal \(coherence .* at 0% .* T-piece"):
@@ -80,7 +80,7 @@ def test_different_signals_a_hum_and_an_inverted_channel_are_refused() -> None:
         measure_skew(first, -second, RATE)
 
 
-def test_records_that_are_none_are_refused() -> None:
+def test_records_that_are_none_are_rejected() -> None:
     first, second = SIGNALS
     with pytest.raises(ValueError, match="at least 16384 finite samples"):
         measure_skew(first[:1000], second[:1000], RATE)

@@ -131,7 +131,7 @@ def test_the_date_of_calibration(calibrated: str, today: date, months: float, co
 
 
 @pytest.mark.parametrize("direction", ["z", "X", "xy"])
-def test_a_channel_of_no_direction_of_the_tool_tip_is_refused(direction: str) -> None:
+def test_a_channel_of_no_direction_of_the_tool_tip_is_rejected(direction: str) -> None:
     with pytest.raises(ValueError, match=f"direction='{direction}' is (none of x, y|that of a tap across)"):
         replace(HAMMER, direction=direction)  # type: ignore[arg-type]
     assert [replace(HAMMER, direction=one).direction for one in ("", "x", "y")] == ["", "x", "y"]

@@ -234,7 +234,7 @@ def test_a_dataq_with_its_sensors_goes_through(structure: Structure, monkeypatch
         assert np.array_equal(block.codes, expected[:, block.first_scan : block.first_scan + block.codes.shape[1]])
 
 
-def test_no_device_and_no_address_are_refused(tapper: Tapper, channels: Pair) -> None:
+def test_no_device_and_no_address_are_rejected(tapper: Tapper, channels: Pair) -> None:
     with pytest.raises(DeviceError, match="check the cable and the port"):
         TapsBridge(lambda: TapsSource("/dev/ttyNOT_THERE"), print)
     with TapsEmulator(tapper(), channels, RATE) as device, pytest.raises(OSError, match="assign requested address"):

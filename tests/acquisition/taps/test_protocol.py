@@ -71,7 +71,7 @@ def test_a_stream_cut_anywhere_gives_the_same_frames(sent: list[Frame], step: in
 
 
 @given(frames, st.data())
-def test_a_corrupted_byte_is_refused_and_never_another_frame(frame: Frame, data: st.DataObject) -> None:
+def test_a_corrupted_byte_is_rejected_and_never_another_frame(frame: Frame, data: st.DataObject) -> None:
     encoded = bytearray(encode_frame(frame))
     place = data.draw(st.integers(0, len(encoded) - 2))
     encoded[place] ^= data.draw(st.integers(1, 255))
@@ -115,12 +115,12 @@ def test_endless_noise_without_a_delimiter_is_not_kept() -> None:
     assert decoder.feed(b"\x00" + encode_frame(Frame(MessageType.HELLO))) == [Frame(MessageType.HELLO)]
 
 
-def test_too_long_a_frame_is_refused() -> None:
+def test_too_long_a_frame_is_rejected() -> None:
     with pytest.raises(ValueError, match="longer than 8192"):
         encode_frame(Frame(MessageType.DATA, body=bytes(MAX_FRAME)))
 
 
 @pytest.mark.parametrize("body", [b"", encode_data(0, SCANS)[:-1], encode_data(0, SCANS) + b"\x00"])
-def test_a_data_body_of_the_wrong_length_is_refused(body: bytes) -> None:
+def test_a_data_body_of_the_wrong_length_is_rejected(body: bytes) -> None:
     with pytest.raises(ValueError, match="DATA body"):
         decode_data(body)

@@ -109,7 +109,7 @@ def test_a_run_too_long_is_thrown_away_up_to_its_delimiter_and_no_further() -> N
     assert decoder.feed(good) == [data(0)]
 
 
-def test_duplicates_and_late_frames_are_refused_and_counted() -> None:
+def test_duplicates_and_late_frames_are_rejected_and_counted() -> None:
     stream = ScanStream(SESSION, 2)
     blocks = [stream.accept(data(first)) for first in (0, 9, 9, 0, 4, 18)]
     assert [block and block.first_scan for block in blocks] == [0, 9, None, None, None, 18]
@@ -142,7 +142,7 @@ def test_a_loss_without_a_jump_still_spoils_the_hit_it_is_in() -> None:
     ],
     ids=["three channels", "short", "empty"],
 )
-def test_a_frame_that_contradicts_the_configuration_is_refused(frame: Frame) -> None:
+def test_a_frame_that_contradicts_the_configuration_is_rejected(frame: Frame) -> None:
     stream = ScanStream(SESSION, 2)
     assert stream.accept(frame) is None
     assert (stream.refused, stream.foreign) == (1, 0)

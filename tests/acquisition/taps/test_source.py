@@ -128,7 +128,7 @@ def last(blocks: list[Block]) -> int:
     return int(blocks[-1].first_scan + blocks[-1].codes.shape[1])
 
 
-def test_unplugging_is_said_in_one_sentence(tapper: Tapper, channels: Pair) -> None:
+def test_unplugging_is_reported_in_one_sentence(tapper: Tapper, channels: Pair) -> None:
     with (
         TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(unplug_after=20_000)) as device,
         TapsSource(device.port) as source,
@@ -165,7 +165,7 @@ def test_a_slow_host_loses_scans_and_is_told_how_many(
     )
 
 
-def test_a_port_in_use_is_refused_with_the_cure(device: TapsEmulator) -> None:
+def test_a_port_in_use_is_rejected_with_the_cure(device: TapsEmulator) -> None:
     if device.port.startswith("socket"):
         pytest.skip("a TCP port is not exclusive")
     with TapsSource(device.port), pytest.raises(DeviceError, match="another program uses it"):
@@ -180,12 +180,12 @@ def test_a_port_in_use_is_refused_with_the_cure(device: TapsEmulator) -> None:
         ("socket://nowhere", "socket://HOST:PORT is expected"),
     ],
 )
-def test_a_port_that_does_not_exist_is_refused_with_the_cure(port: str, cure: str) -> None:
+def test_a_port_that_does_not_exist_is_rejected_with_the_cure(port: str, cure: str) -> None:
     with pytest.raises(DeviceError, match=cure):
         TapsSource(port)
 
 
-def test_something_that_is_no_daq_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_something_that_is_no_daq_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     master, slave = os.openpty()
     try:
@@ -196,7 +196,7 @@ def test_something_that_is_no_daq_is_refused(monkeypatch: pytest.MonkeyPatch) ->
         os.close(slave)
 
 
-def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> None:
+def test_a_device_that_describes_itself_wrongly_is_rejected(tapper: Tapper) -> None:
     impossible = Channel("force", 1.0, 5.0)
     object.__setattr__(impossible, "quantity", "temperature")
     with (
@@ -215,7 +215,7 @@ def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> No
         ("skew_s", float("nan"), "skew=nan s is not a finite number"),
     ],
 )
-def test_an_info_that_would_spoil_the_time_base_is_refused(
+def test_an_info_that_would_spoil_the_time_base_is_rejected(
     device: TapsEmulator, monkeypatch: pytest.MonkeyPatch, key: str, value: Any, message: str
 ) -> None:
     said = device._info()  # noqa: SLF001
@@ -297,7 +297,7 @@ def test_hits_of_a_24_bit_device_keep_their_codes_on_disk(tapper: Tapper, channe
         (4, HitFlags.OK),
     ],
 )
-def test_an_overload_that_the_device_reports_refuses_the_hit(
+def test_an_overload_that_the_device_reports_rejects_the_hit(
     mask: int, flags: HitFlags, tapper: Tapper, channels: Pair, tmp_path: Path
 ) -> None:
     signal = tapper()
@@ -352,7 +352,7 @@ def test_a_fault_names_the_sensor_by_the_number_that_info_gives_it(
         assert source.fault.startswith("the cable of the acceleration sensor")
 
 
-def test_a_fault_from_before_the_start_is_told_again(device: TapsEmulator) -> None:
+def test_a_fault_from_before_the_start_is_reported_again(device: TapsEmulator) -> None:
     device.send_event(Event(EventKind.SENSOR_BIAS, channel=0))
     for _ in range(2):
         with TapsSource(device.port) as source:
@@ -398,7 +398,7 @@ def test_a_bad_beginning_is_overcome(
         assert [first.first_scan, second.first_scan, source.lost_scans] == [0, 512, 0]
 
 
-def test_a_device_whose_info_never_arrives_is_refused(
+def test_a_device_whose_info_never_arrives_is_rejected(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
@@ -409,7 +409,7 @@ def test_a_device_whose_info_never_arrives_is_refused(
         TapsSource(device.port)
 
 
-def test_a_device_that_begins_anew_by_itself_is_told_from_a_silent_one(
+def test_a_device_that_restarts_by_itself_is_distinguished_from_a_silent_one(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.3)
@@ -471,7 +471,7 @@ def test_unplugged_in_any_state_it_is_the_same_sentence(
             (source.stop if state == "stopping" else source.start)()
 
 
-def test_a_rate_that_the_device_does_not_have_is_refused(device: TapsEmulator) -> None:
+def test_a_rate_that_the_device_does_not_have_is_rejected(device: TapsEmulator) -> None:
     with pytest.raises(ValueError, match="sample rate 1000 Hz is none of this device's: 25600 Hz"):
         TapsSource(device.port, sample_rate=1000.0)
 

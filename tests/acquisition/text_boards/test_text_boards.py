@@ -160,7 +160,7 @@ def test_any_bytes_are_read_without_an_error(noise: bytes) -> None:
 
 
 @pytest.mark.parametrize("bits", [8, 16, 32])
-def test_a_counter_that_begins_anew_is_no_loss(bits: int) -> None:
+def test_a_counter_that_restarts_is_no_loss(bits: int) -> None:
     counter = ScanCounter()
     start = 2**bits - 300
     counts = (start + np.arange(600)) % 2**bits

@@ -104,7 +104,7 @@ def test_scans_are_the_voltages_at_the_inputs_in_order(name: str, plugged: Any, 
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_stream_begins_anew_at_scan_0(name: str, plugged: Any) -> None:
+def test_a_stream_restarts_at_scan_0(name: str, plugged: Any) -> None:
     with plugged(name) as device:
         for _ in range(2):
             device.start()
@@ -178,7 +178,7 @@ def test_the_supply_of_iepe_sensors_is_switched_by_input(plugged: Any, wiring: W
     assert wiring.log[2:] == [(0, 0), (1, 0)]
 
 
-def test_an_open_loop_is_told(plugged: Any, wiring: Wiring) -> None:
+def test_an_open_loop_is_reported(plugged: Any, wiring: Wiring) -> None:
     wiring.faults.add("open loop")
     with plugged("nidaqmx") as device:
         assert device.fault == ""
@@ -228,7 +228,7 @@ def test_what_cannot_be_opened_is_one_clear_error(
         ("ljm", "CLAIMED_BY_ANOTHER_PROCESS"),
     ],
 )
-def test_a_device_in_use_is_told(name: str, reason: str, plugged: Any, wiring: Wiring) -> None:
+def test_a_device_in_use_is_reported(name: str, reason: str, plugged: Any, wiring: Wiring) -> None:
     wiring.faults.add("busy")
     with pytest.raises(DeviceError, match=reason):
         plugged(name).start()
@@ -306,7 +306,7 @@ def test_calibrations_in_names() -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_missing_library_is_told_with_the_command_that_installs_it(
+def test_a_missing_library_is_reported_with_the_command_that_installs_it(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for library in ("sounddevice", "nidaqmx", "daqhats", "uldaq", "labjack.ljm", "labjack"):

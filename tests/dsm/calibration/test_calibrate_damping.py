@@ -174,12 +174,12 @@ def test_a_damper_that_holds_its_bearing_gives_no_mode_that_only_creeps(damping:
 
 
 @pytest.mark.parametrize("eta", [-0.1, math.nan, math.inf])
-def test_bad_loss_factors_are_refused(eta: float) -> None:
+def test_bad_loss_factors_are_rejected(eta: float) -> None:
     with pytest.raises(ValueError, match="loss_factor="):
         damped_modes(stepped((0, 0, 0)), 1, eta)
 
 
-def test_free_shafts_and_no_modes_are_refused() -> None:
+def test_free_shafts_and_no_modes_are_rejected() -> None:
     with pytest.raises(ValueError, match="held by 0"):
         damped_modes(replace(stepped((0, 0, 0)), bearings=[]), 1)
     with pytest.raises(ValueError, match="0 modes"):
@@ -233,7 +233,7 @@ def test_report() -> None:
 
 
 @pytest.mark.parametrize(("group", "mode"), [("front", 1), ("front", 2)])
-def test_more_than_a_damper_can_give_is_refused_with_the_most_it_can(group: str, mode: int) -> None:
+def test_more_than_a_damper_can_give_is_rejected_with_the_most_it_can(group: str, mode: int) -> None:
     spindle = stepped((0, 0, 0))
     with pytest.raises(UnreachableDampingError, match=rf"damping_ratio=0\.9 of mode {mode} is out of reach: ") as error:
         calibrate_damping(spindle, 0.9, mode=mode, group=group)
@@ -263,7 +263,7 @@ def test_a_bearing_in_a_node_of_the_mode_cannot_damp_it() -> None:
         calibrate_damping(spindle, 0.01, mode=2, group="middle")
 
 
-def test_other_damping_above_the_measured_one_is_refused() -> None:
+def test_other_damping_above_the_measured_one_is_rejected() -> None:
     with pytest.raises(
         UnreachableDampingError, match=r"damping_ratio=0\.004 of mode 1 leaves nothing .* 0\.00499"
     ) as error:
@@ -284,7 +284,7 @@ def test_other_damping_above_the_measured_one_is_refused() -> None:
         ((1, 0, 1), {"damping_ratio": 0.1}, "2 of the 3 bearings to calibrate have damping; give it to all"),
     ],
 )
-def test_bad_input_of_the_calibration_is_refused(
+def test_bad_input_of_the_calibration_is_rejected(
     dampers: tuple[float, float, float], arguments: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):

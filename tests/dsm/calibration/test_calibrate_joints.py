@@ -54,7 +54,7 @@ def test_without_a_name_joints_stay_as_given() -> None:
     assert found.spindle.joints == shaft.joints
 
 
-def test_a_frequency_that_no_joint_can_give_is_refused_with_its_range() -> None:
+def test_a_frequency_that_no_joint_can_give_is_rejected_with_its_range() -> None:
     shaft = spindle([Joint(0.08, 1e8, 1e5, group="holder")])
     with pytest.raises(UnreachableFrequencyError, match="no bearing stiffness puts mode 3 at 9999 Hz") as error:
         calibrate(shaft, 9999.0, mode=3, group="holder")

@@ -127,7 +127,7 @@ def test_covariance_is_what_noise_makes_of_the_factors() -> None:
     assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.3)
 
 
-def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -> None:
+def test_scatter_replaces_standard_errors_only_where_modes_are_to_spare() -> None:
     truth = shaft()
     exact = natural_frequencies(truth, 6)
     assert fit_stiffness(truth, exact[:3]).log_covariance is None
@@ -218,18 +218,18 @@ TWO = natural_frequencies(shaft(), 2)
         ({"frequency": TWO, "mode": [1.0, 2.5], "groups": ["rear"]}, r"mode=\[1\.0, 2\.5\]"),
     ],
 )
-def test_bad_input_is_refused(arguments: dict[str, Any], message: str) -> None:
+def test_bad_input_is_rejected(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         fit_stiffness(shaft(), **arguments)
 
 
-def test_rigid_bearings_are_refused_by_number() -> None:
+def test_rigid_bearings_are_rejected_by_number() -> None:
     spindle = replace(shaft(), bearings=[*shaft().bearings[:2], Bearing(0.45, math.inf, group="rear")])
     with pytest.raises(ValueError, match=r"bearing 3: stiffness=inf .* leave its group 'rear' out"):
         fit_stiffness(spindle, TWO, groups=["front", "rear"])
 
 
-def test_a_frequency_out_of_reach_is_refused_with_its_range() -> None:
+def test_a_frequency_out_of_reach_is_rejected_with_its_range() -> None:
     with pytest.raises(
         UnreachableFrequencyError, match=r"puts mode 2 at 9999 Hz: it lies between .* Hz; check"
     ) as error:
@@ -290,7 +290,7 @@ def test_intervals_without_a_remark_hold_the_truth(modes: int, noise: float) -> 
     assert doubted + failed < {2: 210, 3: 90, 4: 45}[modes]
 
 
-def test_a_second_solution_is_told() -> None:
+def test_a_second_solution_is_reported() -> None:
     """Two modes that fit exactly with half the front and twice the rear stiffness too."""
     truth = random_shaft(np.random.default_rng(12))
     exact = natural_frequencies(truth, 2)
@@ -313,7 +313,7 @@ def test_a_solution_that_fits_much_better_is_taken() -> None:
     assert not found.remarks
 
 
-def test_an_interval_that_holds_too_little_is_told() -> None:
+def test_an_interval_that_holds_too_little_is_reported() -> None:
     """Close to veering the sum of squares rises by half of what it should at one end."""
     draw = np.random.default_rng(902)
     for _ in range(191):
@@ -340,7 +340,7 @@ def three_modes(draws: int) -> list[FloatArray]:
 
 
 @pytest.mark.parametrize("draws", [139, 239])
-def test_a_narrow_valley_beside_a_wide_range_that_fits_too_is_told(draws: int) -> None:
+def test_a_narrow_valley_next_to_a_wide_range_that_fits_too_is_reported(draws: int) -> None:
     """The rear bearings are hardly felt at what they are, and were read as 0.285 ± 0.012 without a remark."""
     measured = three_modes(draws)[-1]
     found = fit_stiffness(worn_six_and_four(1.0, 1.0), measured, 3e-3 * measured)

@@ -128,7 +128,7 @@ def test_tools_of_two_spindles_do_not_fit_one() -> None:
 
 
 @pytest.mark.parametrize("shaft", [None, [0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 2], [0, 1], [0.0, 0, 0, 1, 1, 1]])
-def test_which_spindle_is_to_be_said(shaft: list[int] | None) -> None:
+def test_which_spindle_must_be_named(shaft: list[int] | None) -> None:
     *two, _ = tools(np.random.default_rng(4))
     with pytest.raises(ValueError, match="does not say for each of 6 modes on which of 2 spindles"):
         fit_stiffness(two, **(measured(two) | {"shaft": shaft}))

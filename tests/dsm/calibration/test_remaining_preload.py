@@ -64,7 +64,7 @@ def test_rollers_say_nothing_of_it() -> None:
         replace(SPINDLE, bearings=[replace(b, rolling_elements="needles") for b in SPINDLE.bearings])  # type: ignore[arg-type]
 
 
-def test_near_the_limit_of_rigid_bearings_the_stiffness_is_open_and_nothing_is_said_of_preload() -> None:
+def test_near_the_limit_of_rigid_bearings_the_stiffness_is_open_and_nothing_is_reported_of_preload() -> None:
     rigid = float(natural_frequencies(SPINDLE, 1, rigid_bearings=True)[0])
     found = calibrate(SPINDLE, 0.999 * rigid)
     assert [remark.code for remark in found.remarks] == ["bearings-not-felt"]

@@ -123,7 +123,7 @@ def test_polar_inertia_of_the_shaft_is_twice_its_diametral_inertia() -> None:
         ([[1.0]], r"speed_rpm has shape \(1, 1\)"),
     ],
 )
-def test_bad_speeds_are_refused(speed: list[float], message: str) -> None:
+def test_bad_speeds_are_rejected(speed: list[float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         whirl_map(PLAIN, speed, 2)
 

@@ -63,7 +63,7 @@ SPINDLE = Spindle(PARTS, BEARINGS)
         ),
     ],
 )
-def test_segments_are_refused_by_number(segment: Segment, message: str) -> None:
+def test_segments_are_rejected_by_number(segment: Segment, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Spindle([*PARTS, segment], BEARINGS)
 
@@ -83,7 +83,7 @@ def test_segments_are_refused_by_number(segment: Segment, message: str) -> None:
         (Bearing(0.2, 1e8, housing_stiffness=0.0), r"bearing 3: housing_stiffness=0\.0 .* \(N/m\)"),
     ],
 )
-def test_bearings_are_refused_by_number(bearing: Bearing, message: str) -> None:
+def test_bearings_are_rejected_by_number(bearing: Bearing, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Spindle(PARTS, [*BEARINGS, bearing])
 
@@ -100,7 +100,7 @@ def test_bearings_are_refused_by_number(bearing: Bearing, message: str) -> None:
         (LumpedMass(0.3, 1.0, 1e-3, 3e-3), r"mass 2: polar_inertia=0\.003 kg m\^2 is larger than twice"),
     ],
 )
-def test_masses_are_refused_by_number(mass: LumpedMass, message: str) -> None:
+def test_masses_are_rejected_by_number(mass: LumpedMass, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Spindle(PARTS, BEARINGS, masses=[LumpedMass(0.25, 1.0), mass])
 
@@ -118,7 +118,7 @@ def test_masses_are_refused_by_number(mass: LumpedMass, message: str) -> None:
         (Joint(0.3, 1e9, math.nan), r"joint 1: rotational_stiffness=nan .* \(N m/rad\)"),
     ],
 )
-def test_joints_are_refused_by_number(joint: Joint, message: str) -> None:
+def test_joints_are_rejected_by_number(joint: Joint, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Spindle(PARTS, BEARINGS, masses=[LumpedMass(0.25, 1.0)], joints=[joint])
 
@@ -132,19 +132,19 @@ def test_joints_are_refused_by_number(joint: Joint, message: str) -> None:
         ((210e9, 7850.0, math.inf), "shear_modulus=inf"),
     ],
 )
-def test_impossible_materials_are_refused(constants: tuple[float, float, float], message: str) -> None:
+def test_impossible_materials_are_rejected(constants: tuple[float, float, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Material(*constants)
 
 
-def test_a_spindle_of_an_impossible_shear_modulus_is_refused() -> None:
+def test_a_spindle_of_an_impossible_shear_modulus_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"shear_modulus=-1\.0"):
         Spindle(PARTS, BEARINGS, shear_modulus=-1.0)
     with pytest.raises(ValueError, match=r"Poisson's ratio 0\.75"):
         natural_frequencies(Spindle(PARTS, BEARINGS, theory="timoshenko", shear_modulus=60e9), 1)
 
 
-def test_too_many_segments_are_refused() -> None:
+def test_too_many_segments_are_rejected() -> None:
     with pytest.raises(ValueError, match="501 segments were given; a spindle has 1 to 500 of them"):
         Spindle([Segment(0.001, 0.05)] * 501, BEARINGS)
 
@@ -173,7 +173,7 @@ def test_a_spindle_needs_segments_and_a_material() -> None:
         Spindle(PARTS, BEARINGS, density=math.nan)
 
 
-def test_an_unknown_theory_is_refused_by_name() -> None:
+def test_an_unknown_theory_is_rejected_by_name() -> None:
     with pytest.raises(ValueError, match="theory='rayleigh' is none of euler-bernoulli"):
         Spindle(PARTS, BEARINGS, theory="rayleigh")  # type: ignore[arg-type]
 
@@ -196,7 +196,7 @@ def test_a_spindle_is_plain_frozen_data() -> None:
         lambda s: stiffness_curve(s, [1.0]),
     ],
 )
-def test_a_shaft_that_can_move_freely_is_refused(ask: Callable[[Spindle], object]) -> None:
+def test_a_shaft_that_can_move_freely_is_rejected(ask: Callable[[Spindle], object]) -> None:
     with pytest.raises(ValueError, match=r"held by 1 bearing\(s\).* at least two"):
         ask(Spindle(PARTS, BEARINGS[:1]))
 
@@ -227,7 +227,7 @@ def test_one_bearing_is_enough_for_natural_frequencies_and_receptance() -> None:
         (lambda: stiffness_curve(SPINDLE, [0.0]), "frequency=0 Hz"),
     ],
 )
-def test_bad_arguments_are_refused(ask: Callable[[], object], message: str) -> None:
+def test_bad_arguments_are_rejected(ask: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         ask()
 
@@ -256,7 +256,7 @@ def test_no_frequencies_give_no_receptance() -> None:
 @pytest.mark.parametrize(
     "ask", [lambda: natural_frequencies(SPINDLE, 400), lambda: calibrate(SPINDLE, 500.0, mode=200)]
 )
-def test_hundreds_of_modes_are_refused(ask: Callable[[], object]) -> None:
+def test_hundreds_of_modes_are_rejected(ask: Callable[[], object]) -> None:
     with pytest.raises(ValueError, match=r"1.* to 100"):
         ask()
 

@@ -113,7 +113,7 @@ def test_two_modes_grow_where_the_planes_are_far_apart() -> None:
 
 
 @pytest.mark.parametrize("spin", [CANTILEVER[0], 2 * CANTILEVER[0]])
-def test_a_critical_speed_is_refused(spin: float) -> None:
+def test_a_critical_speed_is_rejected(spin: float) -> None:
     with pytest.raises(ArithmeticError, match="is a critical speed"):
         angular(unit_beam(4.0, CLAMPED), 2, spin)
 
@@ -312,7 +312,7 @@ GOOD = SpinningSegment(1.0, 1.0, 2.0, 1.0)
         ("held: dof='w'", [GOOD], [], [(0.1, "w")]),
     ],
 )
-def test_refuses_what_is_no_beam(
+def test_rejects_what_is_no_beam(
     message: str, segments: list[SpinningSegment], springs: list[SpinningSpring], held: list[tuple[float, SpinningDof]]
 ) -> None:
     with pytest.raises(ValueError, match=message):
@@ -329,12 +329,12 @@ def test_refuses_what_is_no_beam(
     ],
     ids=["free", "hinge", "v slides", "no spring along v"],
 )
-def test_refuses_a_beam_that_moves_without_bending(beam: SpinningBeam) -> None:
+def test_rejects_a_beam_that_moves_without_bending(beam: SpinningBeam) -> None:
     with pytest.raises(ValueError, match="without bending"):
         spinning_frequencies(beam, 1, 10.0)
 
 
 @pytest.mark.parametrize(("count", "speed_rpm"), [(0, 1.0), (2, -1.0), (2, math.nan)])
-def test_refuses_counts_and_speeds(count: int, speed_rpm: float) -> None:
+def test_rejects_counts_and_speeds(count: int, speed_rpm: float) -> None:
     with pytest.raises(ValueError, match=r"modes were asked|speed_rpm="):
         spinning_frequencies(unit_beam(4.0, CLAMPED), count, speed_rpm)

@@ -129,7 +129,7 @@ def test_symmetric_and_each_frequency_by_itself() -> None:
         ("speed_rpm", {"speed_rpm": -1.0}),
     ],
 )
-def test_refuses(name: str, change: dict[str, float]) -> None:
+def test_rejects(name: str, change: dict[str, float]) -> None:
     good = {"rigidity_xx": 1, "rigidity_yy": 1, "mass_per_length": 1, "length": 1, "frequency": [1.0], "speed_rpm": 0}
     with pytest.raises(ValueError, match=name):
         spinning_element(**{**good, **change})  # type: ignore[arg-type]

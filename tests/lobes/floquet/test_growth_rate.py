@@ -57,7 +57,7 @@ def test_rough_pieces_are_enough_for_growth_within_1e_4(seed: int) -> None:
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
-def test_two_multipliers_that_are_nearly_one_are_told_apart(tolerance: float) -> None:
+def test_two_multipliers_that_are_nearly_one_are_distinguished(tolerance: float) -> None:
     """At 50 mm the largest of them looked 0.021 smaller than it is, and the cut stable."""
     x = [(1825.18, 0.0304691, 5.70289e7), (244.785, 0.0421993, 3.98341e8), (220.192, 0.0480036, 9.06338e8)]
     x += [(216.191, 0.0457401, 1.87381e8), (1026.47, 0.0460876, 8.51811e8)]

@@ -259,19 +259,19 @@ def test_limits_over_radial_depth() -> None:
         ({"depth": []}, "depth has shape"),
     ],
 )
-def test_bad_input_of_the_chart_is_refused(change: dict[str, Any], message: str) -> None:
+def test_bad_input_of_the_chart_is_rejected(change: dict[str, Any], message: str) -> None:
     good = {"x": X, "y": Y, "cut": CUT, "speed_rpm": 6000.0, "depth": 1e-3}
     with pytest.raises(ValueError, match=message):
         spectral_radius(**{**good, **change})
 
 
 @pytest.mark.parametrize("depth", [0.0, -1.0, math.nan, math.inf])
-def test_bad_deepest_depths_are_refused(depth: float) -> None:
+def test_bad_deepest_depths_are_rejected(depth: float) -> None:
     with pytest.raises(ValueError, match="max_depth"):
         stability_boundary(X, Y, CUT, 6000.0, depth)
 
 
 @pytest.mark.parametrize("immersion", [0.0, 1.1, [], [[0.5]]])
-def test_bad_immersions_are_refused(immersion: Any) -> None:
+def test_bad_immersions_are_rejected(immersion: Any) -> None:
     with pytest.raises(ValueError, match="immersion"):
         radial_lobes(lambda cut: zero_order_lobes(X, Y, cut, SPEEDS), CUT, immersion)

@@ -126,6 +126,6 @@ def test_a_loop_that_is_never_negative_has_no_limit() -> None:
         ((math.nan, 90, 90, 90), "not > 0"),
     ],
 )
-def test_what_is_no_pitch_is_refused(degrees: tuple[float, ...], said: str) -> None:
+def test_what_is_no_pitch_is_rejected(degrees: tuple[float, ...], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         with_pitch(EVEN, *degrees)

@@ -83,7 +83,7 @@ def any_name(machine: str, tool: str, program: str, event: str) -> None:
 @example("a\u200bb\ufeff", "🛠️", "W" * 255, "\u0301")
 @example("\ud800", "\x00", "\udcff", "\udcff")
 @given(TEXTS, TEXTS, TEXTS, TEXTS)
-def test_any_name_is_shown_or_refused(machine: str, tool: str, program: str, event: str) -> None:
+def test_any_name_is_shown_or_rejected(machine: str, tool: str, program: str, event: str) -> None:
     any_name(machine, tool, program, event)
 
 
@@ -91,7 +91,7 @@ def test_any_name_is_shown_or_refused(machine: str, tool: str, program: str, eve
 @pytest.mark.timeout(1800)
 @settings(max_examples=300, deadline=None)
 @given(TEXTS, TEXTS, TEXTS, TEXTS)
-def test_three_hundred_names_are_shown_or_refused(machine: str, tool: str, program: str, event: str) -> None:
+def test_three_hundred_names_are_shown_or_rejected(machine: str, tool: str, program: str, event: str) -> None:
     any_name(machine, tool, program, event)
 
 
@@ -113,7 +113,7 @@ def test_three_hundred_names_are_shown_or_refused(machine: str, tool: str, progr
         "a b\\",
     ],
 )
-def test_a_folder_of_any_name_is_shown_or_refused(name: str, tmp_path: Path) -> None:
+def test_a_folder_of_any_name_is_shown_or_rejected(name: str, tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     plant = tmp_path / "plant"
     plant.mkdir()

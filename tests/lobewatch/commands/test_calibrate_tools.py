@@ -109,7 +109,7 @@ def test_what_is_to_be_entered_is_valid_and_in_the_places_of_machine_toml(folder
     assert joint.rotational_stiffness == pytest.approx(1.7 * 2e5, rel=5e-3)
 
 
-def test_tools_of_two_spindles_are_told_and_nothing_is_to_be_entered(tmp_path: Path) -> None:
+def test_tools_of_two_spindles_are_reported_and_nothing_is_to_be_entered(tmp_path: Path) -> None:
     made = machine(tmp_path / "m")
     tap(made, "reference", 1)
     tap(made, LONG, 2, bearings=0.7)
@@ -151,7 +151,7 @@ def test_too_few_modes_share_factors_and_predict_nothing(tmp_path: Path) -> None
         ([], "give the measured --frequency, or two --tool"),
     ],
 )
-def test_bad_input_is_refused_in_a_sentence(folder: MachineFolder, options: list[str], said: str) -> None:
+def test_bad_input_is_rejected_in_a_sentence(folder: MachineFolder, options: list[str], said: str) -> None:
     with pytest.raises((ValueError, DataError), match=said):
         run(folder, *options)
 

@@ -200,7 +200,7 @@ def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, 
     assert (settled.code, settled.programs["A"]["verdict"]) == (0, "stable")
 
 
-def test_the_doubt_is_told_with_its_sources_and_once(shop: Shop, check: Check, no_search: None) -> None:
+def test_the_uncertainty_is_reported_with_its_sources_and_once(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     default = "frequency ±0.3 %, damping ±10 %, stiffness ±3 % from tap to tap (default until 8 tests)"
     said = check().out
@@ -213,7 +213,7 @@ def test_the_doubt_is_told_with_its_sources_and_once(shop: Shop, check: Check, n
     assert f"doubt: {given}; speed ±2 % (machine.toml); Kt and Kr/Kt ±7 % (machine.toml) (docs/lobes.md)\n" in said
 
 
-def test_other_doubts_are_told_by_program(shop: Shop, check: Check, no_search: None) -> None:
+def test_other_uncertainties_are_reported_by_program(shop: Shop, check: Check, no_search: None) -> None:
     slot = (
         "teeth = 4\ntool_diameter_mm = 20\nradial_depth_mm = 20\ndirection = 'down'\nspeed_rpm = 9000\ndepth_mm = 0.2\n"
     )
@@ -243,7 +243,7 @@ def test_a_material_that_is_named_is_not_asked_for(shop: Shop, check: Check, no_
     assert re.search(r"the cutting coefficients decide: .*; to settle it: measure them(;|\n)", said.out)
 
 
-def test_the_doubt_of_a_listed_material_is_its_published_range(shop: Shop, check: Check, no_search: None) -> None:
+def test_the_uncertainty_of_a_listed_material_is_its_published_range(shop: Shop, check: Check, no_search: None) -> None:
     shop.run(("A", 12900, 0.2))
     shop.edit("tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed", 'material = "AISI 4140"\nspeed')
     shop.edit("[speed]", "[doubt]\ncoefficients_percent = 7\n\n[speed]")
@@ -275,7 +275,7 @@ def test_a_series_of_eight_tells_its_own_scatter(shop: Shop, check: Check, no_se
     assert "from tap to tap (scatter of 8 tests)" in check().out
 
 
-def test_the_drive_and_missing_taps_are_told(shop: Shop, check: Check, no_search: None) -> None:
+def test_the_drive_and_missing_taps_are_reported(shop: Shop, check: Check, no_search: None) -> None:
     shop.run(("A", 12900, 1.5), ("B", 8700, 0.4), ("C", 6500, 1.0))
     shop.edit("speed_rpm = 12900", "feed_per_tooth_mm = 0.1\nspeed_rpm = 12900")
     shop.edit("[speed]", "[drive]\npower_kw = 0.5\n\n[speed]")
@@ -380,7 +380,7 @@ def test_bad_input_is_one_sentence_with_place_and_value(
     assert "Traceback" not in said.err
 
 
-def test_no_longer_is_said_of_the_same_directions_only(shop: Shop, check: Check, no_search: None) -> None:
+def test_no_longer_is_reported_of_the_same_directions_only(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     shop.tap(700, 1713.0 * 0.9)
     shop.tap(700.1, 1690.0 * 0.9, "y")
@@ -401,7 +401,7 @@ def test_a_long_check_says_how_far_it_is(
     assert check().err.count("0 of 3 programs are checked") == 1
 
 
-def test_check_without_anything_to_check_is_refused(check: Check, tmp_path: Path) -> None:
+def test_check_without_anything_to_check_is_rejected(check: Check, tmp_path: Path) -> None:
     said = check()
     assert (said.code, "no tap test yet" in said.err) == (2, True)
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
@@ -419,7 +419,7 @@ def test_only_the_programs_that_are_named_are_checked(shop: Shop, check: Check, 
     assert check("--program", "B").last == "1 program: 1 stable"
 
 
-def test_a_program_that_is_not_there_is_refused_with_those_that_are(shop: Shop, check: Check) -> None:
+def test_a_program_that_is_not_there_is_rejected_with_those_that_are(shop: Shop, check: Check) -> None:
     shop.tap_both()
     said = check("--program", "B", "--program", "D")
     assert (said.code, said.out) == (2, "")

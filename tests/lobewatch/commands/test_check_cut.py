@@ -13,7 +13,7 @@ Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
 
 
-def test_a_cut_is_judged_without_a_program_as_one(shop: Shop, check: Check, no_search: None) -> None:
+def test_a_cut_is_evaluated_without_a_program_as_one(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     text = (shop.path / "machine.toml").read_bytes()
     said = check("--speed", "8700", "--depth", "0.4", "--json")
@@ -26,7 +26,7 @@ def test_a_cut_is_judged_without_a_program_as_one(shop: Shop, check: Check, no_s
     assert check("--speed", "12900", "--depth", "6").code == 1
 
 
-def test_a_material_and_a_geometry_may_be_said_of_a_cut(shop: Shop, check: Check, no_search: None) -> None:
+def test_a_material_and_a_geometry_may_be_given_for_a_cut(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     cut = ("--speed", "8700", "--depth", "0.2", "--material", "1.0503")
     assert "Kt -25..+30 %, Kr/Kt -52..+100 % (published for C45)" in check(*cut).out
@@ -74,14 +74,14 @@ def test_what_is_missing_of_a_cut_is_asked_for_in_one_message(shop: Shop, check:
         (("--speed", "9000", "--depth", "0,5"), "Invalid value for '--depth'"),
     ],
 )
-def test_bad_numbers_of_a_cut_are_refused(shop: Shop, check: Check, options: tuple[str, ...], message: str) -> None:
+def test_bad_numbers_of_a_cut_are_rejected(shop: Shop, check: Check, options: tuple[str, ...], message: str) -> None:
     shop.tap_both()
     said = check(*options)
     assert (said.code, said.out) == (2, "")
     assert message in re.sub(r"[\s│]+", " ", said.err)
 
 
-def test_a_machine_without_programs_judges_a_cut_that_is_said_in_full(
+def test_a_machine_without_programs_evaluates_a_cut_that_is_specified_in_full(
     shop: Shop, check: Check, no_search: None
 ) -> None:
     shop.put("")

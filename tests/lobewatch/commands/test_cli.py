@@ -59,9 +59,7 @@ def test_json_of_a_live_tap(run: Run, device: TapsEmulator) -> None:
     assert [program["stable"] for program in said["programs"]] == [True, True, True]
 
 
-def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
-    run: Run, trial: MachineFolder, device: TapsEmulator
-) -> None:
+def test_an_interrupted_tap_is_resumed_and_new_restarts(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
     from datetime import UTC, datetime
     from itertools import islice
 
@@ -200,7 +198,7 @@ def test_replay_of_the_real_beam_hit_into_a_fresh_machine(run: Run, beam: Path) 
     refused(run("lobes", "plain"), "not a driving point")
 
 
-def test_replay_refuses_what_cannot_be_trusted_and_stores_nothing(
+def test_replay_rejects_what_cannot_be_trusted_and_stores_nothing(
     run: Run, beam: Path, clipped_beam: Path, cnc_csv: Path
 ) -> None:
     run("init", "plain")
@@ -319,7 +317,7 @@ def test_wrong_use(run: Run) -> None:
 
 
 @pytest.mark.parametrize("name", [".", "./mill", "/tmp", "_", "", "\u202estatus", "\U0001f642"])
-def test_what_is_no_command_is_said_to_be_none(run: Run, name: str) -> None:
+def test_what_is_no_command_is_reported_to_be_none(run: Run, name: str) -> None:
     said = run(name)
     assert said.code == 2
     assert "No such command" in said.err
@@ -392,7 +390,7 @@ def test_the_demo_over_tcp_needs_no_pseudo_terminal_and_finds_the_same(
 
 
 @pytest.mark.parametrize("scatter", ["-0.1", "5.1", "nan"])
-def test_a_scatter_that_cannot_be_is_refused_before_anything_is_made(run: Run, scatter: str) -> None:
+def test_a_scatter_that_cannot_be_is_rejected_before_anything_is_made(run: Run, scatter: str) -> None:
     refused(run("demo", "--scatter", scatter), f"--scatter {scatter}", "between 0 and 5 %")
     assert not list(Path().iterdir())
 

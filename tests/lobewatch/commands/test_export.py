@@ -90,7 +90,7 @@ def test_packed_csv_is_the_same_csv(mills: Path) -> None:
     assert gzip.decompress((mills / "fleet.csv.gz").read_bytes()) == (mills / "fleet.csv").read_bytes()
 
 
-def test_numbers_in_csv_have_the_digits_that_they_are_said_to_have() -> None:
+def test_numbers_in_csv_have_the_digits_that_they_are_reported_to_have() -> None:
     random = np.random.default_rng(0)
     values = random.normal(size=(500, 2)) * 10.0 ** random.integers(-12, 14, (500, 2))
     told = round_significant(values, np.array([7, 3]))
@@ -139,7 +139,7 @@ def test_a_machine_that_was_never_tapped_has_no_line(mills: Path, shop: Shop, ki
     assert (told["tap_tests"], told["machines"]) == (0, 1)
 
 
-def test_another_ending_is_refused_and_nothing_is_left(mills: Path) -> None:
+def test_another_ending_is_rejected_and_nothing_is_left(mills: Path) -> None:
     with pytest.raises(DataError, match=r"\.xlsx is no kind of table; give \.sqlite, \.csv, \.csv\.gz, \.parquet"):
         run(mills, mills / "fleet.xlsx")
     assert {path.name for path in mills.iterdir()} == {"a, b", "c"}

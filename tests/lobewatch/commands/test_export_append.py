@@ -73,7 +73,7 @@ def tap_again(shop: Shop, mills: Path, days: float, frequency: float = 1700.0) -
     return str(shop.tap(days, frequency))
 
 
-def test_lines_stand_in_the_month_of_their_tap_test(mills: Path, tmp_path: Path) -> None:
+def test_lines_are_in_the_month_of_their_tap_test(mills: Path, tmp_path: Path) -> None:
     export(mills, tmp_path / "all.parquet")
     told = export(mills, "--append", tmp_path / "fleet")
     assert (told["exit_code"], told["machines"], told["tap_tests"], told["added"]) == (0, 2, 8, 8)
@@ -146,7 +146,7 @@ def test_of_exports_at_once_none_writes_twice(mills: Path, tmp_path: Path) -> No
     assert len({line[1:3] for line in lines(fleet)}) == len(lines(fleet)) == 8
 
 
-def test_what_was_excluded_or_analysed_anew_since_is_said_by_its_month(mills: Path, tmp_path: Path) -> None:
+def test_what_was_excluded_or_analysed_again_since_is_reported_by_its_month(mills: Path, tmp_path: Path) -> None:
     fleet = tmp_path / "fleet"
     export(mills, "--append", fleet)
     (tap,) = [line[2] for line in lines(fleet) if line[:2] == ("2026-02", "a")]

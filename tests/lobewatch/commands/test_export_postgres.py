@@ -251,7 +251,7 @@ def test_an_address_that_cannot_be_is_one_sentence_without_its_password(
     assert SECRET not in debug.stderr
 
 
-def test_who_may_not_make_the_table_is_told(server: Server, plant: str, mills: Path) -> None:
+def test_a_user_who_may_not_make_the_table_is_reported(server: Server, plant: str, mills: Path) -> None:
     with suppress(psycopg.errors.DuplicateObject):
         server.ask(f"CREATE ROLE guest LOGIN PASSWORD '{SECRET}'")
     address = server.address(plant).replace("lobewatch:", "guest:")
@@ -259,7 +259,7 @@ def test_who_may_not_make_the_table_is_told(server: Server, plant: str, mills: P
         export(mills, "--to", address)
 
 
-def test_without_psycopg_it_is_said_how_to_install_it(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_psycopg_it_is_reported_how_to_install_it(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with pytest.raises(DataError, match=r'needs psycopg; install it with: pip install "lobewatch\[postgres\]"'):
         export(mills, "--to", "postgresql://db.example/plant")

@@ -37,7 +37,7 @@ def options(answers: dict[str, str]) -> list[str]:
     return [word for name, answer in answers.items() for word in (f"--{name}", answer)]
 
 
-def test_every_answer_is_an_option_and_stands_in_the_file(run: Run) -> None:
+def test_every_answer_is_an_option_and_is_in_the_file(run: Run) -> None:
     said = run("init", "mill-3", "--yes", *options(ANSWERS))
     assert said.code == 0, said.err
     assert said.out.endswith("next: lobewatch tap mill-3\n")
@@ -194,7 +194,7 @@ def test_without_a_force_sensor_the_accelerometer_is_the_only_channel(run: Run) 
     assert MachineFolder(Path("mill-3")).machine.tap.hammer == "none"
 
 
-def test_a_hammer_that_is_told_again_takes_none_back(run: Run) -> None:
+def test_a_hammer_that_is_chosen_again_takes_none_back(run: Run) -> None:
     run("init", "mill-3", "--yes", *options(ANSWERS | {"hammer": "none"}))
     assert run("init", "mill-3", "--edit", "hammer", "--hammer", "0 2.25 5").code == 0
     made = tables()
@@ -202,7 +202,7 @@ def test_a_hammer_that_is_told_again_takes_none_back(run: Run) -> None:
     assert [channel["quantity"] for channel in made["daq"]["channel"]] == ["acceleration", "force"]
 
 
-def test_an_accelerometer_is_told_again_beside_a_hammer_that_is_not_used_any_more(run: Run) -> None:
+def test_an_accelerometer_is_chosen_again_next_to_a_hammer_that_is_not_used_any_more(run: Run) -> None:
     run("init", "mill-3", "--yes", *options(ANSWERS))
     assert run("init", "mill-3", "--edit", "hammer", "--hammer", "none").code == 0
     assert run("init", "mill-3", "--edit", "accelerometer", "--accelerometer", "1 100 5").code == 0
@@ -211,7 +211,7 @@ def test_an_accelerometer_is_told_again_beside_a_hammer_that_is_not_used_any_mor
     assert [channel.get("sensitivity_mv_per_g") for channel in made["daq"]["channel"]] == [None, 100]
 
 
-def test_a_board_that_prints_lines_is_told_with_its_rate(run: Run) -> None:
+def test_a_board_that_prints_lines_is_reported_with_its_rate(run: Run) -> None:
     board = ANSWERS | {"daq": "/dev/ttyNOPE lines 3200", "hammer": "none", "accelerometer": "0 100 1.6"}
     assert run("init", "mill-3", "--yes", *options(board)).code == 0
     assert MachineFolder(Path("mill-3")).machine.daq.sample_rate_hz == 3200

@@ -49,7 +49,7 @@ def run(shop: Shop, *arguments: object) -> Result:
     return result
 
 
-def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) -> None:
+def test_chatter_in_a_file_is_reported_kept_and_drawn(shop: Shop, tmp_path: Path) -> None:
     file, picture = recording(tmp_path / "cut.csv", 1712.3), tmp_path / "cut.svg"
     result = run(shop, "--program", "A", "--speed", 12000, "--depth", 3, "--file", file, "--json", "--out", picture)
     told = json.loads(result.stdout)
@@ -66,7 +66,7 @@ def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) ->
     assert "chatter at 1712" in picture.read_text("utf-8")
 
 
-def test_the_power_of_a_cut_says_a_kt_at_the_speed_that_was_heard(shop: Shop, tmp_path: Path) -> None:
+def test_the_power_of_a_cut_says_a_kt_at_the_speed_that_was_detected(shop: Shop, tmp_path: Path) -> None:
     """0.64 % faster than set: as much less Kt. A power that cannot be is refused before anything is heard."""
     shop.run(("A", 12000, 1.5), more="feed_per_tooth_mm = 0.1")
     place = ("--program", "A", "--file", recording(tmp_path / "cut.csv"))
@@ -103,7 +103,7 @@ def test_a_recording_that_is_kept_says_the_same_again(shop: Shop, tmp_path: Path
     assert other["chatter_frequency_hz"] == one["chatter_frequency_hz"]
 
 
-def test_several_cuts_in_a_file_are_told_and_kept_each_with_its_own_air(shop: Shop, tmp_path: Path) -> None:
+def test_several_cuts_in_a_file_are_reported_and_kept_each_with_its_own_air(shop: Shop, tmp_path: Path) -> None:
     parts = [recording(tmp_path / f"{n}.csv", chatter, seconds=1.0) for n, chatter in enumerate((None, 1712.3))]
     values = [line.split(",")[1] for part in parts for line in part.read_text().splitlines()[1:]]
     rows = "\n".join(f"{n / RATE:.8f},{value}" for n, value in enumerate(values))
@@ -125,7 +125,7 @@ def test_several_cuts_in_a_file_are_told_and_kept_each_with_its_own_air(shop: Sh
     assert "chatter at 1712" in picture.read_text("utf-8")
 
 
-def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(shop: Shop, tmp_path: Path) -> None:
+def test_a_tone_that_nothing_explains_is_reported_with_its_distance_from_the_modes(shop: Shop, tmp_path: Path) -> None:
     shop.tap_both()
     time = np.arange(round(2.0 * RATE)) / RATE
     inside = (time > 0.5) & (time < 1.7)
@@ -172,7 +172,7 @@ def test_a_tachometer_is_followed_kept_and_contradicted(shop: Shop, tmp_path: Pa
     assert (untold["reason"], untold["measured_rpm"]) == ("speed-not-found", None)
 
 
-def test_a_microphone_is_said_and_kept_as_one(shop: Shop, tmp_path: Path) -> None:
+def test_a_microphone_is_reported_and_kept_as_one(shop: Shop, tmp_path: Path) -> None:
     values = read_cut_recording(recording(tmp_path / "cut.csv", 1712.3)).acceleration
     scipy.io.wavfile.write(tmp_path / "cut.wav", int(RATE), (values / 200).astype(np.float32))
     arguments = ("--program", "A", "--speed", 12000, "--file", tmp_path / "cut.wav")
@@ -185,7 +185,7 @@ def test_a_microphone_is_said_and_kept_as_one(shop: Shop, tmp_path: Path) -> Non
     assert "by microphone: it hears the shop too" in said
 
 
-def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:
+def test_what_cannot_be_classified_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:
     file = recording(tmp_path / "cut.csv", seconds=0.05)
     told = json.loads(run(shop, "--program", "A", "--speed", 12000, "--file", file, "--json").stdout)
     assert (told["word"], told["reason"]) == ("cannot tell", "no-cut")
@@ -221,7 +221,7 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
         (("--program", "A", "--file", "none.csv", "--screen"), "--screen follows a device"),
     ],
 )
-def test_what_cannot_be_listened_to_is_refused_in_a_sentence(
+def test_what_cannot_be_listened_to_is_rejected_in_a_sentence(
     shop: Shop, arguments: tuple[object, ...], said: str
 ) -> None:
     result = run(shop, *arguments)
@@ -229,7 +229,7 @@ def test_what_cannot_be_listened_to_is_refused_in_a_sentence(
     assert said in str(result.exception)
 
 
-def test_what_the_tap_tests_predict_at_this_depth_stands_beside_it(shop: Shop, tmp_path: Path) -> None:
+def test_what_the_tap_tests_predict_at_this_depth_stands_next_to_it(shop: Shop, tmp_path: Path) -> None:
     shop.run(("A", 12077, 1.5), more='feed = "x"')
     shop.tap_both()
     logbook = Logbook.open(shop.path)

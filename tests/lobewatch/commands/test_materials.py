@@ -68,7 +68,7 @@ def test_rows_of_json_carry_units_ranges_and_a_source(materials: Materials) -> N
     assert all(row["source"] for row in rows.values())
 
 
-def test_a_name_that_nothing_has_is_told_with_the_nearest(materials: Materials) -> None:
+def test_a_name_that_nothing_has_is_reported_with_the_nearest(materials: Materials) -> None:
     code, out, err = materials("42CrMo5", "--json")
     assert (code, out) == (2, "")
     assert "no material has '42CrMo5' in a name; is '42CrMo4' meant?" in err

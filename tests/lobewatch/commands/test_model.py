@@ -204,12 +204,12 @@ def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
             invoke(["lobes", str(folder.path), *arguments])
 
 
-def test_a_prediction_is_refused_before_the_first_tap(folder: MachineFolder) -> None:
+def test_a_prediction_is_rejected_before_the_first_tap(folder: MachineFolder) -> None:
     with pytest.raises(ValueError, match="no tap test has set the bearings of the model yet"):
         predict_assembly(folder.machine, [], TOOL)
 
 
-def test_an_unknown_tool_and_a_machine_without_a_model_are_refused(folder: MachineFolder, tmp_path: Path) -> None:
+def test_an_unknown_tool_and_a_machine_without_a_model_are_rejected(folder: MachineFolder, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'drill' has no model; modelled are 'reference', 'long end mill'"):
         build_model_state(folder.machine, None, "drill")
     make_machine_folder(tmp_path / "plain", "new_machine.toml")

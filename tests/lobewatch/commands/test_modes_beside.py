@@ -85,7 +85,7 @@ def test_other_responses_of_one_measured_file_by_their_numbers(
         (["2", "missing.csv"], "missing.csv: No such file"),
     ],
 )
-def test_what_is_no_other_measurement_is_refused(
+def test_what_is_no_other_measurement_is_rejected(
     beside: list[str], complaint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = str(DATA / "vibrationtesting" / "mckiddat.mat")

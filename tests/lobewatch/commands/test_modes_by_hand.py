@@ -88,7 +88,7 @@ def test_of_a_tap_test_they_are_kept_in_the_journal_and_hold_for_all_that_follow
     assert ("modes-by-hand", "drop 2500, fix 1713:0.031") in [(remark.code, remark.about) for remark in remarks]
 
 
-def test_the_newest_word_counts_and_can_be_taken_back(shop: Shop) -> None:
+def test_the_newest_word_counts_and_can_be_withdrawn(shop: Shop) -> None:
     tap_id = tapped(shop)
     run("modes", shop.path, tap_id, "--drop", "1713")
     run("modes", shop.path, tap_id, "--drop", "900")
@@ -130,7 +130,7 @@ def test_replay_keeps_them_with_each_test(shop: Shop, file: Path) -> None:
     assert frequencies(shop) == [1713, 2500]
 
 
-def test_what_cannot_be_done_is_said_and_nothing_is_kept(shop: Shop, file: Path) -> None:
+def test_what_cannot_be_done_is_reported_and_nothing_is_kept(shop: Shop, file: Path) -> None:
     tap_id = tapped(shop)
     lines = (shop.path / "journal.jsonl").read_bytes()
     for options, words in (
@@ -161,7 +161,7 @@ def test_a_replayed_file_that_it_cannot_be_done_of_is_stored_without(shop: Shop,
     assert "hand-not-applied" not in [remark.code for remark in shop.logbook.history.rows[-1].remarks]
 
 
-def test_a_choice_that_no_longer_fits_is_said_and_the_fit_counts(shop: Shop) -> None:
+def test_a_choice_that_no_longer_fits_is_reported_and_the_fit_counts(shop: Shop) -> None:
     tap_id = tapped(shop)
     line = {"kind": "modes", "tap": tap_id, "add": [], "drop": [1200.0], "fix": [], "time": "2026-01-15T09:00:00+00:00"}
     shop.folder.journal.append(line)

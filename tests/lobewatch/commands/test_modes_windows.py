@@ -204,7 +204,7 @@ def test_rejected_modes_are_counted_and_shown_with_all(
     assert "heavy-damping" in everything
 
 
-def test_a_mode_that_outlasts_the_window_is_left_out_and_said(
+def test_a_mode_that_outlasts_the_window_is_left_out_and_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """A line of hum or a clock looks like a mode of hardly any damping; the others have their answer all the same."""
@@ -228,7 +228,7 @@ def stiffness_at(frequency: float, modes: Sequence[Mode]) -> float:
     return min(modes, key=lambda mode: abs(mode.frequency - frequency)).stiffness
 
 
-def test_a_window_that_nobody_named_is_said_with_its_time_constant(tmp_path: Path) -> None:
+def test_a_window_that_nobody_named_is_reported_with_its_time_constant(tmp_path: Path) -> None:
     path = hit(tmp_path / "windowed.csv", 0.5, tau=0.05)
     silent = fit_file_modes(path)
     (said,) = [remark for remark in silent.remarks if remark.code == "window-suspected"]

@@ -17,7 +17,7 @@ def decays(run: Run, tmp_path: Path) -> str:
     return record(tmp_path / "decays.csv").name
 
 
-def test_frequency_and_damping_are_told_and_no_stiffness(run: Run, decays: str) -> None:
+def test_frequency_and_damping_are_reported_and_no_stiffness(run: Run, decays: str) -> None:
     said = run("modes", decays, "--hammer", "none", "--json")
     assert said.code == 0, said.err
     mode = json.loads(said.out)["modes"][0]
@@ -41,13 +41,13 @@ def test_a_mode_is_left_out_and_a_band_kept_to(run: Run, decays: str) -> None:
     assert all(abs(mode["frequency_hz"] - TRUTH[0]) > 100 for mode in json.loads(said.out)["modes"])
 
 
-def test_of_a_tap_test_of_a_machine_nothing_has_to_be_said(run: Run, decays: str) -> None:
+def test_of_a_tap_test_of_a_machine_nothing_has_to_be_reported(run: Run, decays: str) -> None:
     run("init", "mill-3", "--yes", "--hammer", "none")
     assert run("replay", "mill-3", decays, "--date", "2026-03-01").code == 0
     said = run("modes", "mill-3", "20260301")
     assert (said.code, "not known" in said.out) == (0, True), said.err
 
 
-def test_what_needs_the_force_is_refused(run: Run, decays: str) -> None:
+def test_what_needs_the_force_is_rejected(run: Run, decays: str) -> None:
     refused(run("modes", decays), "a force and a response", "hammer none where no force was measured")
     refused(run("modes", decays, "--hammer", "none", "--window", "0.1"), "are of hits with their force")

@@ -103,7 +103,7 @@ def test_init_keeps_the_name_of_the_folder(run: Run, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [f"mill{CLEAR}", "two\nlines", "tab\tbed", "bell\x07", "csi\x9b2J", "half\udce4"])
-def test_init_refuses_a_folder_that_steers_a_terminal(run: Run, name: str) -> None:
+def test_init_rejects_a_folder_that_steers_a_terminal(run: Run, name: str) -> None:
     said = run("init", name)
     assert (said.code, said.out) == (2, "")
     assert said.err.startswith("error: folder='")
@@ -130,7 +130,7 @@ def test_init_refuses_a_folder_that_steers_a_terminal(run: Run, name: str) -> No
         ("replay",),
     ],
 )
-def test_an_empty_name_of_a_folder_is_refused(run: Run, folder: MachineFolder, command: tuple[str, ...]) -> None:
+def test_an_empty_name_of_a_folder_is_rejected(run: Run, folder: MachineFolder, command: tuple[str, ...]) -> None:
     before = sorted(Path.cwd().rglob("*"))
     said = run(*command, "", *(["x.csv"] if command == ("replay",) else []))
     assert (said.code, said.out) == (2, "")

@@ -86,7 +86,7 @@ def test_a_person_reads_pitches_gain_chips_and_where_they_hold(tapped: Shop, ask
     assert "at 0.05 mm" not in text
 
 
-def test_equal_pitch_is_said_to_be_as_good_where_it_is(tapped: Shop, ask: Any) -> None:
+def test_equal_pitch_is_reported_to_be_as_good_where_it_is(tapped: Shop, ask: Any) -> None:
     answer = json.loads(ask("--speed", "24000", "--json")[1])
     assert (answer["equal_is_as_good"], answer["proposed_deg"], answer["depth_mm"]) == (True, None, None)
     assert all(cutter["limit_low_mm"] < 1.05 * answer["equal"]["limit_low_mm"] for cutter in answer["unequal"])
@@ -95,7 +95,7 @@ def test_equal_pitch_is_said_to_be_as_good_where_it_is(tapped: Shop, ask: Any) -
     assert "equal pitch is as good at 24 000 rpm: it has no limit up to 2 mm" in text
 
 
-def test_pitches_that_the_cutter_has_are_judged_too(tapped: Shop, ask: Any) -> None:
+def test_pitches_that_the_cutter_has_are_evaluated_too(tapped: Shop, ask: Any) -> None:
     tapped.edit("teeth = 2", "teeth = 2\npitch_deg = [178, 182]")
     answer = json.loads(ask("--speed", "13800", "--json")[1])
     (present,) = (cutter for cutter in answer["unequal"] if cutter["pattern"] == "as it is")
@@ -104,7 +104,7 @@ def test_pitches_that_the_cutter_has_are_judged_too(tapped: Shop, ask: Any) -> N
     assert 0 < present["gain"] < answer["unequal"][0]["gain"]
 
 
-def test_what_is_no_cutter_or_no_cut_is_refused(shop: Shop, ask: Any) -> None:
+def test_what_is_no_cutter_or_no_cut_is_rejected(shop: Shop, ask: Any) -> None:
     shop.run(("slot", 6200, 0.8))
     assert ask("--speed", "6200")[0] == 2
     shop.tap_both()

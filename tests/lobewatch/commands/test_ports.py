@@ -174,7 +174,7 @@ def test_ports_lists_all_but_asks_only_usb_devices(
     assert lines[5].startswith("1 of 3 answer")
 
 
-def test_a_port_in_use_is_said_to_be_so(run: Any, trial: MachineFolder) -> None:
+def test_a_port_in_use_is_reported_to_be_so(run: Any, trial: MachineFolder) -> None:
     with dataq_device(trial) as device, open_device(trial.machine.daq, device.port):
         said = run("ports", "--port", device.port)
     assert "another program uses it: close that program" in said.out
@@ -207,7 +207,7 @@ def test_no_port_at_all_gets_a_sentence_with_the_cure(run: Any, monkeypatch: pyt
         ("win32", FileNotFoundError(errno.ENOENT, "No such file"), "check the cable and the port's name"),
     ],
 )
-def test_what_is_wrong_with_a_port_is_told_with_the_cure_of_the_platform(
+def test_what_is_wrong_with_a_port_is_reported_with_the_cure_of_the_platform(
     platform: str, error: Exception, cure: str
 ) -> None:
     text = str(explain_open_error("/dev/x", error, platform))

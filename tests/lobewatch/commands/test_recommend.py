@@ -90,7 +90,7 @@ def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, ru
     assert run("check", "--json")[0] == 0
 
 
-def test_a_spindle_of_one_speed_is_a_narrow_range_and_a_reversed_one_is_refused(shop: Shop, run: Any) -> None:
+def test_a_spindle_of_one_speed_is_a_narrow_range_and_a_reversed_one_is_rejected(shop: Shop, run: Any) -> None:
     shop.tap_both()
     shop.run(("A", 6500, 0.5))
     shop.edit("low_rpm = 3000\nhigh_rpm = 24000", "low_rpm = 6500\nhigh_rpm = 6500")
@@ -125,7 +125,7 @@ def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
     assert json.loads(run("check", "--program", "A", "--json")[1])["programs"][0]["advice"] is None
 
 
-def test_a_tool_that_bears_no_speed_of_the_spindle_has_none(shop: Shop, run: Any) -> None:
+def test_a_tool_that_allows_no_speed_of_the_spindle_has_none(shop: Shop, run: Any) -> None:
     shop.tap_both()
     code, out, _ = run("recommend", "--material", "42CrMo4")
     reason, cures = out.splitlines()
@@ -154,7 +154,7 @@ def test_a_program_that_runs_at_a_speed_its_tool_does_not_bear_is_not_sent_to_ta
     assert cures.startswith("what would change it: a speed within that; ")
 
 
-def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:
+def test_a_tool_that_was_never_tapped_is_predicted_and_reported_to_be_doubtful(shop: Shop, run: Any) -> None:
     shop.tap_both()
     of = ("--material", "AA 6061", "--teeth", "2", "--diameter", "18")
     assert "predicted: doubtful until the tool is tapped" in run("recommend", "--tool", "long end mill", *of)[1]
@@ -187,7 +187,7 @@ def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str
     assert toml(shop) == before
 
 
-def test_a_decimal_comma_is_told_to_be_a_point(run: Any) -> None:
+def test_a_decimal_comma_is_reported_to_be_a_point(run: Any) -> None:
     for command in ("recommend", "check"):
         code, _, error = run(command, "--depth", "1,5")
         assert (code, "'1,5' is no number; write 1.5 with a point" in " ".join(error.split())) == (2, True)

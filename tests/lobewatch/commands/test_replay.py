@@ -100,7 +100,7 @@ def test_a_dry_run_explains_and_stores_nothing(shop: Shop, folder: Path) -> None
     assert before == sorted(path for path in shop.path.rglob("*") if path.is_file())
 
 
-def test_a_dry_run_says_the_same_whoever_reads(shop: Shop, folder: Path) -> None:
+def test_a_dry_run_says_the_same_to_every_reader(shop: Shop, folder: Path) -> None:
     shutil.copy(folder / "a 20240901.csv", folder / "twin 20240902.csv")
     (folder / "bad 20240801.csv").write_text("Freq (Hz),Real (um/N),Imag (um/N)\n1,2,3\n2,x,3\n")
     options, found = ("--date-pattern", "%Y%m%d", "--dry-run", "--json"), []
@@ -155,7 +155,7 @@ def test_where_no_file_can_be_used_nothing_is_kept_going_with(shop: Shop, tmp_pa
     assert shop.logbook.taps == []
 
 
-def test_notes_beside_recordings_are_passed_over_and_refused_by_name(shop: Shop, folder: Path) -> None:
+def test_notes_next_to_recordings_are_skipped_and_rejected_by_name(shop: Shop, folder: Path) -> None:
     notes = folder / "Notizen Fräser.txt"
     notes.write_text("3 Schläge, harte Spitze\n24.05.2024\n", encoding="utf-8")
     said = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run", "--json").stdout
@@ -199,7 +199,7 @@ def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("length", [-1, 1])
-def test_a_file_that_changes_while_it_is_read_is_refused(
+def test_a_file_that_changes_while_it_is_read_is_rejected(
     shop: Shop, folder: Path, monkeypatch: pytest.MonkeyPatch, length: int
 ) -> None:
     growing, wait = folder / "a 20240901.csv", "it changes while it is read; wait until it is written"
@@ -219,7 +219,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(
     assert taps(shop) == ["2024-05-01", "2024-07-01"]
 
 
-def test_a_window_is_refused_by_a_replay_and_taken_off_by_modes(shop: Shop, tmp_path: Path) -> None:
+def test_a_window_is_rejected_by_a_replay_and_taken_off_by_modes(shop: Shop, tmp_path: Path) -> None:
     plain = frf(tmp_path / "plain.csv")
     windowed = tmp_path / "window.csv"
     windowed.write_text("# window: exponential 0.02 s\n" + plain.read_text())

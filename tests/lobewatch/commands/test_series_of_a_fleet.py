@@ -78,7 +78,7 @@ def test_running_hours_are_the_time_of_a_forecast(new_shop: type[Shop], tmp_path
     assert by_hours.likeliest_shape.start == pytest.approx(by_hours.points[0].time.timestamp() / 86400, abs=1)
 
 
-def test_hours_that_go_back_are_said_and_do_not_count(new_shop: type[Shop], tmp_path: Path) -> None:
+def test_hours_that_go_back_are_reported_and_do_not_count(new_shop: type[Shop], tmp_path: Path) -> None:
     wrong = [*USED[:20], USED[2], *USED[21:]]
     back = new_shop(tmp_path / "back")
     by_wrong, by_days = shop_with_hours(back, wrong), shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
@@ -158,7 +158,7 @@ def test_after_a_repair_the_scatter_of_before_is_known(run: Run, new_shop: type[
     assert known.alone[0] == pytest.approx(0.2, rel=0.4)
 
 
-def test_a_fall_that_has_slowed_down_is_said_to_settle(new_shop: type[Shop], tmp_path: Path) -> None:
+def test_a_fall_that_has_slowed_down_is_reported_to_settle(new_shop: type[Shop], tmp_path: Path) -> None:
     random = np.random.default_rng(6)
     run_in, worn = new_shop(tmp_path / "run-in"), new_shop(tmp_path / "worn")
     months = np.arange(24.0)

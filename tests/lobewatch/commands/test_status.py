@@ -42,7 +42,7 @@ def mills(shop: Shop, tmp_path: Path) -> Path:
     return tmp_path / "mills"
 
 
-def test_what_cannot_be_judged_is_first_then_the_worst_and_an_alarm_ends_with_1(mills: Path) -> None:
+def test_what_cannot_be_evaluated_is_first_then_the_worst_and_an_alarm_ends_with_1(mills: Path) -> None:
     told = run(mills, "--json")
     found = json.loads(told.stdout)["machines"]
     assert told.exit_code == 1
@@ -58,7 +58,7 @@ def test_what_cannot_be_judged_is_first_then_the_worst_and_an_alarm_ends_with_1(
     assert text.index("bad") < text.index("worn") < text.index("new") < text.index("good ")
 
 
-def test_without_an_alarm_it_ends_with_0_but_not_where_a_machine_cannot_be_judged(mills: Path) -> None:
+def test_without_an_alarm_it_ends_with_0_but_not_where_a_machine_cannot_be_evaluated(mills: Path) -> None:
     assert [run(mills / name).exit_code for name in ("good", "new", "bad")] == [0, 0, 1]
 
 
@@ -74,6 +74,6 @@ def test_due_shows_those_to_be_tapped_alone(mills: Path) -> None:
     assert "good" in run(mills, "--due").stdout
 
 
-def test_a_folder_without_machines_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_machines_is_rejected(tmp_path: Path) -> None:
     told = CliRunner().invoke(app, ["status", str(tmp_path)])
     assert "neither a machine folder nor a folder of them" in str(told.exception)

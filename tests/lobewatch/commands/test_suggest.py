@@ -59,7 +59,7 @@ def test_power_is_asked_for_where_it_can_say_a_kt(shop: Shop, run: Any) -> None:
     assert "--stable (or --chatter --frequency HZ); --power KW, where it is shown, tells Kt\n" in text
 
 
-def test_a_cut_that_contradicts_is_said_and_left_out(shop: Shop, run: Any) -> None:
+def test_a_cut_that_contradicts_is_reported_and_left_out(shop: Shop, run: Any) -> None:
     shop.tap_both()
     for depth, heard in (("2.2", "--stable"), ("2.1", "--stable"), ("0.2", "--chatter")):
         assert run("observe", "--program", "A", "--speed", "12900", "--depth", depth, heard)[0] == 0

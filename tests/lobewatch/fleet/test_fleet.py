@@ -61,7 +61,7 @@ def test_one_damaged_machine_among_many_costs_its_own_line_alone(shop: Shop, tmp
     assert len(found) == 30
 
 
-def test_a_folder_whose_name_is_no_text_is_refused_and_costs_the_others_nothing(shop: Shop, tmp_path: Path) -> None:
+def test_a_folder_whose_name_is_no_text_is_rejected_and_costs_the_others_nothing(shop: Shop, tmp_path: Path) -> None:
     shop.put("")
     shop.tap_both()
     for name in ("good", "b\udcff"):
@@ -79,7 +79,7 @@ def test_a_folder_whose_name_is_no_text_is_refused_and_costs_the_others_nothing(
     assert [(one.key, one.current.is_readable) for one in found] == [(r"b\udcff", False), ("good", True)]
 
 
-def test_a_plant_without_machines_is_refused_and_one_in_itself_stands_once(shop: Shop, tmp_path: Path) -> None:
+def test_a_fleet_without_machines_is_rejected_and_one_in_itself_stands_once(shop: Shop, tmp_path: Path) -> None:
     mills = tmp_path / "mills"
     mills.mkdir()
     with pytest.raises(DataError, match="neither a machine folder nor a folder of them; make one with"):

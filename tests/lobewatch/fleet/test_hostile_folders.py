@@ -179,7 +179,7 @@ def test_hostile_folders_cost_a_good_one_nothing(
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_folder_alone_is_judged_or_refused(
+def test_a_hostile_folder_alone_is_evaluated_or_rejected(
     plant: Path, said: Callable[..., tuple[int, str, str]], name: str
 ) -> None:
     folder = plant / "good"

@@ -63,7 +63,7 @@ def kept(shop: Shop) -> bool:
     return read_summary(shop.path, now(shop)) is not None
 
 
-def test_it_says_at_any_time_what_the_standing_says(tapped: Shop) -> None:
+def test_it_says_at_any_time_what_the_status_says(tapped: Shop) -> None:
     summarize_machine(tapped.logbook, now(tapped))
     summary = read_summary(tapped.path, now(tapped, 62.0))
     assert summary is not None
@@ -120,7 +120,7 @@ def test_that_of_another_folder_or_another_week_does_not_count(tapped: Shop, tmp
     assert not kept(tapped)
 
 
-def test_whoever_alters_a_machine_leaves_its_standing_beside_it(shop: Shop) -> None:
+def test_a_change_of_a_machine_leaves_its_status_next_to_it(shop: Shop) -> None:
     days = (datetime.now(shop.start.tzinfo) - shop.start) / timedelta(days=1)
     shop.put("")
     shop.tap_both(days - 2)
@@ -138,14 +138,14 @@ def test_whoever_alters_a_machine_leaves_its_standing_beside_it(shop: Shop) -> N
             assert read_summary(shop.path, datetime.now(shop.start.tzinfo)) is not None, command
 
 
-def test_a_machine_whose_lock_is_held_is_told_without_a_file(tapped: Shop) -> None:
+def test_a_machine_whose_lock_is_held_is_reported_without_a_file(tapped: Shop) -> None:
     with MachineFolder(tapped.path).locked():
         ((_, _, summary, _),) = Fleet({"m": tapped.path}).assess_machines(now(tapped))
     assert summary.newest_tap_id == tapped.logbook.newest_tap().id
     assert not (tapped.path / "standing.json").exists()
 
 
-def test_fresh_standings_are_told_without_numbers_being_read(tapped: Shop) -> None:
+def test_fresh_statuses_are_reported_without_numbers_being_read(tapped: Shop) -> None:
     """Hundreds of machines within a second: nothing that is slow to import is needed."""
     summarize_machine(tapped.logbook)
     program = (
@@ -156,7 +156,7 @@ def test_fresh_standings_are_told_without_numbers_being_read(tapped: Shop) -> No
     assert (told.returncode, b"frequency fallen" in told.stdout or b"m," in told.stdout) == (0, True)
 
 
-def test_rows_of_fresh_standings_are_exported_without_a_logbook(tapped: Shop, tmp_path: Path) -> None:
+def test_rows_of_fresh_statuses_are_exported_without_a_logbook(tapped: Shop, tmp_path: Path) -> None:
     summarize_machine(tapped.logbook)
     program = (
         "import sys; from lobewatch.cli import main; sys.argv = ['lobewatch', 'export', *sys.argv[1:]]\n"
@@ -167,7 +167,7 @@ def test_rows_of_fresh_standings_are_exported_without_a_logbook(tapped: Shop, tm
     assert (done.returncode, len(table.read_text("utf-8").splitlines())) == (0, 7)
 
 
-def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
+def test_the_verdict_on_programs_is_in_it(tapped: Shop) -> None:
     toml = (tapped.path / "machine.toml").read_text("utf-8")
     (tapped.path / "machine.toml").write_text(toml + PROGRAM, "utf-8")
     ((_, _, summary, dated),) = Fleet({"m": tapped.path}).assess_machines(now(tapped))
@@ -178,7 +178,7 @@ def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
     assert summary.programs == {name: one.stability for name, one in stored.items()}
 
 
-def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:
+def test_every_byte_is_inspected_again_every_six_hours(tapped: Shop) -> None:
     waits = list[float]()
 
     class Third(threading.Event):
@@ -190,7 +190,7 @@ def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:
     assert waits == [6 * 3600.0] * 3
 
 
-def test_a_recording_of_a_cut_that_is_in_no_journal_costs_its_machine_its_light_and_nobody_the_list(
+def test_a_recording_of_a_cut_that_is_in_no_journal_costs_its_machine_its_status_and_nobody_the_list(
     tapped: Shop,
 ) -> None:
     (tapped.path / "cuts").mkdir()

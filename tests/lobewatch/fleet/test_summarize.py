@@ -93,7 +93,7 @@ def test_what_others_have_made_is_not_made_again(mills: Path, shop: Shop, monkey
     assert asked == ["broken"]
 
 
-def test_standings_that_are_there_go_to_nobody(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_statuses_that_are_there_go_to_nobody(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     alone = status(mills)
     (mills / "broken").rename(mills.parent / "elsewhere")
     monkeypatch.setattr(summarize, "summarize_in_parallel", lambda *_, **__: pytest.fail("somebody was asked"))
@@ -101,7 +101,7 @@ def test_standings_that_are_there_go_to_nobody(mills: Path, monkeypatch: pytest.
     assert [row["light"] for row in json.loads(found.stdout)["machines"]] == [row["light"] for row in alone[1:]]
 
 
-def test_folders_that_the_workers_do_not_see_are_looked_at_here(
+def test_folders_that_the_workers_do_not_see_are_inspected_here(
     mills: Path, cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = status(mills)
@@ -118,7 +118,7 @@ def test_folders_that_the_workers_do_not_see_are_looked_at_here(
     assert status(mills, "--scheduler", cluster.scheduler_address) == alone
 
 
-def test_jobs_and_scheduler_at_once_and_a_scheduler_that_is_none_are_refused(mills: Path) -> None:
+def test_jobs_and_scheduler_at_once_and_a_scheduler_that_is_none_are_rejected(mills: Path) -> None:
     with pytest.raises(ValueError, match="give one of them"):
         status(mills, "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1")
     with pytest.raises(DataError, match="no Dask scheduler answers there"):

@@ -13,7 +13,7 @@ Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
 
 
-def test_limits_and_words_of_programs_stand_in_the_row_they_were_asked_of(shop: Shop) -> None:
+def test_limits_and_words_of_programs_are_in_the_row_they_were_asked_of(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     newest = shop.tap(30, 1650.0)
     logbook = shop.logbook

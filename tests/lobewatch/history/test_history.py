@@ -19,7 +19,7 @@ pytestmark = pytest.mark.quick
 LINES = np.arange(4.0, 4000.0, 4.0)
 
 
-def test_rows_are_read_back_as_they_were_worked_out(tmp_path: Path) -> None:
+def test_rows_are_read_back_as_they_were_computed(tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     folder = MachineFolder(tmp_path / "m")
     for days, modes in enumerate(([Mode(1713.0, 0.03, 3.5e7), Mode(2900.0, 0.02, 9e7)], [Mode(900.0, 0.03, 3.5e7)])):

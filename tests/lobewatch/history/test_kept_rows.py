@@ -66,14 +66,14 @@ def file_of(shop: Shop, number: int) -> Path:
     return path
 
 
-def test_all_is_worked_out_anew(tapped: Shop) -> None:
+def test_all_is_computed_again(tapped: Shop) -> None:
     history = tapped.logbook.history
     assert frequencies(history) == [1713, 1712, 1711]
     assert (history.kept, tapped.logbook.remarks) == ((), [])
     assert OLDER.encode() not in tapped.folder.history_path.read_bytes()
 
 
-def test_what_the_analysis_refuses_keeps_its_row_and_counts(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_the_analysis_rejects_keeps_its_row_and_counts(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     tap_id = tapped.folder.taps()[1].id
     refuse(monkeypatch, tap_id)
     for _ in range(2):

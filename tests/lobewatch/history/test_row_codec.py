@@ -62,7 +62,7 @@ def test_no_question_is_overlooked(code: str) -> None:
     assert [one.code for one in decode_row(encode_row(0, asked, HASHES), HASHES)[1].questions] == [code]
 
 
-def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_opened_anew(shop: Shop) -> None:
+def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_reopened(shop: Shop) -> None:
     shop.put("")
     shop.tap(0, 1713.0)
     logbook = shop.logbook

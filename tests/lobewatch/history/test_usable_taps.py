@@ -45,7 +45,7 @@ def file_of(shop: Shop, number: int) -> Path:
     return path
 
 
-def test_an_old_one_is_left_out_and_said(tapped: Shop) -> None:
+def test_an_old_one_is_left_out_and_reported(tapped: Shop) -> None:
     sound = json.loads(run("check", tapped.path, "--json").stdout)["programs"]
     bad = file_of(tapped, 0)
     flip(bad)
@@ -97,7 +97,7 @@ def test_one_that_is_found_damaged_late_is_left_out_too(tapped: Shop, monkeypatc
     assert [remark.about for remark in logbook.remarks if remark.code == "tap-damaged"] == [f"taps/{bad.name}"]
 
 
-def test_where_none_is_left_that_is_said(tapped: Shop) -> None:
+def test_where_none_is_left_that_is_reported(tapped: Shop) -> None:
     for path in (tapped.path / "taps").iterdir():
         path.unlink()
     said = CliRunner().invoke(app, ["check", str(tapped.path)])

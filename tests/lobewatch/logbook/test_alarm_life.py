@@ -69,7 +69,7 @@ def test_an_event_in_the_middle_of_a_fall_closes_nothing(mill: Shop, run: Run) -
     assert said.json["machines"][0]["light"] == "alarm"
 
 
-def test_a_new_baseline_closes_it_and_one_taken_back_opens_it_again(mill: Shop, run: Run) -> None:
+def test_a_new_baseline_closes_it_and_one_withdrawn_opens_it_again(mill: Shop, run: Run) -> None:
     (before,) = alarms(mill, 18)
     event = add_event(mill.folder, "bearings replaced", at(mill, 17.2), new_baseline=True)
     tap_months(mill, [0.0, 0.0], 18)
@@ -95,7 +95,7 @@ def test_the_data_close_it(shop: Shop) -> None:
     assert codes(shop, 36) <= {"one-direction", "overdue"}
 
 
-def test_acknowledged_is_said_everywhere_and_the_light_stays(mill: Shop, run: Run) -> None:
+def test_acknowledged_is_reported_everywhere_and_the_status_stays(mill: Shop, run: Run) -> None:
     until = (datetime.now(UTC) + timedelta(days=40)).date()
     said = run("ack", mill.path, "--until", until, "--note", "bearings ordered", "--operator", "Kim", "--json")
     assert said.code == 0
@@ -158,7 +158,7 @@ def test_fixed_limits_and_programs_ring_too_each_with_the_test_that_raised_it(sh
     assert {alarm.code for alarm in alarms(shop, 5) if alarm.acknowledgement} == {"frequency-alarm"}
 
 
-def test_bad_acknowledgements_are_refused(mill: Shop, run: Run) -> None:
+def test_bad_acknowledgements_are_rejected(mill: Shop, run: Run) -> None:
     refused(run("ack", mill.path, "none-such"), "no such alarm", "decay:reference:x:")
     refused(run("ack", mill.path, "--until", "2020-01-01"), "is past")
     assert run("ack", mill.path, "--note", "known").code == 0
@@ -209,7 +209,7 @@ def test_two_alarms_at_once_are_named_and_acknowledged_apart(shop: Shop, run: Ru
     assert {alarm.id for alarm in alarms(shop, 18) if alarm.acknowledgement} == names
 
 
-def test_two_clampings_of_one_day_are_two_points_where_that_is_said(shop: Shop) -> None:
+def test_two_clampings_of_one_day_are_two_points_where_that_is_reported(shop: Shop) -> None:
     shop.put("")
     tap_months(shop, [0.0] * 12)
     for hour, reclamped in ((0, False), (1, False), (2, True)):

@@ -183,7 +183,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
             again.run()
 
 
-def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: MachineFolder) -> None:
+def test_a_committed_test_whose_spool_was_left_is_not_resumed(folder: MachineFolder) -> None:
     tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
     folder.commit(tap)
     (folder.spool / tap.id).mkdir(parents=True)
@@ -266,7 +266,7 @@ def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothi
     assert "natural frequency" in render_report(Logbook.open(folder.path), "reference", "x")
 
 
-def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolder) -> None:
+def test_a_tap_next_to_the_tip_is_carried_to_it_by_the_model(folder: MachineFolder) -> None:
     folder.toml.write_text(folder.toml.read_text().replace("position_mm = 0 ", "position_mm = 60 "))
     beside = MachineFolder(folder.path)
     table = beside.machine.spindle
@@ -293,7 +293,7 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     assert "Bearing stiffness" not in html
 
 
-def test_series_are_sorted_by_time_and_told_apart(folder: MachineFolder) -> None:
+def test_series_are_sorted_by_time_and_distinguished(folder: MachineFolder) -> None:
     tapped: list[tuple[float, TapDirection]] = [(60, "x"), (0, "x"), (30, "x"), (45, "y")]
     for days, direction in tapped:
         folder.commit(recorded(about(folder, days, direction), Mode(1700.0 - days, 0.03, 3.5e7)))
@@ -341,7 +341,7 @@ def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: Ma
     assert [row.frequency for row in again.rows] == [row.frequency for row in history.rows]
 
 
-def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_asked_about(folder: MachineFolder) -> None:
+def test_a_jump_of_the_frequency_is_reported_and_a_far_one_is_asked_about(folder: MachineFolder) -> None:
     for days, f in ((0.0, 1500.0), (30.0, 1640.0), (60.0, 2100.0)):
         folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
     history, (_, jumped, far) = up_to_date(folder)

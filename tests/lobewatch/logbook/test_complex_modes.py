@@ -62,7 +62,7 @@ def machine(shop: Shop) -> Machine:
     return found
 
 
-def test_draws_have_the_joint_covariance_of_the_tap_test(machine: Machine) -> None:
+def test_samples_have_the_joint_covariance_of_the_tap_test(machine: Machine) -> None:
     mode, (table,) = turned(-25.0, 1.5), machine.program
     assembly = of([mode])
     middle = build_median_row(build_program(table, machine), assembly)

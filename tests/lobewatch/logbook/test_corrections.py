@@ -116,7 +116,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
     assert shop.logbook.status(at) == before
 
 
-def test_only_rows_after_an_exclusion_or_a_baseline_are_analysed_anew(
+def test_only_rows_after_an_exclusion_or_a_baseline_are_analysed_again(
     shop: Shop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for month in range(4):
@@ -163,7 +163,7 @@ def test_after_a_new_baseline_nothing_is_known_until_the_next_tap(shop: Shop) ->
             run(command, shop.path)
 
 
-def test_an_old_recording_is_stored_beside_a_new_baseline(shop: Shop, beam: Path) -> None:
+def test_an_old_recording_is_stored_next_to_a_new_baseline(shop: Shop, beam: Path) -> None:
     mill(shop)
     shop.tap_both()
     add_event(shop.folder, "spindle replaced", day(shop, 10), new_baseline=True)
@@ -233,7 +233,7 @@ def test_history_lists_taps_exclusions_events_and_verdicts_in_order(shop: Shop) 
     assert "wrong, tool" in text
 
 
-def test_corrections_are_taken_back_by_later_lines(shop: Shop) -> None:
+def test_corrections_are_withdrawn_by_later_lines(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     tap_id = newest_id(shop)
     run("exclude", shop.path, tap_id[:15], "--reason", "doubt")

@@ -63,7 +63,7 @@ def remark_codes(logbook: Logbook) -> list[str]:
     return [remark.code for remark in verdict.remarks]
 
 
-def test_a_cross_tap_settles_to_which_side_modes_lie(askew: Shop) -> None:
+def test_a_cross_tap_decides_to_which_side_modes_lie(askew: Shop) -> None:
     before = askew.logbook
     assert "cross-not-tapped" in remark_codes(before)
     assert len(before.assembly("reference").principal_directions.sign_patterns) == 2
@@ -128,7 +128,7 @@ def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mo
     assert "cross-not-tapped" in remark_codes(askew.logbook)
 
 
-def test_a_cross_tap_alone_tells_no_tool(shop: Shop) -> None:
+def test_a_cross_tap_alone_gives_no_tool(shop: Shop) -> None:
     shop.put(NARROW)
     tap(shop, 0, "xy", project_modes(PAIR, turned_by(35)).cross)
     assert shop.logbook.assembly("reference").directions == ()
@@ -136,7 +136,7 @@ def test_a_cross_tap_alone_tells_no_tool(shop: Shop) -> None:
     assert verdict.stability.value == "unknown"
 
 
-def test_stored_rows_hold_beside_a_cross_tap_that_comes_later(askew: Shop) -> None:
+def test_stored_rows_hold_next_to_a_cross_tap_that_comes_later(askew: Shop) -> None:
     before = askew.logbook.history.rows
     tap(askew, 0.02, "xy", project_modes(PAIR, turned_by(35)).cross)
     rows = askew.logbook.history.rows

@@ -121,7 +121,7 @@ def test_no_command_analyses_a_tap_twice(
     assert len(analysed) == len(set(analysed)) <= most
 
 
-def test_a_reader_beside_a_writer_reads_on_and_writes_nothing(path: Path) -> None:
+def test_a_reader_next_to_a_writer_reads_on_and_writes_nothing(path: Path) -> None:
     tap(path, 0, 1713.0)
     Logbook.open(path).status()
     before = (path / "history.rows").read_bytes()
@@ -171,7 +171,7 @@ UNSURE = DISPUTED.replace('"disputed"', '"unsure"').replace("depth_mm = 4.55", "
 @pytest.mark.parametrize(
     ("program", "word", "light"), [(DISPUTED, Stability.NOT_STABLE, "alarm"), (UNSURE, Stability.DOUBTFUL, "warn")]
 )
-def test_one_program_has_one_word_in_every_place(
+def test_one_program_has_one_verdict_in_every_place(
     shop: Shop, path: Path, program: str, word: Stability, light: str
 ) -> None:
     shop.put(program)
@@ -244,7 +244,7 @@ def test_an_older_direction_falls_with_the_newer_one(shop: Shop) -> None:
     assert shop.logbook.verdicts()[0].limit == pytest.approx(both_tapped, rel=1e-3)
 
 
-def test_the_light_is_that_of_the_worst_series_not_of_the_newest_tap(path: Path) -> None:
+def test_the_status_is_that_of_the_worst_series_not_of_the_newest_tap(path: Path) -> None:
     for days, frequency in ((0, 1713.0), (30, 1620.0), (60, 1520.0)):
         tap(path, days, frequency)
     tap(path, 61, 1400.0, tool="another")
@@ -256,7 +256,7 @@ def test_the_light_is_that_of_the_worst_series_not_of_the_newest_tap(path: Path)
     assert standing.series[0].drop.value == pytest.approx(100 * (1 - 1520 / 1713), abs=0.01)
 
 
-def test_light_report_and_history_have_one_formula_for_the_fall(path: Path) -> None:
+def test_status_report_and_history_have_one_formula_for_the_fall(path: Path) -> None:
     tap(path, 0, 1713.0)
     tap(path, 30, 1680.0)
     logbook = Logbook.open(path)
@@ -285,7 +285,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
     assert not asked
 
 
-def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
+def test_older_rows_are_evaluated_on_demand_and_kept(shop: Shop) -> None:
     for days, share in ((0, 1.0), (30, 0.95), (60, 0.9)):
         shop.tap_both(days, share)
     logbook = shop.logbook
@@ -296,7 +296,7 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
     assert kept == [False, True, False, False, False, True]
 
 
-def test_a_program_is_judged_once_in_an_opened_logbook(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_is_evaluated_once_in_an_opened_logbook(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def counting(table: ProgramTable, *known: Any) -> Verdict:
@@ -362,7 +362,7 @@ def of_another_version(rows: list[bytes]) -> list[bytes]:
 
 
 @pytest.mark.parametrize("older", [of_fewer_fields, of_another_version])
-def test_a_history_of_another_make_is_made_anew(
+def test_a_history_of_another_make_is_made_again(
     path: Path, analysed: list[str], older: Callable[[list[bytes]], list[bytes]]
 ) -> None:
     tap(path, 0, 1713.0)
@@ -398,7 +398,7 @@ def damage(path: Path, tap_id: str) -> None:
         file.write(b"x")
 
 
-def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> None:
+def test_a_damaged_tap_is_called_so_and_no_wrong_label_is_kept(path: Path) -> None:
     tap(path, 0, 1713.0)
     tap(path, 30, 1541.74)
     logbook = Logbook.open(path)

@@ -81,7 +81,7 @@ def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
     )
 
 
-def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_critical_falls_are_computed_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     first = forecast_machine(worn.logbook).programs["A"]
 
     def again(*_: object) -> None:
@@ -111,7 +111,7 @@ def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
     assert not any("bearing" in one for one in said)
 
 
-def test_a_short_history_foretells_nothing(shop: Shop) -> None:
+def test_a_short_history_predicts_nothing(shop: Shop) -> None:
     shop.tap_both()
     shop.run(("A", 12900, 1.5))
     found = forecast_machine(shop.logbook)
@@ -123,7 +123,7 @@ def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     assert not any(words in told.stdout for words in ("history too short", "is not stable", "Dates hold"))
 
 
-def test_what_foretells_nothing_hides_no_date(worn: Shop) -> None:
+def test_what_predicts_nothing_hides_no_date(worn: Shop) -> None:
     """A tap test of another tool, and a direction that is too young."""
     now = worn.logbook.history.rows[-1].time
     before = forecast_machine(worn.logbook, now)
@@ -145,7 +145,7 @@ def test_a_young_direction_hides_no_date_of_the_other(shop: Shop) -> None:
     assert found.programs["A"].not_stable.latest is not None
 
 
-def test_overdue_is_said_as_overdue_and_never_as_measured(worn: Shop) -> None:
+def test_overdue_is_reported_as_overdue_and_never_as_measured(worn: Shop) -> None:
     last = worn.logbook.history.rows[-1].time
     found, later = (forecast_machine(worn.logbook, last + timedelta(days=days)) for days in (0, 180))
     assert later.limits == found.limits
@@ -203,7 +203,7 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
         (["--csv", "--json"], "give one of them"),
     ],
 )
-def test_what_is_not_there_is_refused_in_a_sentence(shop: Shop, options: list[str], said: str) -> None:
+def test_what_is_not_there_is_rejected_in_a_sentence(shop: Shop, options: list[str], said: str) -> None:
     shop.tap(0, 1713.0)
     shop.put("")
     told = CliRunner().invoke(app, ["trend", str(shop.path), *options])
@@ -282,7 +282,7 @@ def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop
     assert measurement_json(logbook.measurement(first), logbook)["preload_left"] is None
 
 
-def test_nothing_is_said_of_preload_where_the_bearings_are_not_felt(shop: Shop) -> None:
+def test_nothing_is_reported_of_preload_where_the_bearings_are_not_felt(shop: Shop) -> None:
     """They raise f_1 to 2301 Hz at most."""
     shop.tap(0, 2297.0)
     newest = shop.tap(30, 2290.0)
@@ -292,7 +292,7 @@ def test_nothing_is_said_of_preload_where_the_bearings_are_not_felt(shop: Shop) 
     assert "preload" not in run("calibrate", shop.path, "--frequency", 2297).stdout
 
 
-def test_nothing_is_said_of_the_preload_of_rollers_or_of_a_single_test(shop: Shop) -> None:
+def test_nothing_is_reported_of_the_preload_of_rollers_or_of_a_single_test(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     assert preload_in_trend(shop) is None
     shop.edit("{ position_mm = 617 }", '{ position_mm = 617, rolling_elements = "rollers" }')
@@ -317,7 +317,7 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
     assert find_critical_drop(found).error == pytest.approx(np.std(falls), rel=0.3)
 
 
-def test_a_program_without_a_word_is_not_put_down_to_the_history(worn: Shop) -> None:
+def test_a_program_without_a_verdict_is_not_put_down_to_the_history(worn: Shop) -> None:
     worn.run(("A", 12900, 1.5), tool="D99")
     rows = {name: cells for name, *cells in forecast_date_rows(forecast_machine(worn.logbook))}
     assert rows["A"] == ["unknown now, see check"] * 2

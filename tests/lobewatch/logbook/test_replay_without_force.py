@@ -69,7 +69,7 @@ def test_a_tap_file_of_ours_is_replayed_for_another_machine(without_force: Shop,
     ]
 
 
-def test_with_a_hammer_a_recording_without_force_is_refused(shop: Shop, tmp_path: Path) -> None:
+def test_with_a_hammer_a_recording_without_force_is_rejected(shop: Shop, tmp_path: Path) -> None:
     path = record(tmp_path / "decays.csv")
     run = CliRunner().invoke(app, ["replay", str(shop.path), str(path), "--date", "2026-03-01"])
     assert isinstance(run.exception, DataError)

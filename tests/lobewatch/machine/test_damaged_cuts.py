@@ -101,7 +101,7 @@ def test_six_hundred_damaged_recordings_are_named_and_mended(heard: Path, tmp_pa
     assert found["named"] >= 500
 
 
-def test_a_damaged_recording_alters_nothing_that_is_said(heard: Path) -> None:
+def test_a_damaged_recording_alters_nothing_that_is_reported(heard: Path) -> None:
     """The evaluation is stored in the journal."""
 
     def said() -> list[tuple[int, str]]:

@@ -83,7 +83,7 @@ def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:
         folder.read(entry)
 
 
-def test_two_writers_are_told_apart(folder: MachineFolder) -> None:
+def test_two_writers_are_distinguished(folder: MachineFolder) -> None:
     refusal = pytest.raises(BusyError, match="is writing here; wait until it is done")
     with folder.locked(), refusal, MachineFolder(folder.path).locked(patience=0):
         pass
@@ -91,7 +91,7 @@ def test_two_writers_are_told_apart(folder: MachineFolder) -> None:
         pass
 
 
-def test_a_folder_without_machine_toml_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_machine_toml_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"no machine\.toml in it"):
         MachineFolder(tmp_path)
 

@@ -51,7 +51,7 @@ def holding(folder: MachineFolder) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def test_whoever_holds_it_is_named(folder: MachineFolder) -> None:
+def test_the_holder_is_named(folder: MachineFolder) -> None:
     with holding(folder) as process:
         holder = rf"`lobewatch sensors` \(process {process.pid}, since \d\d:\d\d\)"
         with pytest.raises(BusyError, match=f"m: {holder} is writing here; wait until it is done$"):
@@ -78,7 +78,7 @@ def test_a_name_that_a_killed_program_has_left_is_not_believed(folder: MachineFo
 
 
 @pytest.mark.parametrize("content", [None, b"", b'{"command":"lobew', b'{"command":1}', b"\xff"])
-def test_one_that_has_not_said_its_name_holds_it_all_the_same(folder: MachineFolder, content: bytes | None) -> None:
+def test_one_that_has_not_reported_its_name_holds_it_all_the_same(folder: MachineFolder, content: bytes | None) -> None:
     with holding(folder):
         (folder.path / LOCK_HOLDER_NAME).unlink()
         if content is not None:

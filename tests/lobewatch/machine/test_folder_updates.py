@@ -53,7 +53,7 @@ def test_a_program_is_found_by_how_its_name_begins() -> None:
         find_by_name(tables, "B")
 
 
-def test_what_was_heard_stands_in_both_copies_with_all_that_it_is_judged_by(shop: Shop) -> None:
+def test_what_was_detected_is_in_both_copies_with_all_that_it_is_evaluated_by(shop: Shop) -> None:
     told = ("--speed", 12000, "--depth", 2, "--chatter", "--frequency", 1650, "--date", "2026-02-01T10:00:00")
     assert run(shop, "observe", "--program", "A", *told, "--json").exit_code == 0
     (cut,) = shop.logbook.cuts
@@ -76,7 +76,7 @@ FEED = ("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
 """Change of machine.toml after which power says a Kt."""
 
 
-def test_the_power_of_a_cut_stands_in_its_line_with_the_kt_that_it_says(shop: Shop) -> None:
+def test_the_power_of_a_cut_is_in_its_line_with_the_kt_that_it_says(shop: Shop) -> None:
     """Slot at 12 900 rpm, 1.5 mm deep: 1.1 times Kt of 1400 N/mm2 and edges of 42 N/mm on half a turn."""
     shop.edit(*FEED)
     rate = 4 * 215 * 1.5e-3 * 0.02
@@ -128,7 +128,7 @@ def test_a_kte_that_is_known_counts_in_its_ratio_to_kt(shop: Shop) -> None:
         ("0.65", "--power 0.65: with the Kt of 700 N/mm2"),
     ],
 )
-def test_a_power_that_cannot_be_is_refused_and_not_kept(shop: Shop, power: str, said: str) -> None:
+def test_a_power_that_cannot_be_is_rejected_and_not_kept(shop: Shop, power: str, said: str) -> None:
     shop.edit(*FEED)
     shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 700")
     shop.edit("[reference_cut]", "[drive]\npower_kw = 15\n\n[reference_cut]")
@@ -145,7 +145,7 @@ def test_a_power_that_cannot_be_is_refused_and_not_kept(shop: Shop, power: str, 
         ("10", "feed_per_tooth_mm = 0.1\ncorner_radius_mm = 12", "whose radial depth changes on its way"),
     ],
 )
-def test_a_power_that_says_nothing_of_kt_is_refused(shop: Shop, radial: str, more: str, said: str) -> None:
+def test_a_power_that_says_nothing_of_kt_is_rejected(shop: Shop, radial: str, more: str, said: str) -> None:
     shop.run(("A", 12900, 1.5), more=more)
     shop.edit("radial_depth_mm = 20\ndirection", f"radial_depth_mm = {radial}\ndirection")
     result = run(shop, "observe", "--program", "A", "--stable", "--power", "3.0")
@@ -168,7 +168,7 @@ def test_a_power_that_says_nothing_of_kt_is_refused(shop: Shop, radial: str, mor
         (("--program", "A", "--stable", "--date", "2126-01-01"), "lies in the future"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_sentence_and_not_kept(
+def test_what_cannot_be_is_rejected_in_a_sentence_and_not_kept(
     shop: Shop, arguments: tuple[object, ...], said: str
 ) -> None:
     result = run(shop, "observe", *arguments)
@@ -177,7 +177,7 @@ def test_what_cannot_be_is_refused_in_a_sentence_and_not_kept(
     assert not (shop.path / "journal.jsonl").exists()
 
 
-def test_a_tool_never_tapped_and_an_earlier_word_at_the_same_point_are_said_and_all_is_kept(shop: Shop) -> None:
+def test_a_tool_never_tapped_and_an_earlier_word_at_the_same_point_are_reported_and_all_is_kept(shop: Shop) -> None:
     first = run(shop, "observe", "--program", "A", "--stable", "--json")
     again = run(shop, "observe", "--program", "A", "--chatter", "--speed", 12910, "--json")
     other = run(shop, "observe", "--program", "A", "--chatter", "--speed", 12500, "--json")
@@ -204,7 +204,7 @@ def test_a_cut_is_taken_out_and_back_and_listed_each_time(shop: Shop) -> None:
     assert "A at 12000 rpm, 1.5 mm: chatter at 1650 Hz, by ear" in run(shop, "history").stdout
 
 
-def test_excluding_a_cut_that_is_none_or_twice_is_refused(shop: Shop) -> None:
+def test_excluding_a_cut_that_is_none_or_twice_is_rejected(shop: Shop) -> None:
     store_cut(shop.folder, heard(shop))
     exclude_entry(shop.folder, "c1", "no")
     with pytest.raises(ValueError, match="c1: excluded already"):
@@ -234,7 +234,7 @@ def damaged(path: Path) -> None:
 
 
 @pytest.mark.parametrize("harm", [damaged, Path.unlink])
-def test_a_damaged_recording_is_named_and_mended_and_its_word_goes_on_to_count(shop: Shop, harm: Any) -> None:
+def test_a_damaged_recording_is_named_and_mended_and_its_verdict_goes_on_to_count(shop: Shop, harm: Any) -> None:
     store_cut(shop.folder, heard(shop), signal())
     path = shop.path / "cuts" / "c1.h5"
     harm(path)
@@ -275,7 +275,7 @@ def test_nothing_is_kept_while_the_journal_is_damaged(shop: Shop) -> None:
     assert not (shop.path / "cuts").exists()
 
 
-def test_what_cannot_be_told_teaches_nothing_and_is_kept(shop: Shop) -> None:
+def test_what_cannot_be_classified_teaches_nothing_and_is_kept(shop: Shop) -> None:
     store_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
     logbook = Logbook.open(shop.path)
     assert logbook.cuts == ()

@@ -87,7 +87,7 @@ DAMAGES: dict[str, tuple[Callable[[MachineFolder], object], str, list[str]]] = {
 
 
 @pytest.mark.parametrize("what", DAMAGES)
-def test_damage_is_named_and_what_is_said_to_mend_it_does(what: str, folder: MachineFolder) -> None:
+def test_damage_is_named_and_what_is_reported_to_mend_it_does(what: str, folder: MachineFolder) -> None:
     harm, name, left = DAMAGES[what]
     assert verify(folder.path).remarks == ()
     harm(folder)
@@ -192,7 +192,7 @@ def test_a_tap_that_an_ended_program_has_not_entered_is_entered(
     assert verify(folder.path).entered == ()
 
 
-def test_an_edited_machine_file_is_told_with_its_first_line(folder: MachineFolder) -> None:
+def test_an_edited_machine_file_is_reported_with_its_first_line(folder: MachineFolder) -> None:
     text = folder.toml.read_text("utf-8")
     folder.toml.write_text(f"# edited\n{text}", "utf-8")
     (folder.path / "report.html").write_text("mine")
@@ -233,7 +233,7 @@ def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) 
     assert len(before) == 4
 
 
-def test_a_history_that_could_not_be_stored_is_not_said_to_be_made(
+def test_a_history_that_could_not_be_stored_is_not_reported_to_be_made(
     folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> int:

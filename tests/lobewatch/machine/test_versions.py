@@ -44,7 +44,7 @@ def test_a_folder_of_version_1_without_its_journal_is_rebuilt(old: MachineFolder
     assert len(MachineFolder(old.path).taps()) == 2
 
 
-def test_a_newer_version_is_refused_in_a_sentence(folder: MachineFolder) -> None:
+def test_a_newer_version_is_rejected_in_a_sentence(folder: MachineFolder) -> None:
     path = folder.path / "taps" / "tap_1.h5"
     with h5py.File(path, "r+") as file:
         file.attrs["version"] = 9
@@ -52,7 +52,9 @@ def test_a_newer_version_is_refused_in_a_sentence(folder: MachineFolder) -> None
         read_tap(path)
 
 
-def test_a_tap_of_a_newer_version_is_left_out_and_said(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tap_of_a_newer_version_is_left_out_and_reported(
+    folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
     read = read_tap
 
     def newer(path: Path) -> TapTest:

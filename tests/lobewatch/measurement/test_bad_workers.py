@@ -95,7 +95,7 @@ def machine(path: Path, n_programs: int = 0) -> Logbook:
     return Logbook.open(path)
 
 
-def test_answers_of_no_form_are_worked_out_here(spoiled: Callable[..., None], caplog: pytest.LogCaptureFixture) -> None:
+def test_answers_of_no_form_are_computed_here(spoiled: Callable[..., None], caplog: pytest.LogCaptureFixture) -> None:
     for spoil in (lambda _: None, lambda _: 3, lambda _: (1, 2), lambda _: ("lobewatch", 1, 2)):
         spoiled(spoil, whole=True)
         assert [*share_work(abs, [-1, -2, -3], CLUSTER)] == [1, 2, 3]
@@ -179,7 +179,7 @@ def test_a_damaged_tap_file_of_a_worker_is_never_stored(
     ],
     ids=["cut short", "more", "list", "nothing", "swapped", "text for a word", "NaN", "text for a limit"],
 )
-def test_wrong_words_on_programs_are_never_stored(
+def test_wrong_labels_on_programs_are_never_stored(
     tmp_path: Path, spoiled: Callable[..., None], caplog: pytest.LogCaptureFixture, spoil: Spoil
 ) -> None:
     logbook = machine(tmp_path / "m", 2)

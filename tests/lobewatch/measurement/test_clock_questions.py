@@ -75,7 +75,7 @@ def test_a_clock_at_1970_makes_no_new_baseline_until_it_is_accepted(shop: Shop) 
     assert (standing.status, standing.series_of("reference", "x").first_time) == ("good", began)
 
 
-def test_the_question_stands_in_the_journal_and_outlives_the_history(shop: Shop) -> None:
+def test_the_question_is_in_the_journal_and_outlives_the_history(shop: Shop) -> None:
     began = shop.start - timedelta(days=3)
     tap_id = live(shop.logbook, began, began)
     shop.folder.history_path.unlink(missing_ok=True)
@@ -84,7 +84,7 @@ def test_the_question_stands_in_the_journal_and_outlives_the_history(shop: Shop)
     assert shop.logbook.questions == {}
 
 
-def test_a_test_of_2031_is_said_once_the_clock_is_right(shop: Shop) -> None:
+def test_a_test_of_2031_is_reported_once_the_clock_is_right(shop: Shop) -> None:
     then = datetime(2031, 1, 1, tzinfo=UTC)
     tap_id = live(shop.logbook, then, then)
     found = shop.logbook.status(shop.start + timedelta(days=30))

@@ -41,7 +41,7 @@ def codes(tap: TapFit) -> list[str]:
     return [remark.code for remark in tap.remarks]
 
 
-def test_a_named_sensor_is_taken_off_and_its_doubt_is_in_the_errors() -> None:
+def test_a_named_sensor_is_taken_off_and_its_uncertainty_is_in_the_errors() -> None:
     tap = fit(measured(), "sensor_mass_g = 10", 'mounting = "wax"')
     for mode, true in zip(tap.modes, MODES, strict=True):
         low, high = mode.interval().T
@@ -67,7 +67,7 @@ def test_nobody_named_it_asks_where_ten_grams_matter() -> None:
 
 
 @pytest.mark.parametrize(("stiffness", "fall", "also"), [(3e7, -1.4, " and stiffness by +0 %"), (4e4, -79, "")])
-def test_what_ten_grams_would_do_is_said_however_light_the_structure_is(
+def test_what_ten_grams_would_do_is_reported_however_light_the_structure_is(
     stiffness: float, fall: float, also: str
 ) -> None:
     """Expect f / sqrt(1 + m / M) for M = K / w^2 = 0.338 kg and m = 0.45 g."""
@@ -76,7 +76,7 @@ def test_what_ten_grams_would_do_is_said_however_light_the_structure_is(
     assert f"would change the frequency by {fall} %{also}, more than its interval" in asked.text
 
 
-def test_of_a_response_beside_the_hammer_nothing_is_taken_off() -> None:
+def test_of_a_response_next_to_the_hammer_nothing_is_taken_off() -> None:
     against = measured(0.0, sign=-1.0)
     tap = fit(against, "sensor_mass_g = 10", 'mounting = "glue"')
     assert codes(tap) == ["sensor-mass-stays"]
@@ -103,7 +103,7 @@ def test_a_magnet_reads_k_14_percent_low_at_2600_hz_and_says_so() -> None:
         ('mounting = "tape"', "mounting"),
     ],
 )
-def test_what_no_sensor_is_is_refused(line: str, words: str) -> None:
+def test_what_no_sensor_is_is_rejected(line: str, words: str) -> None:
     with pytest.raises(DataError, match=words):
         parse_machine_file(f"{TOML}{line}")
 

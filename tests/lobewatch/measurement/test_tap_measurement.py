@@ -69,7 +69,7 @@ def test_a_bearing_stiffness_of_no_bearing_is_unknown(machine: Machine) -> None:
     assert [remark.text for remark in measurement.remarks if "is outside 0.1 to 100000 N/um" in remark.text]
 
 
-def test_a_small_mode_against_the_hammer_is_left_out_and_said(machine: Machine) -> None:
+def test_a_small_mode_against_the_hammer_is_left_out_and_reported(machine: Machine) -> None:
     """13 Hz with K < 0, its peak 8 % of that of a perfect mode, once took all lobes of the direction away."""
     large, zeta = 1 / (2 * TRUE.stiffness * TRUE.damping_ratio), 0.05
     measurement = measured(machine, Mode(60.0, zeta, -1 / (2 * zeta * 0.08 * large)), TRUE)

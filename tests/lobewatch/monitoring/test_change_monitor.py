@@ -40,7 +40,7 @@ def first_fall(watched: ChangeMonitor) -> SeriesChange:
 
 
 @pytest.mark.quick
-def test_the_reference_series_is_judged_as_printed() -> None:
+def test_the_reference_series_is_evaluated_as_printed() -> None:
     found = monitor_drops(Readings(FALLING))
     assert np.all(np.isnan(found.scores[:8]))
     expected = [0.8163, 0.9261, 0.9079, 1.0457, 3.0248, 4.4853, 5.3025, 6.1634, 6.8471, 7.4790, 8.0282, 8.5846]
@@ -150,7 +150,7 @@ def test_what_the_temperature_explains_is_no_fall() -> None:
 
 
 @pytest.mark.quick
-def test_a_fall_beside_the_temperature_is_found() -> None:
+def test_a_fall_next_to_the_temperature_is_found() -> None:
     random = np.random.default_rng(4)
     warmth = random.uniform(18.0, 30.0, 30)
     y = -0.02 * warmth - 0.5 * (np.arange(30) >= 18) + random.normal(0, 0.03, 30)

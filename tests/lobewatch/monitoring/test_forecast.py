@@ -44,12 +44,12 @@ def test_a_level_passed_is_reached_already_and_a_far_one_not_before_the_horizon(
     assert found.crossing_dates(-30.0) == DateRange(np.inf, np.inf, np.inf)
 
 
-def test_nothing_is_foretold_beyond_twice_the_history_or_the_horizon() -> None:
+def test_nothing_is_predicted_beyond_twice_the_history_or_the_horizon() -> None:
     assert forecast_series(MONTHS, FALLING, 1e6).dates[[0, -1]] == pytest.approx([19.0, 57.0])
     assert forecast_series(MONTHS, FALLING, 30.0).dates[-1] == pytest.approx(30.0)
 
 
-def test_a_straight_line_is_foretold_as_its_textbook_interval_says() -> None:
+def test_a_straight_line_is_predicted_as_its_textbook_interval_says() -> None:
     random = np.random.default_rng(5)
     dates = np.sort(random.uniform(0, 30, 40))
     y = -0.5 * dates + random.normal(0, 0.2, 40)
@@ -115,7 +115,7 @@ def test_the_temperature_is_no_decay() -> None:
 
 
 @pytest.mark.parametrize("dates", [np.arange(7.0), np.zeros(0), np.zeros(9)])
-def test_too_short_a_history_foretells_nothing(dates: Floats) -> None:
+def test_too_short_a_history_predicts_nothing(dates: Floats) -> None:
     with pytest.raises(ValueError, match="a forecast needs 8"):
         forecast_series(dates, np.zeros(dates.size), 60.0)
 

@@ -133,7 +133,7 @@ def share_held(pairs: list[tuple[History, DateRange]]) -> float:
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("course", FLOORS)
-def test_80_percent_ranges_hold_the_date_of_a_course(course: str) -> None:
+def test_80_percent_ranges_hold_the_date_of_a_trend(course: str) -> None:
     pairs = study(course, 300)
     designs = [share_held(pairs[300 * n : 300 * (n + 1)]) for n in range(3)]
     print(course, *(f"{share:.0f}" for share in designs))  # noqa: T201
@@ -168,6 +168,6 @@ def test_the_range_of_a_straight_line_is_at_most_1_6_times_as_wide(design: str) 
     assert 0.9 <= wide / narrow <= 1.6
 
 
-def test_most_ranges_hold_the_date_whatever_the_course() -> None:
+def test_most_ranges_hold_the_date_whatever_the_trend() -> None:
     pairs = [pair for course in FLOORS for pair in study(course, 3)]
     assert share_held(pairs) >= 60

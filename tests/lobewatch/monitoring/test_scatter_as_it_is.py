@@ -113,7 +113,7 @@ def test_one_bad_clamping_asks_for_another_and_hardly_ever_raises_an_alarm() -> 
     assert raised <= 8
 
 
-def test_another_operator_is_no_fall_and_a_fall_beside_the_operators_is_found() -> None:
+def test_another_operator_is_no_fall_and_a_fall_next_to_the_operators_is_found() -> None:
     random = np.random.default_rng(3)
     who = tuple("AABB" * 9)
     apart = np.where(np.array(who) == "B", -0.5, 0.0)

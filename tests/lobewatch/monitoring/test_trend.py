@@ -41,7 +41,7 @@ def test_tests_of_a_day_are_one_point_the_mean_of_two_the_median_of_three() -> N
     assert found[1].error == pytest.approx(0.01 / np.sqrt(2))
 
 
-def test_a_test_confirms_another_of_the_same_day_where_the_tool_was_clamped_anew() -> None:
+def test_a_test_confirms_another_of_the_same_day_where_the_tool_was_reclamped() -> None:
     asked = monthly(FALLING[:14])
     again = asked[-1]._replace(time=asked[-1].time + timedelta(hours=1))
     same_clamping, reclamped = judged([*asked, again]), judged([*asked, again._replace(reclamped=True)])
@@ -76,7 +76,7 @@ def test_a_spindle_that_falls_from_the_beginning_started_where_its_line_does() -
     assert found.spread == pytest.approx(0.05, abs=0.01)
 
 
-def test_a_rise_is_told_apart() -> None:
+def test_a_rise_is_distinguished() -> None:
     found = judged(monthly(-FALLING))
     assert found.open_drop is None
     assert found.detection.rise is not None
@@ -84,14 +84,14 @@ def test_a_rise_is_told_apart() -> None:
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])
-def test_a_short_series_foretells_nothing(n: int) -> None:
+def test_a_short_series_predicts_nothing(n: int) -> None:
     found = judged(monthly(FALLING[:n]))
     assert found.forecast is None
     assert found.spread == 0.0
     assert found.start == pytest.approx(max(FALLING[:n][:3]))
 
 
-def test_a_machine_that_was_not_tapped_for_long_is_not_foretold() -> None:
+def test_a_machine_that_was_not_tapped_for_long_is_not_predicted() -> None:
     series = monthly(FALLING)
     late = fit_trend(series, series[-1].time + timedelta(days=3 * 30 * 19))
     assert late.is_stale
@@ -106,7 +106,7 @@ def test_ten_taps_of_an_hour_tapped_years_ago_are_taken_as_they_are() -> None:
     assert fit_trend(days_apart, START + timedelta(days=9000)).is_stale
 
 
-def test_of_a_very_long_series_the_newest_thousand_points_are_judged() -> None:
+def test_of_a_very_long_series_the_newest_thousand_points_are_evaluated() -> None:
     steps = np.repeat([0.0, -1.0, -1.0], [12, 600, 600]) + np.tile([0.05, -0.05], 606)
     found = judged(monthly(steps))
     assert len(found.points) == 1000

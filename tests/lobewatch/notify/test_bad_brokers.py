@@ -78,7 +78,7 @@ def test_a_command_ends_though_the_broker_never_acknowledges(tmp_path: Path) -> 
         assert json.loads((mill / "unsent.json").read_text())["topic"] == "lobewatch/a/standing"
 
 
-def test_a_plant_of_bad_brokers_is_told_in_parallel_and_the_good_one_too(
+def test_a_fleet_of_bad_brokers_is_notified_in_parallel_and_the_good_one_too(
     tmp_path: Path, unaccepted: str, unused: str, mosquitto: Mosquitto
 ) -> None:
     mosquitto.start()

@@ -48,7 +48,7 @@ def test_a_command_that_alters_a_machine_tells_how_it_stands(mill: Path, mosquit
     assert not (mill / "unsent.json").exists()
 
 
-def test_what_a_killed_broker_was_not_told_goes_with_the_next_command(mill: Path, mosquitto: Mosquitto) -> None:
+def test_what_a_killed_broker_was_not_sent_goes_with_the_next_command(mill: Path, mosquitto: Mosquitto) -> None:
     shutil.copytree(mill, mill.parent / "n")
     mosquitto.start()
     assert run("event", mill, "oiled").exit_code == 0
@@ -66,7 +66,7 @@ def test_what_a_killed_broker_was_not_told_goes_with_the_next_command(mill: Path
     assert not (mill / "unsent.json").exists()
 
 
-def test_a_wrong_password_is_said_and_fails_nothing(
+def test_a_wrong_password_is_reported_and_fails_nothing(
     mill: Path, mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mosquitto.start("lobewatch", "right-one")
@@ -102,14 +102,14 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
     "address", ["mqtt://", "http://host", "mqtt://host:99999", "mqtt://host/a/#", "host", "mqtt://me:secret@/x"]
 )
 @pytest.mark.quick
-def test_what_is_no_address_is_refused_without_telling_the_password(address: str) -> None:
+def test_what_is_no_address_is_rejected_without_telling_the_password(address: str) -> None:
     with pytest.raises(DataError, match="is no address of a broker; give mqtt://HOST") as refused:
         parse_machine_file(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
     assert "secret" not in str(refused.value)
 
 
 @pytest.mark.quick
-def test_user_password_port_and_prefix_stand_in_the_address() -> None:
+def test_user_password_port_and_prefix_are_in_the_address() -> None:
     found = parse_broker("mqtts://me:p%40ss@broker.example/hall/")
     assert found == ("mqtts", "broker.example", 8883, "me", "p@ss", "hall")
     assert "p@ss" not in found.address

@@ -50,7 +50,7 @@ def test_the_named_host_gets_the_password(
         ("[", "mqtt://me@[fd00::1]", "[fd00::1]:1883"),
     ],
 )
-def test_no_other_host_gets_it_and_what_to_set_is_said(
+def test_no_other_host_gets_it_and_what_to_set_is_reported(
     monkeypatch: pytest.MonkeyPatch, named: str, address: str, place: str
 ) -> None:
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
@@ -82,7 +82,7 @@ def test_a_copied_machine_does_not_take_the_password_elsewhere(
         assert said.stderr.count("is not used") == 1
 
 
-def test_the_named_broker_is_told_with_the_password(
+def test_the_named_broker_is_notified_with_the_password(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, password: str
 ) -> None:
     with FakeBroker(obey) as ours:

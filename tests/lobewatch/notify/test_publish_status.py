@@ -35,7 +35,7 @@ def standing(mosquitto: Mosquitto, key: str) -> dict[str, Any]:
     return message
 
 
-def test_what_has_not_changed_is_told_once_a_day(plant: Path, mosquitto: Mosquitto) -> None:
+def test_what_has_not_changed_is_reported_once_a_day(plant: Path, mosquitto: Mosquitto) -> None:
     first = standing(mosquitto, "a")
     assert (first["light"], first["alarms"]) == ("good", [])
     assert run("status", plant, "--notify").exit_code == 0
@@ -49,7 +49,9 @@ def test_what_has_not_changed_is_told_once_a_day(plant: Path, mosquitto: Mosquit
 
 
 @pytest.mark.parametrize("damage", ["torn", "missing"])
-def test_a_machine_that_cannot_be_judged_is_told_as_unknown(plant: Path, mosquitto: Mosquitto, damage: str) -> None:
+def test_a_machine_that_cannot_be_evaluated_is_reported_as_unknown(
+    plant: Path, mosquitto: Mosquitto, damage: str
+) -> None:
     toml = plant / "a" / "machine.toml"
     if damage == "torn":
         toml.write_text(toml.read_text("utf-8")[:-200] + "= torn", "utf-8")
@@ -66,7 +68,7 @@ def test_a_machine_that_cannot_be_judged_is_told_as_unknown(plant: Path, mosquit
     assert standing(mosquitto, "b")["light"] == "good"
 
 
-def test_a_machine_that_is_gone_is_told_as_unknown_until_it_is_forgotten(plant: Path, mosquitto: Mosquitto) -> None:
+def test_a_machine_that_is_gone_is_reported_as_unknown_until_it_is_forgotten(plant: Path, mosquitto: Mosquitto) -> None:
     with pytest.raises(ValueError, match="--forget a: is there"):
         run("status", plant, "--notify", "--forget", "a")
     shutil.rmtree(plant / "a")

@@ -69,7 +69,7 @@ def test_straight_lines_do_not_lock_in_a_slender_beam() -> None:
     assert first_frequency(slender, 40, "linear", "rigid") == pytest.approx(exact, rel=2e-3)
 
 
-def test_less_than_an_element_a_segment_is_refused() -> None:
+def test_less_than_an_element_a_segment_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"elements=1 .* 2 segments"):
         first_frequency(beam(), 1, "linear")
 

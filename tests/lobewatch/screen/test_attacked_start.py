@@ -224,7 +224,7 @@ def test_twenty_starts_at_once_after_a_failure_begin_one_test(tmp_path: Path, mo
     assert len(begun) == 2
 
 
-def test_nothing_of_a_cut_is_told_to_strangers(cut: CutScreenServer) -> None:
+def test_nothing_of_a_cut_is_shown_to_strangers(cut: CutScreenServer) -> None:
     for changed, status in (
         ({"Authorization": None}, 401),
         ({"Authorization": "Bearer wrong-token-wrong"}, 401),
@@ -253,7 +253,7 @@ def test_half_sent_requests_do_not_keep_the_page_of_a_cut_waiting(cut: CutScreen
         assert ask(cut, "GET", "/access") == (200, {"may_alter": True})
 
 
-def test_what_is_no_request_is_refused_by_the_screen_of_a_cut(
+def test_what_is_no_request_is_rejected_by_the_screen_of_a_cut(
     cut: CutScreenServer, capfd: pytest.CaptureFixture[str]
 ) -> None:
     for nonsense in (

@@ -25,7 +25,9 @@ Session = Any
 """ScriptedSession of tests/conftest.py."""
 
 
-def test_the_word_counter_and_reason_follow_the_test(browser: Browser, session: Session, server: ScreenServer) -> None:
+def test_the_verdict_counter_and_reason_follow_the_test(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
     browser.open(server.url)
     browser.see("text", "CHECKING")
     session.check()
@@ -96,7 +98,7 @@ def test_without_the_token_the_page_says_which_address_to_open(opened: Browser, 
     opened.complaints()
 
 
-def test_a_lost_server_is_said_and_found_again(opened: Browser, session: Session) -> None:
+def test_a_lost_server_is_reported_and_found_again(opened: Browser, session: Session) -> None:
     session.show(TapStep.TAP)
     with ScreenServer(session) as server:
         opened.open(server.url)
@@ -151,7 +153,7 @@ def test_a_test_is_started_and_watched_from_the_dashboard(
             browser.see("machines", "START y")
 
 
-def test_a_real_test_from_the_first_tap_to_the_light(
+def test_a_real_test_from_the_first_tap_to_the_status(
     browser: Browser, tmp_path: Path, tapper: Callable[..., HammeredStructure]
 ) -> None:
     make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")

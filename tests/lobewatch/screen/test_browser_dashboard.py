@@ -114,7 +114,7 @@ def test_the_dashboard_breaks_no_rule_of_accessibility(
 
 
 @pytest.mark.parametrize("size", [(768, 1024), (390, 800)])
-def test_nothing_is_beside_a_narrower_screen(
+def test_nothing_is_outside_a_narrower_screen(
     browser: Browser, dashboard: DashboardServer, size: tuple[int, int]
 ) -> None:
     browser.open(dashboard.url, size)
@@ -123,7 +123,7 @@ def test_nothing_is_beside_a_narrower_screen(
     assert row(browser, "worn").find_element(By.CLASS_NAME, "report").rect["height"] >= 44
 
 
-def test_a_click_shows_one_light_or_those_to_be_tapped(browser: Browser, dashboard: DashboardServer) -> None:
+def test_a_click_shows_one_status_or_those_to_be_tapped(browser: Browser, dashboard: DashboardServer) -> None:
     browser.open(dashboard.url)
     browser.see("filter", "? UNKNOWN 10")
     browser.part("filter-warn").click()
@@ -160,7 +160,7 @@ def test_start_is_there_where_a_port_is_and_its_error_in_its_line(
     opened.complaints()
 
 
-def test_an_interrupted_test_across_is_gone_on_with_or_begun_anew(browser: Browser, tmp_path: Path) -> None:
+def test_an_interrupted_test_across_is_resumed_or_restarted(browser: Browser, tmp_path: Path) -> None:
     machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
     folder = MachineFolder(tmp_path / "mill")
     pulse = np.exp(-((np.arange(1000) / 30 - 5) ** 2))
@@ -209,7 +209,7 @@ def test_lines_change_go_and_come_and_the_others_stay_as_they_are(
         browser.see("filter", "All 3")
 
 
-def test_a_page_that_outlives_its_server_takes_all_anew(browser: Browser, tmp_path: Path) -> None:
+def test_a_page_that_outlives_its_server_takes_all_again(browser: Browser, tmp_path: Path) -> None:
     for name in ("a", "b"):
         machine(tmp_path / name)
     with DashboardServer(tmp_path, token="a-token-of-a-test") as server:

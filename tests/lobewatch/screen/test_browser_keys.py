@@ -63,7 +63,7 @@ def test_undo_by_the_large_button(
     browser.wait(lambda: not browser.part("undo").is_enabled())
 
 
-def test_what_cannot_be_undone_is_said(opened: Browser, session: Session, server: ScreenServer) -> None:
+def test_what_cannot_be_undone_is_reported(opened: Browser, session: Session, server: ScreenServer) -> None:
     session.hit()
     session.refusal = "this hit is too old to take back"
     opened.open(server.url)

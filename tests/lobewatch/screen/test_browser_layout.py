@@ -100,7 +100,9 @@ def contrast(*colours: str) -> float:
     return (max(lights) + 0.05) / (min(lights) + 0.05)
 
 
-def test_the_word_is_told_to_those_who_cannot_see_it(browser: Browser, session: Session, server: ScreenServer) -> None:
+def test_the_verdict_is_reported_to_those_who_cannot_see_it(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
     browser.open(server.url)
     browser.see("text", "CHECKING")
     assert browser.part("word").get_attribute("aria-live") == "assertive"

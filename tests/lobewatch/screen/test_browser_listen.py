@@ -87,7 +87,7 @@ def letters(browser: Browser) -> float:
 @pytest.mark.parametrize(
     ("depth_mm", "kind", "text"), [(2.0, "stable", "STABLE"), (7.0, "chatter", "CHATTER")], ids=["stable", "chatter"]
 )
-def test_the_page_goes_from_air_to_the_word_by_itself(
+def test_the_page_goes_from_air_to_the_verdict_by_itself(
     browser: Browser,
     folder: MachineFolder,
     capsys: pytest.CaptureFixture[str],

@@ -177,7 +177,7 @@ def reports(new_shop: Callable[[Path], Shop], tmp_path_factory: pytest.TempPathF
     return [one, fleet]
 
 
-def test_the_first_screen_fits_with_its_words_and_pictures_beside_each_other(
+def test_the_first_screen_fits_with_its_words_and_pictures_next_to_each_other(
     browser: Browser, reports: list[Path]
 ) -> None:
     browser.open(reports[0].as_uri(), (1280, 657))

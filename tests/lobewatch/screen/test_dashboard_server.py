@@ -126,7 +126,7 @@ def test_what_is_damaged_is_found_in_the_background(tmp_path: Path) -> None:
     assert (row["light"], "daq.json: " in row["note"]) == ("warn", True)
 
 
-def test_an_interrupted_test_is_gone_on_with_or_begun_anew(tmp_path: Path) -> None:
+def test_an_interrupted_test_is_resumed_or_restarted(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill", hits=3)
     with hammered(folder) as device:
         toml = folder.toml.read_text("utf-8").replace("[daq]", f'[daq]\nport = "{device.port}"')
@@ -158,7 +158,7 @@ def test_overdue_is_never_good(shop: Path) -> None:
     assert found.next_step == "Take the tap test that is due."
 
 
-def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
+def test_another_machine_toml_is_analysed_again(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
     assert "mode-lost" not in [remark.code for remark in Logbook.open(folder.path).status(DAY).remarks]
@@ -206,7 +206,7 @@ def test_who_may_only_watch_reads_lists_and_reports_and_starts_nothing(shop: Pat
 
 
 @pytest.mark.parametrize("body", [None, {}, {"direction": "z"}, {"direction": "x", "port": "/dev/null"}, [1], "x"])
-def test_what_cannot_be_started_is_refused(shop: Path, body: object) -> None:
+def test_what_cannot_be_started_is_rejected(shop: Path, body: object) -> None:
     with DashboardServer(shop) as server:
         status, answer = ask(server, "POST", "/machines/a-new/start", body)
         assert status == 400

@@ -89,7 +89,7 @@ def test_of_many_machines_only_the_row_that_has_changed_is_sent(mills: Path, sho
         assert page.machines == whole(server)
 
 
-def test_a_machine_that_goes_or_comes_is_told_to_the_page_and_to_prometheus(mills: Path) -> None:
+def test_a_machine_that_goes_or_comes_is_announced_to_the_page_and_to_prometheus(mills: Path) -> None:
     with DashboardServer(mills) as server:
         page = Page(server)
         page.refresh()

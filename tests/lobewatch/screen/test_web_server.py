@@ -103,13 +103,13 @@ def test_every_token_is_another() -> None:
 
 @pytest.mark.parametrize("token", ["", "short", "has a space in it", "ä" * 20, "x#y" * 9])
 @pytest.mark.quick
-def test_a_token_that_does_not_fit_into_an_address_is_refused(session: Session, token: str) -> None:
+def test_a_token_that_does_not_fit_into_an_address_is_rejected(session: Session, token: str) -> None:
     with pytest.raises(ValueError, match="12 to 200 characters"):
         ScreenServer(session, token=token)
 
 
 @pytest.mark.parametrize("given", [None, "Bearer wrong-token-wrong", "Bearer ", "", f"Bearer {TOKEN}x", "Bearer \xe4"])
-def test_without_the_token_nothing_is_altered_or_told(session: Session, given: str | None) -> None:
+def test_without_the_token_nothing_is_altered_or_reported(session: Session, given: str | None) -> None:
     session.hit()
     with ScreenServer(session, token=TOKEN) as server:
         for method, path in (("POST", "/undo"), ("POST", "/stop"), ("GET", "/access"), ("GET", "/feed")):
@@ -139,7 +139,7 @@ class Watched:
     def choose(self, key: str, tool: str = "") -> None: ...
 
 
-def test_nothing_is_looked_at_while_nothing_changes(session: Session) -> None:
+def test_nothing_is_inspected_while_nothing_changes(session: Session) -> None:
     """But once a second, for the sign of life; what has changed is sent at once, and a page that is gone not told."""
     watched, kinds = Watched(session), []
 
@@ -204,7 +204,7 @@ def test_another_page_may_not_alter_anything_even_with_the_token(session: Sessio
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "[", ""])
-def test_a_foreign_name_that_points_here_is_refused(session: Session, host: str) -> None:
+def test_a_foreign_name_that_points_here_is_rejected(session: Session, host: str) -> None:
     with ScreenServer(session, token=TOKEN) as server:
         for path in ("/", "/access", "/static/screen.js"):
             assert ask(server, "GET", path, Host=host, Origin=None)[0] in (400, 403)
@@ -247,7 +247,7 @@ def test_what_is_no_request_is_answered_with_400_and_nothing_in_the_terminal(
     assert capfd.readouterr() == ("", "")
 
 
-def test_what_the_session_refuses_is_said_in_one_sentence(session: Session) -> None:
+def test_what_the_session_rejects_is_reported_in_one_sentence(session: Session) -> None:
     session.refusal = "there is no hit to take back"
     with ScreenServer(session, token=TOKEN) as server:
         status, answer, _ = ask(server, "POST", "/undo")
@@ -373,7 +373,7 @@ def test_at_the_end_the_last_state_is_sent_and_the_feed_closed_as_such(session: 
     follow(server, talk)
 
 
-def test_a_port_in_use_is_said(session: Session) -> None:
+def test_a_port_in_use_is_reported(session: Session) -> None:
     with ScreenServer(session) as server:
         port = int(server.origin.rpartition(":")[2])
         with (
@@ -384,7 +384,7 @@ def test_a_port_in_use_is_said(session: Session) -> None:
 
 
 @pytest.mark.parametrize("listen", ["a..b", "x" * 70, "no such name"])
-def test_an_address_that_cannot_be_is_said(session: Session, listen: str) -> None:
+def test_an_address_that_cannot_be_is_reported(session: Session, listen: str) -> None:
     with pytest.raises(DeviceError, match=f"cannot listen on {listen} port 0"), ScreenServer(session, listen=listen):
         pass
 
@@ -395,7 +395,7 @@ def test_no_address_is_not_every_address(session: Session) -> None:
 
 
 @pytest.mark.parametrize("listen", ["0.0.0.0", "::", "LocalHost"])
-def test_the_address_told_is_one_that_answers(session: Session, listen: str) -> None:
+def test_the_address_reported_is_one_that_answers(session: Session, listen: str) -> None:
     if listen == "::" and not socket.has_dualstack_ipv6():
         pytest.skip("no IPv6 here")
     with ScreenServer(session, listen=listen) as server:

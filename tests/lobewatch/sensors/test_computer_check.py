@@ -42,7 +42,7 @@ def worst(machine: MachineFolder | None = None, now: float = NOW) -> list[Findin
 
 
 @pytest.mark.quick
-def test_nothing_is_said_of_a_healthy_computer(healthy: Path) -> None:
+def test_nothing_is_reported_of_a_healthy_computer(healthy: Path) -> None:
     assert worst() == []
     text = {finding.subject: finding.text for finding in check_computer(None, NOW)}
     assert text["port /dev/ttyACM0"] == "BOARD-1 answers (taps)"

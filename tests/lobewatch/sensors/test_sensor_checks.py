@@ -114,7 +114,7 @@ class CommonNoise:
         return np.take(self._signals, first_scan + np.arange(n_scans), axis=1, mode="wrap")
 
 
-def test_the_list_names_channels_rate_and_doubts(sensors: Sensors, folder: MachineFolder) -> None:
+def test_the_list_names_channels_rate_and_uncertainties(sensors: Sensors, folder: MachineFolder) -> None:
     old = replace(FORCE, calibration_date="2020-01-15")
     absurd = replace(ACCELERATION, sensitivity=100.0, calibration_date="")
     code, out, err = sensors(silence, (old, absurd), rate=102400.0, realtime=True)
@@ -153,7 +153,7 @@ def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
     assert error in said["remarks"]
 
 
-def test_a_device_at_half_its_rate_is_refused(
+def test_a_device_at_half_its_rate_is_rejected(
     folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_MEASUREMENT_SECONDS", 3.0)
@@ -177,7 +177,7 @@ def test_a_hung_mass_whose_sensitivities_are_right(sensors: Sensors) -> None:
     assert "To change" not in out
 
 
-def test_a_hung_mass_heavier_than_said_shows_what_to_change(sensors: Sensors) -> None:
+def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors) -> None:
     """The wrong mass stands for a wrong sensitivity: F/(m a) cannot tell them apart, and the text says so."""
     code, out, err = sensors(hung_mass(1.1 * MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
     assert code == 0, err

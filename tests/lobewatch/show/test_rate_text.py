@@ -21,6 +21,6 @@ pytestmark = pytest.mark.quick
         (Rate(-0.0001, -0.2, 0.3), "+0.00 % a month now (-0.20 to +0.30, 95 %)"),
     ],
 )
-def test_a_rate_lies_within_its_interval(rate: Rate, text: str) -> None:
+def test_a_rate_is_within_its_interval(rate: Rate, text: str) -> None:
     trend: Any = SimpleNamespace(rate=rate)
     assert rate_text(trend) == text

@@ -86,7 +86,9 @@ def test_what_the_button_did_before_the_stream_counts_for_nothing(
     ("scans", "presses"),
     [((0,), 1), ((0, 100), 1), ((0, 200, 400), 1), ((0, 300), 2), ((500, 900, 100), 3), ((7, 7), 1)],
 )
-def test_presses_are_told_from_bouncing_by_the_clock_of_the_device(scans: tuple[int, ...], presses: int) -> None:
+def test_presses_are_distinguished_from_bouncing_by_the_clock_of_the_device(
+    scans: tuple[int, ...], presses: int
+) -> None:
     button = Button(1000.0)
     events = deque(Event(EventKind.BUTTON, scan=scan) for scan in scans)
     assert button.count_presses(events) == presses

@@ -76,7 +76,7 @@ def test_one_cut_is_taken_with_the_air_around_it() -> None:
     assert told == ["hearing the spindle turn in air; begin the cut"]
 
 
-def test_a_cut_that_is_too_short_is_passed_over() -> None:
+def test_a_cut_that_is_too_short_is_skipped() -> None:
     found, told = record(Stream(sound((1.0, False), (0.3, True), (2.0, False), (1.5, True), (1.0, False))))
     assert found.duration == pytest.approx(1.0 + 1.5 + 0.3, abs=0.1)
     assert len(told) == 2
@@ -92,12 +92,12 @@ def test_scans_lost_in_the_part_that_is_kept_are_counted() -> None:
     assert record(Stream(signal, lost_at=round(2.0 * RATE / 256)))[0].lost_scans == 50
 
 
-def test_no_cut_in_time_is_said() -> None:
+def test_no_cut_in_time_is_reported() -> None:
     with pytest.raises(DataError, match="no cut was heard in 3 s"):
         record(Stream(sound((5.0, False))), 3.0)
 
 
-def test_a_dead_sensor_and_a_missing_one_are_said() -> None:
+def test_a_dead_sensor_and_a_missing_one_are_reported() -> None:
     with pytest.raises(DeviceError, match="hears nothing"):
         record(Stream(np.zeros(round(3 * RATE))))
     with pytest.raises(DeviceError, match="end of its range"):
@@ -106,7 +106,7 @@ def test_a_dead_sensor_and_a_missing_one_are_said() -> None:
         record(Stream(sound((1.0, False)), channels=CHANNELS[:1]))
 
 
-def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path: Path) -> None:
+def test_a_cut_that_comes_through_the_port_is_reported_with_its_true_speed(tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     folder = MachineFolder(tmp_path / "m")
     setting = find_cut_setting(folder.machine, "A: slot at 12 600 rpm", 12600.0, 2.0)

@@ -45,7 +45,9 @@ def test_the_band_of_a_data_sheet_counts_before_that_of_the_sample_rate(folder: 
     assert check_detectable_band(at_rest(25600.0), machine_of(folder, "sensor_band_hz = 2000"), "reference").passed
 
 
-def test_without_a_model_the_band_that_is_followed_counts_and_without_both_that_is_said(folder: MachineFolder) -> None:
+def test_without_a_model_the_band_that_is_followed_counts_and_without_both_that_is_reported(
+    folder: MachineFolder,
+) -> None:
     machine = machine_of(folder)
     band = check_detectable_band(at_rest(3200.0), machine, "no such tool")
     assert not band.passed
@@ -74,7 +76,7 @@ def test_noise_that_a_filter_keeps_to_a_narrower_band_is_denser_there(folder: Ma
     assert needed[1] / needed[0] == pytest.approx(2.0, rel=0.05)
 
 
-def test_hits_of_the_amplitude_that_is_told_give_that_error() -> None:
+def test_hits_of_the_amplitude_that_is_reported_give_that_error() -> None:
     rate, frequency, damping, noise = 3200.0, 500.0, 0.03, 0.5
     size, time = min_decay_amplitude(frequency, damping, noise / np.sqrt(rate / 2)), np.arange(512) / rate
     w, found = 2 * np.pi * frequency, []

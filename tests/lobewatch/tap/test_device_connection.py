@@ -131,7 +131,7 @@ def test_a_device_with_another_sensor_does_not_go_on_with_the_test(
         session.run()
 
 
-def test_a_taken_port_is_told_at_the_start(
+def test_a_taken_port_is_reported_at_the_start(
     folder: MachineFolder, tapper: Tapper, channels: Pair, session_of: OpenSession
 ) -> None:
     with TapsEmulator(tapper(), channels, RATE, realtime=False) as device, TapsSource(device.port):
@@ -142,7 +142,7 @@ def test_a_taken_port_is_told_at_the_start(
     assert "another program uses it" in session.state.reason
 
 
-def test_a_fault_that_the_device_reports_is_told_and_its_end_too(
+def test_a_fault_that_the_device_reports_is_reported_and_its_end_too(
     folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     def fault() -> str:
@@ -155,7 +155,7 @@ def test_a_fault_that_the_device_reports_is_told_and_its_end_too(
     assert told.index("acceleration: cable open") < told.index("The sensor is connected again.")
 
 
-def test_samples_that_end_are_told(
+def test_samples_that_end_are_reported(
     folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     session = session_of(folder, lambda: simulated(tapper(), channels, seconds=2.5), guided=False)

@@ -116,14 +116,14 @@ def test_an_eccentric_tool_has_teeth_on_a_circle() -> None:
     assert runout[0] == pytest.approx(-runout[2])
 
 
-def test_a_machine_without_a_model_is_refused(folder: MachineFolder, tmp_path: Path) -> None:
+def test_a_machine_without_a_model_is_rejected(folder: MachineFolder, tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.mkdir()
     text = folder.toml.read_text("utf-8")
     (plain / "machine.toml").write_text(text[: text.index("\n[spindle]")], "utf-8")
 
 
-def test_a_driver_that_cannot_be_emulated_is_refused(folder: MachineFolder) -> None:
+def test_a_driver_that_cannot_be_emulated_is_rejected(folder: MachineFolder) -> None:
     setting = find_cut_setting(folder.machine, PROGRAM, None, None)
     with pytest.raises(DataError, match="cannot be emulated"):
         emulate_cut(folder, replace(find_driver("taps"), emulate=None), setting)
@@ -138,7 +138,7 @@ def test_a_driver_that_cannot_be_emulated_is_refused(folder: MachineFolder) -> N
         (("--cut", "reference cut"), "--speed is missing"),
     ],
 )
-def test_a_cut_that_cannot_be_is_refused_by_the_command(
+def test_a_cut_that_cannot_be_is_rejected_by_the_command(
     folder: MachineFolder, options: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["lobewatch", "emulate", "taps", str(folder.path), *options])

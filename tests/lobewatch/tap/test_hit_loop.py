@@ -66,7 +66,7 @@ def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
     assert len(read_hits(path)) == 10
 
 
-def test_good_is_not_said_of_a_hit_taken_back(
+def test_good_is_not_reported_of_a_hit_withdrawn(
     folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     def watch(state: TapState) -> None:
@@ -138,7 +138,7 @@ def failing_at(calls: set[int], function: Callable[..., Any]) -> Callable[..., A
     return called
 
 
-def test_a_hit_on_which_the_judging_fails_is_refused_and_kept_and_the_test_goes_on(
+def test_a_hit_on_which_the_judging_fails_is_rejected_and_kept_and_the_test_goes_on(
     folder: MachineFolder,
     tapper: Tapper,
     channels: Pair,
@@ -177,7 +177,7 @@ def test_a_first_hit_that_cannot_be_compared_with_the_others_counts_no_more(
     assert tap.flags == (HitFlags.OK, HitFlags.NOT_EVALUATED, *[HitFlags.OK] * 9)
 
 
-def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
+def test_a_hit_without_which_the_mean_fails_is_rejected_and_not_in_it(
     folder: MachineFolder,
     tapper: Tapper,
     channels: Pair,

@@ -60,7 +60,7 @@ def tapped(
     return build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
 
 
-def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> None:
+def test_the_status_follows_the_fall_of_the_frequency(folder: MachineFolder) -> None:
     first = tapped(folder, 0, 1720.0)
     assert first.status == "warn"
     assert "1720" in first.texts[0]

@@ -35,7 +35,7 @@ def test_trial_hits_choose_what_is_open_and_do_not_count(
     assert len(tap.hits) == 10
 
 
-def test_a_refused_trial_hit_says_what_is_wrong_with_it(
+def test_a_rejected_trial_hit_says_what_is_wrong_with_it(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     states: list[TapState] = []

@@ -72,7 +72,7 @@ def test_the_command_says_what_shows_nothing_and_what_is_no_cut(
         assert reason in capsys.readouterr().err
 
 
-def test_three_taps_through_a_device_settle_to_which_side_the_modes_lie(shop: Shop) -> None:
+def test_three_taps_through_a_device_decide_to_which_side_the_modes_lie(shop: Shop) -> None:
     shop.edit("hits = 10 ", "hits = 4 ")
     table = shop.folder.machine.spindle
     assert table is not None

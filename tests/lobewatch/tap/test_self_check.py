@@ -84,7 +84,7 @@ def test_lost_scans_and_a_full_disk(channels: Pair) -> None:
     assert said["samples"].startswith("512 scans lost")
 
 
-def test_the_longest_stretch_without_hits_is_looked_at(channels: Pair) -> None:
+def test_the_longest_stretch_without_hits_is_inspected(channels: Pair) -> None:
     force, response = np.zeros(TIME.size), np.zeros(TIME.size)
     for at in (0.2, 0.75):
         start = round(at * RATE)
@@ -103,6 +103,6 @@ def test_the_resting_level_is_that_of_short_stretches(channels: Pair) -> None:
     assert estimate_resting_rms(record(channels, response=100.0), 512) == pytest.approx(2.0, rel=0.03)
 
 
-def test_a_record_without_codes_is_refused() -> None:
+def test_a_record_without_codes_is_rejected() -> None:
     with pytest.raises(ValueError, match="needs a record with converter codes"):
         run_self_check(Hit(np.zeros(100), np.zeros(100), 100.0), 1.0, 10**10)

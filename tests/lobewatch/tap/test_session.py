@@ -80,7 +80,7 @@ def test_a_saved_test_is_called_saved_whatever_is_wrong_with_the_others(
     assert session.state.word is TapStep.FAILED
 
 
-def test_a_saved_test_that_is_damaged_at_once_is_told_without_the_other_damage(
+def test_a_saved_test_that_is_damaged_at_once_is_reported_without_the_other_damage(
     folder: MachineFolder,
     tapper: Tapper,
     channels: Pair,
@@ -112,7 +112,7 @@ def test_a_saved_test_that_is_damaged_at_once_is_told_without_the_other_damage(
         (MemoryError("no room"), RuntimeError),
     ],
 )
-def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
+def test_a_full_disk_or_a_mistake_of_ours_is_reported_and_costs_no_hit(
     failure: Exception,
     told: type[Exception],
     folder: MachineFolder,
@@ -140,7 +140,7 @@ def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
     assert sum(hit.earlier for hit in session.state.hits) == 3
 
 
-def test_a_full_disk_is_told_before_the_first_hit(
+def test_a_full_disk_is_reported_before_the_first_hit(
     folder: MachineFolder,
     tapper: Tapper,
     channels: Pair,
@@ -182,7 +182,7 @@ def test_a_disk_that_fills_up_meanwhile_does_not_end_the_test(
     assert list(folder.spool.iterdir()) == []
 
 
-def test_a_stopped_test_is_gone_on_with_by_the_set_up_it_began_with(
+def test_a_stopped_test_is_resumed_by_the_set_up_it_began_with(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     def stop(state: TapState) -> None:

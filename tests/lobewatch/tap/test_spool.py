@@ -85,7 +85,7 @@ def damage(path: Path, how: Callable[[bytes], bytes] = flipped) -> bytes:
 
 @pytest.mark.parametrize("how", DAMAGES)
 @pytest.mark.parametrize("number", [0, 1, 3])
-def test_a_damaged_hit_is_set_aside_and_the_others_are_gone_on_with(
+def test_a_damaged_hit_is_set_aside_and_the_others_are_resumed(
     how: str, number: int, interrupted: Path, open_folder: MachineFolder
 ) -> None:
     content = damage(interrupted / f"{number:04d}.h5", DAMAGES[how])
@@ -98,7 +98,7 @@ def test_a_damaged_hit_is_set_aside_and_the_others_are_gone_on_with(
     assert begun_again(open_folder).damaged == []
 
 
-def test_it_is_said_once_kept_after_the_end_and_no_sound_hit_is_written_over(
+def test_it_is_reported_once_kept_after_the_end_and_no_sound_hit_is_written_over(
     interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
 ) -> None:
     damage(interrupted / "0001.h5")
@@ -114,7 +114,7 @@ def test_it_is_said_once_kept_after_the_end_and_no_sound_hit_is_written_over(
     assert [path.suffix for path in open_folder.spool.iterdir()] == [".damaged"]
 
 
-def test_a_test_of_which_nothing_is_left_is_begun_anew_and_that_is_said(
+def test_a_test_of_which_nothing_is_left_is_restarted_and_that_is_reported(
     interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
 ) -> None:
     for path in interrupted.glob("*.h5"):
@@ -125,7 +125,7 @@ def test_a_test_of_which_nothing_is_left_is_begun_anew_and_that_is_said(
     assert session.state.resumed.count(".h5.damaged") == 4
 
 
-def test_a_damaged_set_up_is_chosen_anew(interrupted: Path, open_folder: MachineFolder) -> None:
+def test_a_damaged_set_up_is_chosen_again(interrupted: Path, open_folder: MachineFolder) -> None:
     damage(interrupted / "setup.json", lambda content: content[:-5])
     tap = begun_again(open_folder)
     assert tap.trigger is None
@@ -133,9 +133,7 @@ def test_a_damaged_set_up_is_chosen_anew(interrupted: Path, open_folder: Machine
     assert [path.name for path in tap.damaged] == [f"{interrupted.name}-setup.json.damaged"]
 
 
-def test_a_hit_taken_back_after_another_was_set_aside_is_that_hit(
-    interrupted: Path, open_folder: MachineFolder
-) -> None:
+def test_a_hit_withdrawn_after_another_was_set_aside_is_that_hit(interrupted: Path, open_folder: MachineFolder) -> None:
     damage(interrupted / "0000.h5")
     begun_again(open_folder).exclude(1, HitFlags.UNDONE, "")
     again = begun_again(open_folder)
@@ -206,7 +204,7 @@ def test_an_altered_figure_of_the_set_up_is_found(interrupted: Path, open_folder
     assert begun_again(open_folder).trigger is None
 
 
-def test_other_interrupted_tests_are_told_and_kept(
+def test_other_interrupted_tests_are_reported_and_kept(
     interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
 ) -> None:
     later = datetime.now(UTC) + timedelta(hours=13)
@@ -260,11 +258,11 @@ def resumed(spool: Path, folder: MachineFolder, seed: int) -> bool:
     return tap.id == spool.name and len(tap.hits) >= count - 1 and len(tap.hits) + len(tap.damaged) >= count
 
 
-def test_damaged_tests_are_gone_on_with(interrupted: Path, open_folder: MachineFolder) -> None:
+def test_damaged_tests_are_resumed(interrupted: Path, open_folder: MachineFolder) -> None:
     assert all(resumed(interrupted, open_folder, seed) for seed in range(12))
 
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-def test_130_damaged_tests_are_gone_on_with(interrupted: Path, open_folder: MachineFolder) -> None:
+def test_130_damaged_tests_are_resumed(interrupted: Path, open_folder: MachineFolder) -> None:
     assert sum(resumed(interrupted, open_folder, seed) for seed in range(130)) == 130

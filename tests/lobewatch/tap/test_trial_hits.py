@@ -110,7 +110,7 @@ def test_the_level_stays_clear_of_the_noise_and_below_the_hits(channels: Pair) -
     assert louder.trigger.level == pytest.approx(100.0, rel=0.05)
 
 
-def test_ranges_that_do_not_fit_are_told_with_the_one_that_would(channels: Pair) -> None:
+def test_ranges_that_do_not_fit_are_reported_with_the_one_that_would(channels: Pair) -> None:
     soft = TrialHits(TapTable(), baseline(channels))
     for _ in range(2):
         soft.add(hit(channels, 0.03, peak=20.0))

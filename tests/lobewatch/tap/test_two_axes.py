@@ -151,7 +151,7 @@ def test_a_second_sensor_that_tells_nothing_costs_the_driving_point_nothing(
     assert session.measurement.followed.frequency == pytest.approx(FREQUENCY[0], rel=1e-3)
 
 
-def test_hits_that_only_the_second_sensor_cannot_follow_are_refused_in_it_alone(short: Shop) -> None:
+def test_hits_that_only_the_second_sensor_cannot_follow_are_rejected_in_it_alone(short: Shop) -> None:
     seen = list[int]()
 
     def some(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -182,7 +182,7 @@ def test_a_disk_that_is_full_for_the_tap_across_leaves_the_other(short: Shop, mo
     assert [entry.direction for entry in short.logbook.taps] == ["x"]
 
 
-def test_an_interrupted_test_goes_on_with_what_both_sensors_felt(short: Shop) -> None:
+def test_an_interrupted_test_resumes_what_both_sensors_felt(short: Shop) -> None:
     about = Circumstances("m", datetime.now(UTC), "reference", "x", "", short.folder.toml_text)
     session = TapSession(short.folder, lambda: Bench(felt(X)), about, guided=False)
     session.wakes.add(lambda: session.stop() if session.state.good == 3 else None)

@@ -52,7 +52,7 @@ def reached(trend: Trend, percent: float) -> tuple[float, float, float]:
     return earliest, probable, latest
 
 
-def test_a_steady_fall_is_an_alarm_and_its_date_is_foretold(folder: MachineFolder) -> None:
+def test_a_steady_fall_is_an_alarm_and_its_date_is_predicted(folder: MachineFolder) -> None:
     found = judged(planned(folder, WearScenario.STEADY))
     assert open_fall(found).kind == "slope"
     assert found.forecast is not None
@@ -62,14 +62,14 @@ def test_a_steady_fall_is_an_alarm_and_its_date_is_foretold(folder: MachineFolde
     assert reached(found, 2.0)[1] == pytest.approx(true - (MONTHS - 1), abs=0.5)
 
 
-def test_a_step_is_called_one_and_nothing_is_foretold(folder: MachineFolder) -> None:
+def test_a_step_is_called_one_and_nothing_is_predicted(folder: MachineFolder) -> None:
     found = judged(planned(folder, WearScenario.STEP))
     assert (open_fall(found).kind, open_fall(found).point) == ("step", 12)
     assert open_fall(found).size == pytest.approx(-100 * math.log(0.98), abs=0.15)
     assert reached(found, 2.0)[1:] == (math.inf, math.inf)
 
 
-def test_an_accelerating_fall_is_foretold_earlier_than_its_mean_rate_says(folder: MachineFolder) -> None:
+def test_an_accelerating_fall_is_predicted_earlier_than_its_mean_rate_says(folder: MachineFolder) -> None:
     found = judged(planned(folder, WearScenario.ACCELERATING))
     assert open_fall(found).kind == "slope"
     assert found.rate is not None
@@ -81,7 +81,7 @@ def test_an_accelerating_fall_is_foretold_earlier_than_its_mean_rate_says(folder
     assert reached(found, 2.0)[1] == pytest.approx(true - (MONTHS - 1), abs=0.5)
 
 
-def test_replaced_bearings_bring_the_frequency_back_and_wear_anew(folder: MachineFolder) -> None:
+def test_replaced_bearings_bring_the_frequency_back_and_wear_again(folder: MachineFolder) -> None:
     wear, taps = SpindleWear.of(folder, MONTHS, WearScenario.REPLACED), planned(folder, WearScenario.REPLACED)
     at = wear.replaced_at
     assert at == 15
@@ -92,7 +92,7 @@ def test_replaced_bearings_bring_the_frequency_back_and_wear_anew(folder: Machin
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_where_nothing_happens_nothing_is_said(folder: MachineFolder, seed: int) -> None:
+def test_where_nothing_happens_nothing_is_reported(folder: MachineFolder, seed: int) -> None:
     found = judged(planned(folder, WearScenario.NONE, seed))
     assert found.open_drop is None
     assert reached(found, 2.0)[1:] == (math.inf, math.inf)
@@ -117,7 +117,7 @@ def test_bad_clampings_are_lower_and_as_many_as_asked(folder: MachineFolder) -> 
     assert 2 <= np.sum(shifts < -0.01) <= 14
 
 
-def test_an_emulated_month_is_seeded_and_falls_with_the_story(folder: MachineFolder) -> None:
+def test_an_emulated_month_is_seeded_and_falls_with_the_scenario(folder: MachineFolder) -> None:
     def frequency(month: int, seed: int = 1) -> float:
         spindle = build_mounted_spindle(folder, WearScenario.STEADY, MONTHS, month, MountingVariation(0.001), seed)
         return float(natural_frequencies(spindle, 1)[0])
@@ -136,7 +136,7 @@ def test_an_emulated_month_has_the_temperature_of_its_season(folder: MachineFold
         assert shift == pytest.approx(-1.5e-4 * warmth, abs=2e-6)
 
 
-def test_the_truth_is_looked_up_by_the_story(folder: MachineFolder) -> None:
+def test_the_truth_is_looked_up_by_the_scenario(folder: MachineFolder) -> None:
     wear = SpindleWear.of(folder, MONTHS, WearScenario.STEADY)
     month = wear.find_month(0.88 * wear.frequency(0))
     assert month is not None
@@ -152,7 +152,7 @@ def test_the_truth_is_looked_up_by_the_story(folder: MachineFolder) -> None:
         (["--temperature", "-1"], "--temperature -1 is not between 0 and 30 K"),
     ],
 )
-def test_a_story_that_cannot_be_is_refused(folder: MachineFolder, options: list[str], said: str) -> None:
+def test_a_scenario_that_cannot_be_is_rejected(folder: MachineFolder, options: list[str], said: str) -> None:
     out = folder.path / "new"
     told = CliRunner().invoke(app, ["demo", "--out", str(out), *options])
     assert told.exit_code != 0
@@ -162,7 +162,7 @@ def test_a_story_that_cannot_be_is_refused(folder: MachineFolder, options: list[
 
 @pytest.mark.long
 @pytest.mark.parametrize("story", [*WearScenario])
-def test_each_story_is_recognised_through_the_whole_chain(folder: MachineFolder, story: WearScenario) -> None:
+def test_each_scenario_is_recognised_through_the_whole_chain(folder: MachineFolder, story: WearScenario) -> None:
     out = folder.path.parent / story
     options = ["--taps", "20", "--story", story, "--scatter", "0.1"]
     made = CliRunner().invoke(app, ["demo", "--out", str(out), *options], catch_exceptions=False)

@@ -107,7 +107,7 @@ def test_commands_answer_without_a_stiffness(command: str, tapped: TapSession, w
     assert "nan" not in run.output.split()
 
 
-def test_what_needs_a_stiffness_refuses_with_the_reason(tapped: TapSession, without_force: MachineFolder) -> None:
+def test_what_needs_a_stiffness_rejects_with_the_reason(tapped: TapSession, without_force: MachineFolder) -> None:
     path = str(without_force.path)
     lobes = CliRunner().invoke(app, ["lobes", path, "--figure", str(without_force.path / "lobes.png")])
     assert isinstance(lobes.exception, DataError)
@@ -120,7 +120,7 @@ def test_what_needs_a_stiffness_refuses_with_the_reason(tapped: TapSession, with
     assert all("no force was measured" in str(program["remarks"]) for program in check["programs"])
 
 
-def test_a_cross_tap_without_force_is_refused(without_force: MachineFolder) -> None:
+def test_a_cross_tap_without_force_is_rejected(without_force: MachineFolder) -> None:
     with pytest.raises(ValueError, match="needs the force"):
         plan_session(without_force, port="/dev/x", direction="xy")
 

@@ -36,7 +36,7 @@ def with_x(x: Measurement | None = None) -> Assembly:
         ("no-modes", ("direction x is tapped, not usable: no mode in the band", "tap x again")),
     ],
 )
-def test_a_direction_that_was_tapped_in_vain_is_not_said_to_be_untapped(code: str, gap: tuple[str, str]) -> None:
+def test_a_direction_that_was_tapped_in_vain_is_not_reported_to_be_untapped(code: str, gap: tuple[str, str]) -> None:
     tool = with_x(measurement("x", code=code))
     assert tool.directions == ("y",)
     assert tool.missing_direction == gap
@@ -45,5 +45,5 @@ def test_a_direction_that_was_tapped_in_vain_is_not_said_to_be_untapped(code: st
     assert remark.cure == gap[1]
 
 
-def test_a_direction_that_was_not_tapped_is_said_to_be_so() -> None:
+def test_a_direction_that_was_not_tapped_is_reported_to_be_so() -> None:
     assert with_x().missing_direction == ("direction x was not tapped", "tap direction x of tool 'T' too")

@@ -27,7 +27,7 @@ def residues(vectors: NDArray[np.float64], modes: list[Mode], near: float) -> ND
 
 
 @pytest.mark.parametrize("angle", [10.0, 45.0, -70.0])
-def test_two_peaks_in_both_are_two_modes_askew_and_one_sign_is_open(angle: float) -> None:
+def test_two_peaks_in_both_are_two_rotated_modes_and_one_sign_is_open(angle: float) -> None:
     vectors = turned_by(angle)
     shown = project_modes(PAIR, vectors)
     axes = find_principal_directions(shown.x, shown.y)
@@ -92,7 +92,7 @@ def test_two_families_of_modes_far_apart_are_two_round_pairs() -> None:
     assert axes.sign_patterns == [None]
 
 
-def test_a_small_mode_beside_a_large_one_makes_no_pair_askew() -> None:
+def test_a_small_mode_next_to_a_large_one_makes_no_rotated_pair() -> None:
     x = [PAIR[0], Mode(1650.0, 0.02, 250e6)]
     assert find_principal_directions(x, [mode.scaled(1.002, 1.05, "") for mode in x]).sign_count == 0
 

@@ -173,7 +173,7 @@ def test_of_a_file_of_version_1_nothing_is_known() -> None:
         ('state = "a\\u001b"', "machine.toml: tap: state='a.*' holds the control character"),
     ],
 )
-def test_a_machine_file_with_other_values_is_refused_in_a_sentence(shop: Shop, line: str, message: str) -> None:
+def test_a_machine_file_with_other_values_is_rejected_in_a_sentence(shop: Shop, line: str, message: str) -> None:
     shop.edit("[tap]\n", f"[tap]\n{line}\n")
     with pytest.raises(DataError, match=message):
         run("history", shop.path)
@@ -188,7 +188,7 @@ def test_a_machine_file_with_other_values_is_refused_in_a_sentence(shop: Shop, l
     ],
 )
 @pytest.mark.parametrize("command", ["tap", "replay"])
-def test_other_conditions_are_refused_before_anything_is_done(
+def test_other_conditions_are_rejected_before_anything_is_done(
     shop: Shop, beam: Path, command: str, options: tuple[str, ...], message: str
 ) -> None:
     source = ("--port", "x") if command == "tap" else (beam,)

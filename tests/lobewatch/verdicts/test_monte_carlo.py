@@ -23,7 +23,7 @@ def mode(frequency: float, stiffness: float, error: float) -> Mode:
     return Mode(frequency, 0.03, stiffness, covariance=np.diag(errors**2))
 
 
-def test_draws_that_chatter_in_a_direction_of_much_to_spare_alone_are_seen() -> None:
+def test_samples_that_chatter_in_a_direction_of_much_to_spare_alone_are_seen() -> None:
     machine, tapped = parse_machine_file('[machine]\nname = "m"\n'), datetime(2026, 1, 1, tzinfo=UTC)
     x, y = [mode(800, 3e7, 0.001)], [mode(990, 5e7, 0.3)]
     tool = Assembly("reference", tapped, "t", x, y, ("x", "y"), None, {}, False, ())

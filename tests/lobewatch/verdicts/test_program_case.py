@@ -38,7 +38,7 @@ def codes(verdict: Any) -> list[str]:
     return [remark.code for remark in verdict.remarks]
 
 
-def test_a_range_is_judged_at_its_worst_inside(judged: Any, shop: Shop) -> None:
+def test_a_range_is_evaluated_at_its_worst_inside(judged: Any, shop: Shop) -> None:
     verdict = judged(0.3, radial="[2, 12]")
     machine, tool = shop.folder.machine, verdict.assembly
     alone = [judged(0.3, radial=f"{depth:g}").limit for depth in (2, 5, 9, 12)]
@@ -90,14 +90,14 @@ def test_wear_lowers_the_low_end_and_nothing_else(judged: Any) -> None:
     assert judged(1.0, radial="20").limit_low == new.limit_low
 
 
-def test_wear_of_the_doubt_holds_for_all_programs(judged: Any, shop: Shop) -> None:
+def test_wear_of_the_uncertainty_holds_for_all_programs(judged: Any, shop: Shop) -> None:
     worn = judged(1.0, 'wear = "worn"', radial="20")
     shop.edit("[speed]", '[doubt]\nwear = "worn"\n\n[speed]')
     assert judged(1.0, radial="20").limit_low == worn.limit_low
     assert judged(1.0, 'wear = "new"', radial="20").limit_low > 1.3 * worn.limit_low
 
 
-def test_what_wear_decides_is_said(judged: Any) -> None:
+def test_what_wear_decides_is_reported(judged: Any) -> None:
     new = judged(0.5, radial="20")
     worn = judged(round(0.93e3 * new.limit_low, 2), 'wear = "worn"', radial="20")
     assert (worn.stability, worn.decisive_cause) == (Stability.DOUBTFUL, "wear")

@@ -130,7 +130,7 @@ def test_a_program_inside_is_not(mill: Shop) -> None:
     assert list(tool_limit_remarks(machine.program[0], machine)) == []
 
 
-def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop) -> None:
+def test_a_tool_that_allows_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop) -> None:
     tapped.put(steel(3000, depth=9, tool=CARBIDE.replace("carbide", "HSS")))
     logbook = tapped.logbook
     (verdict,) = logbook.verdicts()

@@ -42,7 +42,7 @@ def cut(immersion: float = 1.0, depth: float = 1.0, speed: float = 9000.0) -> Pr
 
 
 @pytest.mark.parametrize(("immersion", "depth"), [(1.0, 0.9), (0.2, 4.5)])
-def test_draws_that_are_passed_over_in_other_cuts_are_stable_there(immersion: float, depth: float) -> None:
+def test_samples_that_are_skipped_in_other_cuts_are_stable_there(immersion: float, depth: float) -> None:
     judgement = run_monte_carlo(ProgramCase(cut(immersion, depth), tool(1.3), MACHINE))
     draws = sweep_neighborhood(judgement.samples, 0.02, lambda fall: 1 - fall)
     every, counted = draws.growth(depth / 1e3)[:, 0], draws.critical_growth(depth / 1e3)
@@ -65,7 +65,7 @@ def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
 
 
 @pytest.mark.quick
-def test_few_draws_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
+def test_few_samples_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
     search = SettingSearch(ProgramCase(cut(), tool(), MACHINE))
     judgement = run_monte_carlo(ProgramCase(cut(depth=0.5), tool(), MACHINE))
     program = build_program(cut(depth=0.5), MACHINE)

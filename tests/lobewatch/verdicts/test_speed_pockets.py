@@ -75,7 +75,7 @@ def test_pockets_are_where_they_are_with_force(shop: Shop, new_shop: type[Shop],
     assert [pocket.speed_rpm for pocket in found] == pytest.approx([pocket.speed_rpm for pocket in best], rel=0.01)
 
 
-def test_a_larger_doubt_of_the_frequency_narrows_windows_and_closes_pockets(without_force: Shop) -> None:
+def test_a_larger_uncertainty_of_the_frequency_narrows_windows_and_closes_pockets(without_force: Shop) -> None:
     machine, assembly = without_force.folder.machine, without_force.logbook.assembly("reference")
     (program,) = machine.program
     (best, *_), sure = find_speed_pockets(program, assembly, machine), machine.doubt
@@ -145,7 +145,7 @@ def test_a_program_is_at_best_doubtful(
 
 
 @pytest.mark.parametrize(("chatter", "verdict"), [(None, "doubtful"), (1712.3, "not stable")])
-def test_a_cut_that_the_accelerometer_heard_counts_like_one_by_ear(
+def test_a_cut_that_the_accelerometer_detected_counts_like_one_by_ear(
     chatter: float | None, verdict: str, without_force: Shop, tmp_path: Path
 ) -> None:
     without_force.edit("speed_rpm = 12800", "speed_rpm = 12077")

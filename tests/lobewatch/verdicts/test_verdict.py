@@ -54,7 +54,7 @@ def test_a_twin_that_was_never_tapped_has_the_limit_of_the_tool_tapped(
     assert "predicted" in [remark.code for remark in twin.remarks]
 
 
-def test_a_direction_that_was_not_tapped_is_like_the_other_one_and_widens_the_doubt(shop: Shop) -> None:
+def test_a_direction_that_was_not_tapped_is_like_the_other_one_and_widens_the_uncertainty(shop: Shop) -> None:
     tap_the_model(shop, 1713.0)
     alone = shop.logbook.verdicts()
     shop.tap(

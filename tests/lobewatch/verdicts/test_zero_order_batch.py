@@ -42,7 +42,7 @@ def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_limits_of_askew_modes_are_those_of_zero_order(angle: float) -> None:
+def test_limits_of_rotated_modes_are_those_of_zero_order(angle: float) -> None:
     cut, vectors = Cut(3, 0.5, "up", 7e8, 1e8, feed_angle=angle), [[0.8, 0.6], [0.3, 0.95], [-0.6, 0.8]]
     rows = rows_at_speeds(build_milling_system(X, Y, vectors), cut, np.ones(1))
     shown = project_modes([*X, *Y], vectors)

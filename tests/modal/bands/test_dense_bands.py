@@ -58,7 +58,7 @@ def test_in_noise_both_are_found_within_their_errors(ratio: float) -> None:
         assert all({remark.code for remark in mode.remarks} == {"overlaps"} for mode in found)
 
 
-def test_what_is_too_noisy_to_tell_is_said() -> None:
+def test_what_is_too_noisy_to_tell_is_reported() -> None:
     said = 0
     for seed in range(12):
         found = between(fit_modes(noisy(pair(1.02), 4e-3, seed)))
@@ -71,20 +71,20 @@ def test_what_is_too_noisy_to_tell_is_said() -> None:
     assert said >= 11
 
 
-def test_two_modes_in_noise_of_a_percent_are_said_to_be_several() -> None:
+def test_two_modes_in_noise_of_a_percent_are_reported_to_be_several() -> None:
     codes = [codes_between(noisy(pair(1.02), 1e-2, seed)) for seed in range(12)]
     assert sum("several-modes" in said for said in codes) >= 10
 
 
 @pytest.mark.parametrize("damping", [0.005, 0.03, 0.1])
 @pytest.mark.parametrize("level", [1e-3, 1e-2, 3e-2])
-def test_a_mode_alone_is_never_said_to_be_several(level: float, damping: float) -> None:
+def test_a_mode_alone_is_never_reported_to_be_several(level: float, damping: float) -> None:
     for seed in range(4):
         frf = noisy([Mode(1722.0, damping, 2e7, phase_deg=10.0 * seed)], level, seed)
         assert "several-modes" not in {remark.code for mode in fit_modes(frf) for remark in mode.remarks}
 
 
-def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_said() -> None:
+def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_reported() -> None:
     """The larger has the stiffness that is told; a hundredth of its size beside it is a trifle."""
     modes = [Mode(1722.0, 0.03, 3.5e7), Mode(1722.0 * 1.02, 0.03, 3.5e9)]
     assert "several-modes" not in codes_between(noisy(modes, 1e-3, 0))
@@ -100,7 +100,7 @@ def test_the_gain_of_a_pair_is_what_a_mode_leaves_of_two_near_each_other(turn: c
     assert 0.95 < mode_pair_gain(fit, line, weight, MIN_RESIDUAL_TERMS, 0) / fit.sum_of_squares <= 1
 
 
-def test_opposite_constants_are_told_apart_too() -> None:
+def test_opposite_constants_are_distinguished_too() -> None:
     true = [Mode(1722.0, 0.03, 3.5e7), Mode(1790.0, 0.03, -5e7)]
     assert values(fit_modes(synthesize_frf(true, LINES))) == pytest.approx(values(true), rel=1e-6)
 

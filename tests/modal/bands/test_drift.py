@@ -37,7 +37,7 @@ def followed(count: int, seed: int) -> tuple[int, list[Mode]]:
     return right, wrong
 
 
-def test_the_true_mode_is_followed_beside_drift() -> None:
+def test_the_true_mode_is_followed_next_to_drift() -> None:
     right, wrong = followed(20, 3)
     assert wrong == []
     assert right == 20
@@ -66,7 +66,7 @@ def test_a_drift_against_the_phase_of_a_mode_does_not_hide_it() -> None:
         (Mode(900.0, 0.03, 3e7, np.diag([1.0, 1e-3, 2e7]) ** 2), "mode-not-believed", "stiffness is hardly known"),
     ],
 )
-def test_what_is_not_believed_is_said_with_its_reason(mode: Mode, code: str, words: str) -> None:
+def test_what_is_not_believed_is_reported_with_its_reason(mode: Mode, code: str, words: str) -> None:
     found = select_credible_modes([mode, TRUE, Mode(1900.0, 0.01, -3e7)])
     assert [one.frequency for one in found.modes] == [1500.0]
     assert [one.frequency for one in found.opposed] == [1900.0]

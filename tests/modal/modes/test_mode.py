@@ -45,6 +45,6 @@ def test_joint_covariance_holds_the_phase() -> None:
         ({"phase_deg": 10.0, "damping_ratio": 1.5}, "below 1"),
     ],
 )
-def test_what_is_no_mode_is_refused(wrong: dict[str, float], said: str) -> None:
+def test_what_is_no_mode_is_rejected(wrong: dict[str, float], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         replace(Mode(1500.0, 0.05, 3e7), **wrong)  # type: ignore[arg-type]

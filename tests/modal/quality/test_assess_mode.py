@@ -51,32 +51,32 @@ def test_a_negative_stiffness_says_so(swapped: int) -> None:
 
 
 @pytest.mark.parametrize("degrees", [-40.0, 40.0])
-def test_a_complex_constant_is_measured_and_said(degrees: float) -> None:
+def test_a_complex_constant_is_measured_and_reported(degrees: float) -> None:
     turned = synthesize_frf([MODE], LINES).receptance * np.exp(1j * np.radians(degrees))
     (mode,) = fit_modes(Frf(LINES, turned))
     assert mode.phase_deg == pytest.approx(degrees, abs=0.1)
     assert f"{degrees:+.0f} ±" in remarks(mode)["complex-mode"].text
 
 
-def test_low_coherence_is_said() -> None:
+def test_low_coherence_is_reported() -> None:
     frf = noisy([MODE])
     assert frf.coherence is not None
     said = on_the_only_mode(replace(frf, coherence=np.where(np.abs(LINES - 1722) < 100, 0.8, frf.coherence)))
     assert "0.80" in said["low-coherence"].text
 
 
-def test_an_edge_through_the_peak_is_said() -> None:
+def test_an_edge_through_the_peak_is_reported() -> None:
     assert "500..1750 Hz" in on_the_only_mode(noisy([MODE]), (500.0, 1750.0))["cut-by-edge"].text
     assert "cut-by-edge" not in on_the_only_mode(noisy([MODE]), (500.0, 1900.0))
 
 
-def test_a_record_too_short_for_the_decay_is_said() -> None:
+def test_a_record_too_short_for_the_decay_is_reported() -> None:
     (mode,) = fit_modes(synthesize_frf([Mode(1722.0, 0.001, 3.5e7)], LINES))
     left = 100 * np.exp(-2 * np.pi * 0.001 * 1722.0 / 5.0)
     assert f"{left:.0f} %" in remarks(mode)["still-ringing"].text
 
 
-def test_what_the_fit_leaves_is_said() -> None:
+def test_what_the_fit_leaves_is_reported() -> None:
     clearly = 1 - 0.1 * np.sin(LINES / 12.0)
     (mode, *_) = fit_modes(Frf(LINES, synthesize_frf([MODE], LINES).receptance * clearly))
     assert mode.misfit is not None

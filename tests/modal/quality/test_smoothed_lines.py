@@ -42,7 +42,7 @@ def test_a_narrow_mode_of_smoothed_lines_is_doubtful_and_a_wide_one_is_not() -> 
         assert "smoothed-lines" not in [remark.code for remark in fine.remarks]
 
 
-def test_without_noise_nothing_is_said_and_an_axis_may_be_uneven() -> None:
+def test_without_noise_nothing_is_reported_and_an_axis_may_be_uneven() -> None:
     assert not is_smoothed(frf(0.01, "three", noise=0.0))
     assert not is_smoothed(
         Frf(np.geomspace(10, 3000, 800), synthesize_frf([Mode(800.0, 0.01, 5e7)], F).receptance[:800])

@@ -73,7 +73,7 @@ def test_the_intervals_hold_it_and_the_mode_is_trusted(case: tuple[float, ...]) 
         assert assess_trust(mode) is Trust.TRUSTED
 
 
-def test_what_is_left_is_said_where_it_makes_the_error_of_stiffness() -> None:
+def test_what_is_left_is_reported_where_it_makes_the_error_of_stiffness() -> None:
     said = [
         "still-ringing" in [remark.code for remark in fitted(1500.0, left, 0.0, 0).remarks] for left in (1e-3, 0.01)
     ]

@@ -110,7 +110,7 @@ def test_what_three_quarters_of_two_or_more_others_have_is_trusted_all_the_same(
         ({"remarks": (Remark("smoothed-lines", "", "a text"),)}, "smoothed-lines"),
     ],
 )
-def test_what_is_wrong_in_all_measurements_alike_or_hardly_known_stays_in_doubt(
+def test_what_is_wrong_in_all_measurements_alike_or_hardly_known_stays_uncertain(
     change: dict[str, Any], code: str
 ) -> None:
     assert [rule for rule, _ in trust_rules(replace(GOOD, match_count=(4, 4), **change))] == [code]

@@ -14,7 +14,7 @@ from acquisition import DataError, Description, inspect_file, read_frf, read_rec
 pytestmark = pytest.mark.quick
 
 
-def test_lines_above_the_rows_are_passed_over(tmp_path: Path) -> None:
+def test_lines_above_the_rows_are_skipped(tmp_path: Path) -> None:
     heading = "Freq (Hz),Real (m/N),Imag (m/N)\n"
     path = put(tmp_path / "a.csv", "12,1\n5,2\n7,3\n1,2\n" + heading + rows(F, H.real, H.imag, separator=","))
     with pytest.raises(DataError):
@@ -82,7 +82,7 @@ def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -
     assert "give a spacing > 0 Hz and a start >= 0 Hz" in complaint(path, unit="m/N", spacing=1.0, start=-1.0)
 
 
-def test_a_spacing_is_refused_where_the_file_has_an_axis(tmp_path: Path) -> None:
+def test_a_spacing_is_rejected_where_the_file_has_an_axis(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
     assert "Description.spacing, Description.start: the file holds its frequencies, Freq; leave them out" in complaint(
         path, spacing=1.0
@@ -107,7 +107,7 @@ def test_columns_by_order_number_heading_or_unit(tmp_path: Path, columns: tuple[
     assert is_h(read_frf(path, Description(columns=columns)))
 
 
-def test_columns_that_are_not_all_named_or_called_the_same_are_refused(tmp_path: Path) -> None:
+def test_columns_that_are_not_all_named_or_called_the_same_are_rejected(tmp_path: Path) -> None:
     text = rows(np.arange(59.0), F, H.real, H.imag)
     path = put(tmp_path / "a.txt", text)
     said = complaint(path, columns=("frequency", "real [m/N]", "imag"))

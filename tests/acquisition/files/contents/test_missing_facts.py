@@ -54,7 +54,7 @@ def test_headings_and_options_in_any_unit_give_the_same_receptance(
     assert origins["averages"] == "default"
 
 
-def test_all_that_is_missing_is_said_in_one_message(tmp_path: Path) -> None:
+def test_all_that_is_missing_is_reported_in_one_message(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", rows(F, H.real, H.imag))
     with pytest.raises(
         DataError, match=r'what its columns are .*Description.columns "frequency \[Hz\],real \[m/N\],imag"'
@@ -90,7 +90,7 @@ def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
     assert "the unit of its phase" in complaint(no_phase, unit="um/N")
 
 
-def test_options_that_the_file_contradicts_are_refused(tmp_path: Path) -> None:
+def test_options_that_the_file_contradicts_are_rejected(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", "Freq (Hz)\tReal (um/N)\tImag (um/N)\n" + rows(F, H.real, H.imag))
     assert "Description.unit m/N: the file says um/N" in complaint(path, unit="m/N")
     assert not complaint(path, unit="µm/N")
@@ -135,7 +135,7 @@ def hit_signals(n: int = 20000) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("form", ["%.7f", "float32"])
-def test_a_time_axis_is_judged_as_a_whole(tmp_path: Path, form: str) -> None:
+def test_a_time_axis_is_evaluated_as_a_whole(tmp_path: Path, form: str) -> None:
     time, force, response = hit_signals()
     printed = [float(np.float32(value)) for value in time] if form == "float32" else [float(form % t) for t in time]
     steps = np.diff(printed) * RATE
@@ -158,7 +158,7 @@ def test_a_time_axis_is_judged_as_a_whole(tmp_path: Path, form: str) -> None:
     ],
     ids=["lost", "lost at the end", "twice", "not in order", "backwards", "nan", "drifts"],
 )
-def test_a_time_axis_that_is_not_even_is_refused(tmp_path: Path, spoil: Callable[..., np.ndarray]) -> None:
+def test_a_time_axis_that_is_not_even_is_rejected(tmp_path: Path, spoil: Callable[..., np.ndarray]) -> None:
     time, force, response = hit_signals(2000)
     path = put(tmp_path / "hit.txt", "time_s\tforce_N\tacc_g\n" + rows(spoil(time), force, response, form="%.12g"))
     with pytest.raises(DataError, match=r"uneven|does not rise|time holds 'nan' in line 11,"):
@@ -179,7 +179,7 @@ def test_text_of_two_bytes_a_character(tmp_path: Path) -> None:
     assert read_frf(path).receptance == pytest.approx(H, rel=1e-7)
 
 
-def test_mixed_units_and_damaged_numbers_are_refused(tmp_path: Path) -> None:
+def test_mixed_units_and_damaged_numbers_are_rejected(tmp_path: Path) -> None:
     mixed = put(tmp_path / "a.csv", "Freq (Hz),Real (um/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=","))
     assert "Real is in 'um/N', Imag in 'm/N'; they must be the same" in complaint(mixed)
     volts = put(tmp_path / "b.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + rows(F, H.real, H.imag, separator=","))

@@ -77,7 +77,7 @@ def test_hits_found_within_one_record_are_those_that_were_made_one_by_one(tmp_pa
         ([0.0005, 1.1], 2.2, [2]),
     ],
 )
-def test_a_second_touch_is_no_hit_of_its_own(
+def test_a_double_hit_is_no_hit_of_its_own(
     tmp_path: Path, times: list[float], seconds: float, counts: list[int]
 ) -> None:
     path = put(tmp_path / "a.txt", "time_s\tforce_N\tacc_m/s^2", *tapped(times, seconds))
@@ -208,7 +208,7 @@ def test_the_last_hit_of_signal_calc_is_taken_before_the_window(tmp_path: Path, 
     assert "2 columns are called 'X1'" in whole
 
 
-def test_two_machines_in_one_file_are_refused(tmp_path: Path) -> None:
+def test_two_machines_in_one_file_are_rejected(tmp_path: Path) -> None:
     path = windowed_table(tmp_path / "a.csv", "none")
     convert(path, tmp_path / "a.uff", Description())
     text = (tmp_path / "a.uff").read_text()

@@ -53,7 +53,7 @@ def test_a_pulse_that_is_missing_leaves_the_speed_unknown_not_halved() -> None:
         (pulses(3000.0), 0, "0 pulses a turn; give 1 or more"),
     ],
 )
-def test_what_is_no_tachometer_is_refused(signal: np.ndarray, each: int, text: str) -> None:
+def test_what_is_no_tachometer_is_rejected(signal: np.ndarray, each: int, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         compute_speed_from_pulses(signal, RATE, each)
 

@@ -173,17 +173,17 @@ def assert_read_or_refused(folder: Path, count: int, forks: Forks) -> None:
     assert set(forks.ended_by) <= {"SIGSEGV", "SIGBUS", "SIGABRT", "SIGXCPU"}
 
 
-def test_sixty_damaged_files_are_read_or_refused(tmp_path: Path, forks: Forks) -> None:
+def test_sixty_damaged_files_are_read_or_rejected(tmp_path: Path, forks: Forks) -> None:
     assert_read_or_refused(tmp_path, 60, forks)
 
 
 @pytest.mark.long
 @pytest.mark.timeout(1800)
-def test_five_thousand_damaged_files_are_read_or_refused(tmp_path: Path, forks: Forks) -> None:
+def test_five_thousand_damaged_files_are_read_or_rejected(tmp_path: Path, forks: Forks) -> None:
     assert_read_or_refused(tmp_path, 5000, forks)
 
 
-def test_a_file_that_would_be_read_for_hours_is_refused_after_seconds(tmp_path: Path) -> None:
+def test_a_file_that_would_be_read_for_hours_is_rejected_after_seconds(tmp_path: Path) -> None:
     """The length of a struct without fields, which need no bytes, makes scipy create three million."""
     content = bytearray(saved({"c": {"x": np.array([[{}]], dtype=object)}}))
     at = content.rindex(struct.pack("<4i", 5, 8, 1, 1)) + 8  # behind the tag of the dimensions of the innermost

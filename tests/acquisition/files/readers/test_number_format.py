@@ -73,7 +73,7 @@ def doubtful(decimal: str, force: str, *others: str) -> str:
         (",", "1.234", "Force holds '1.234' in line 2, which may be 1.234 or 1234"),
     ],
 )
-def test_a_number_that_may_be_another_is_refused_where_it_is_used(
+def test_a_number_that_may_be_another_is_rejected_where_it_is_used(
     tmp_path: Path, decimal: str, force: str, message: str
 ) -> None:
     path = put(tmp_path / "a.csv", doubtful(decimal, force))
@@ -98,7 +98,7 @@ def test_a_number_that_may_be_another_is_refused_where_it_is_used(
         (".", "1.234,5", "7", 1234.5),
     ],
 )
-def test_what_another_number_shows_is_not_in_doubt(
+def test_what_another_number_shows_is_not_uncertain(
     tmp_path: Path, decimal: str, force: str, other: str, value: float
 ) -> None:
     path = put(tmp_path / "a.csv", doubtful(decimal, force, other))
@@ -118,7 +118,7 @@ def test_a_person_says_which_sign_is_the_decimal_one(tmp_path: Path, force: str,
     assert read_hits(path, Description(decimal=said))[0].force[1:] == pytest.approx(value, rel=1e-12)
 
 
-def test_a_decimal_sign_that_is_none_or_of_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_decimal_sign_that_is_none_or_of_no_text_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"Description\.decimal dot: is no decimal sign; give comma or point"):
         read_hits(put(tmp_path / "a.csv", doubtful(".", "1,234")), Description(decimal="dot"))
     np.save(tmp_path / "a.npy", np.ones((8, 2)))
@@ -136,7 +136,7 @@ def test_a_decimal_sign_that_is_none_or_of_no_text_is_refused(tmp_path: Path) ->
         (".", "1,234", "7", "Force holds '1,234' in line 3, which may be 1.234 or 1234"),
     ],
 )
-def test_columns_that_contradict_themselves_or_each_other_are_refused(
+def test_columns_that_contradict_themselves_or_each_other_are_rejected(
     tmp_path: Path, decimal: str, force: str, other: str, message: str
 ) -> None:
     text = doubtful(decimal, force, other).splitlines()

@@ -238,7 +238,7 @@ def over_time_sep005(path: Path, time: np.ndarray, force: np.ndarray, response: 
     ],
     ids=["uff", "mat", "mat with a rate", "tdms", "sep005"],
 )
-def test_a_time_that_is_there_twice_is_refused(tmp_path: Path, make: Callable[..., None], suffix: str) -> None:
+def test_a_time_that_is_there_twice_is_rejected(tmp_path: Path, make: Callable[..., None], suffix: str) -> None:
     path, signals = tmp_path / f"a{suffix}", np.random.default_rng(1).normal(size=(2, 64))
     said = Description(unit="g", force_unit="N") if suffix == ".mat" else Description()
     make(path, TWICE, *signals)
@@ -248,7 +248,7 @@ def test_a_time_that_is_there_twice_is_refused(tmp_path: Path, make: Callable[..
     assert "uneven" not in inspect_file(path, said).problems
 
 
-def test_a_frequency_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+def test_a_frequency_that_is_there_twice_is_rejected(tmp_path: Path) -> None:
     twice = np.where(F == 20, 18, F)
     said = Description(columns=("frequency=f", "frf=H"), unit="m/N")
     for make in (scipy.io.savemat, mat_73):
@@ -272,7 +272,7 @@ def one_of_each(folder: Path) -> dict[str, Path]:
     return made
 
 
-def test_a_file_that_is_cut_short_is_refused_or_asks_and_never_gives_other_numbers(tmp_path: Path) -> None:
+def test_a_file_that_is_cut_short_is_rejected_or_asks_and_never_gives_other_numbers(tmp_path: Path) -> None:
     for kind, path in one_of_each(tmp_path).items():
         content, cut = path.read_bytes(), tmp_path / f"cut{path.suffix}"
         said = (
@@ -294,7 +294,7 @@ def test_a_file_that_is_cut_short_is_refused_or_asks_and_never_gives_other_numbe
             assert [hit.force.tolist() for hit in found.hits] == [hit.force.tolist() for hit in whole.hits], (kind, end)
 
 
-def test_a_mat_file_on_which_its_reader_crashes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mat_file_on_which_its_reader_crashes_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"freq": F, "frf": H})
     assert not inspect_file(path, Description(unit="m/N")).problems
@@ -303,7 +303,7 @@ def test_a_mat_file_on_which_its_reader_crashes_is_refused(tmp_path: Path, monke
         inspect_file(path)
 
 
-def test_a_small_mat_file_that_unpacks_to_much_is_refused_unread(tmp_path: Path) -> None:
+def test_a_small_mat_file_that_unpacks_to_much_is_rejected_unread(tmp_path: Path) -> None:
     path = mat_73(tmp_path / "bomb.mat", {"freq": F, "frf": H})
     with h5py.File(path, "r+") as file:
         file.create_dataset("big", shape=(100_000_000,), dtype="f8", chunks=(100_000,), compression="gzip")

@@ -123,7 +123,7 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=FRF:1", "frf [m/N]=FRF:2"))))
 
 
-def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> None:
+def test_what_stands_next_to_signals_over_time_can_be_named(tmp_path: Path) -> None:
     path, time = tmp_path / "a.mat", np.arange(200.0)
     scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
     assert 'Description.columns "frequency [Hz]=w,frf=ts", or [rad/s]' in complaint(path)
@@ -138,7 +138,7 @@ def test_what_stands_beside_signals_over_time_can_be_named(tmp_path: Path) -> No
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
 
 
-def test_siglab_has_volts_over_volts_and_the_units_beside(tmp_path: Path) -> None:
+def test_siglab_has_volts_over_volts_and_the_units_next_to_them(tmp_path: Path) -> None:
     path, cells, channels = tmp_path / "a.vna", np.empty((2, 3), dtype=object), np.empty(3, dtype=object)
     for i, j in np.ndindex(2, 3):
         is_measured = (i, j) in ((0, 1), (0, 2))
@@ -176,7 +176,7 @@ def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
     assert len(read_hits(two, Description(columns=columns, rate=2000))) == 1
 
 
-def test_objects_of_matlab_are_passed_over(tmp_path: Path) -> None:
+def test_objects_of_matlab_are_skipped(tmp_path: Path) -> None:
     """Source: MAT-File Format (The MathWorks), level 5; class 17 is an object that MATLAB alone knows."""
 
     def element(kind: int, content: bytes) -> bytes:
@@ -191,7 +191,7 @@ def test_objects_of_matlab_are_passed_over(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(unit="m/N")))
 
 
-def test_what_stands_in_cells_has_numbers(tmp_path: Path) -> None:
+def test_what_is_in_cells_has_numbers(tmp_path: Path) -> None:
     path, cells = tmp_path / "a.mat", np.empty(2, dtype=object)
     cells[:] = [H, 2 * H]
     scipy.io.savemat(path, {"H": cells, "w": 2 * np.pi * F})
@@ -204,7 +204,7 @@ def test_what_stands_in_cells_has_numbers(tmp_path: Path) -> None:
     assert is_h(read_frf(path, Description(response=2)), 2 * H)
 
 
-def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_array_of_numbers_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     np.save(path, np.array([{"f": F}], dtype=object), allow_pickle=True)
     with pytest.raises(DataError, match=r"a\.npy: cannot be read \(Object arrays .*\); save its numbers alone"):
@@ -225,7 +225,7 @@ def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
 @given(
     st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=4), st.integers(1, 10**6), st.booleans()
 )
-def test_damaged_arrays_are_read_or_refused(
+def test_damaged_arrays_are_read_or_rejected(
     tmp_path: Path, changes: list[tuple[int, int]], end: int, packed: bool
 ) -> None:
     path = tmp_path / "a.npz"

@@ -14,7 +14,7 @@ from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, ro
 from acquisition import DataError, Description, inspect_file, read_frf, read_hits
 
 
-def test_a_file_of_the_force_is_refused_beside_an_frf(tmp_path: Path) -> None:
+def test_a_file_of_the_force_is_rejected_next_to_an_frf(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
     force = put(tmp_path / "b.txt", rows(TIME, FORCE))
     assert "Description.force: the file holds an FRF; leave the option out" in complaint(path, force=force)

@@ -26,7 +26,7 @@ def cells_of(separator: str, *changed: tuple[int, int, str], ends: Sequence[int]
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize(("column", "name"), [(0, "Time"), (1, "Force"), (2, "Acc")])
-def test_a_gap_in_a_column_that_is_used_is_refused_with_its_place(
+def test_a_gap_in_a_column_that_is_used_is_rejected_with_its_place(
     tmp_path: Path, separator: str, column: int, name: str
 ) -> None:
     path = put(tmp_path / "a.csv", cells_of(separator, (40, column, "")))
@@ -43,7 +43,7 @@ def test_a_gap_in_a_column_that_is_not_used_does_not_matter(tmp_path: Path, text
     assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-7)
 
 
-def test_time_with_a_gap_is_left_out_and_the_rate_said(tmp_path: Path) -> None:
+def test_time_with_a_gap_is_left_out_and_the_rate_stated(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", cells_of(",", (40, 0, "")))
     said = Description(columns=("-", "force [N]", "acceleration [m/s^2]", "-"), rate=4000)
     assert read_hits(path, said)[0].force == pytest.approx(FORCE, abs=1e-7)
@@ -68,7 +68,7 @@ def test_columns_are_cut_to_the_shortest_that_is_used(
 
 @pytest.mark.parametrize("n", [1, 3, 5])
 @pytest.mark.parametrize("separator", [",", ";"])
-def test_numbers_beside_the_first_rows_are_notes_where_all_rows_have_as_many_cells(
+def test_numbers_next_to_the_first_rows_are_notes_where_all_rows_have_as_many_cells(
     tmp_path: Path, separator: str, n: int
 ) -> None:
     path = put(tmp_path / "a.csv", cells_of(separator, ends=(400, 400, 400, n)))
@@ -133,7 +133,7 @@ def test_a_file_that_ends_within_its_last_row_is_cut_short(tmp_path: Path, end: 
         read_hits(put(tmp_path / "a.csv", cells_of(",") + end))
 
 
-def test_an_frf_is_cut_where_its_coherence_ends_and_refused_for_a_gap(tmp_path: Path) -> None:
+def test_an_frf_is_cut_where_its_coherence_ends_and_rejected_for_a_gap(tmp_path: Path) -> None:
     lines = [row + "\n" for row in rows(F, H.real, H.imag, 0.9 + 0 * F, separator=",").split()]
     head = "Freq (Hz),Real (m/N),Imag (m/N),Coherence\n"
     ended = [row.replace(",0.9", ",") if i >= 40 else row for i, row in enumerate(lines)]
@@ -183,7 +183,7 @@ def test_lvm_with_gaps_and_thousands_apart(tmp_path: Path, sign: str, other: str
     assert "Acc y is empty in line 33" in complaint(path, response=2)
 
 
-def test_a_cut_is_heard_to_where_its_sensor_ends(tmp_path: Path) -> None:
+def test_a_cut_is_detected_to_where_its_sensor_ends(tmp_path: Path) -> None:
     lines = [f"{t},{a if i < 300 else ''},{3000 if i < 350 else ''}\n" for i, (t, _, a, _) in enumerate(HIT)]
     path = put(tmp_path / "a.csv", "Time (s),Acc (m/s^2),Speed (rpm)\n" + "".join(lines))
     sound = read_cut_recording(path)

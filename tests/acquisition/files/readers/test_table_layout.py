@@ -98,7 +98,7 @@ def test_headings_that_are_comments_or_names_and_units_in_turn(tmp_path: Path, h
     assert is_h(read_frf(put(tmp_path / "a.txt", heading + rows(F, H.real, H.imag))))
 
 
-def test_words_below_the_rows_are_told_and_a_broken_last_row_is_refused(tmp_path: Path) -> None:
+def test_words_below_the_rows_are_reported_and_a_broken_last_row_is_rejected(tmp_path: Path) -> None:
     text = "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag)
     found = inspect_file(put(tmp_path / "a.txt", f"{text}End of file\n")).require_valid()
     assert found.frf is not None
@@ -122,7 +122,7 @@ def test_a_column_of_clock_times_and_empty_columns_are_left_out(tmp_path: Path) 
     )
 
 
-def test_a_column_of_words_is_told(tmp_path: Path) -> None:
+def test_a_column_of_words_is_reported(tmp_path: Path) -> None:
     lines = rows(F, H.real, H.imag).replace("\n", "\tok\n")
     found = inspect_file(
         put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n" + lines)

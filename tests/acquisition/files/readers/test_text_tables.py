@@ -112,7 +112,7 @@ def test_a_line_of_units_may_begin_with_the_word_for_it(tmp_path: Path, label: s
     assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-8)
 
 
-def test_notes_beside_rows_do_not_make_names_and_units_alternate(tmp_path: Path) -> None:
+def test_notes_next_to_rows_do_not_make_names_and_units_alternate(tmp_path: Path) -> None:
     first, *others = HIT.splitlines()
     notes = f"CH No.,CH6,CH8,,,\nUnit,N,cm/s2,,,\n{first},,Mass,2.5\n" + "".join(f"{row},,,\n" for row in others)
     path = put(tmp_path / "a.csv", notes)
@@ -132,7 +132,7 @@ def test_notes_below_the_rows_may_hold_a_number(tmp_path: Path, footer: str) -> 
     assert is_h(read_frf(put(tmp_path / "a.csv", text)))
 
 
-def test_a_row_below_the_rows_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_row_below_the_rows_that_is_none_is_rejected(tmp_path: Path) -> None:
     text = "Freq (Hz),Real (m/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=",") + "sixty,1e-8,2e-8\n"
     with pytest.raises(DataError, match="Freq holds 'sixty' in line 61, which is no number"):
         read_frf(put(tmp_path / "a.csv", text))

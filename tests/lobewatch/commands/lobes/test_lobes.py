@@ -63,7 +63,7 @@ coefficients_percent = 0
 [speed] """
 
 
-def test_the_band_is_as_wide_as_the_doubt(folder: MachineFolder) -> None:
+def test_the_band_is_as_wide_as_the_uncertainty(folder: MachineFolder) -> None:
     tap(folder, 1713.0)
     tap(folder, 1690.0, days=0.2, direction="y")
     edit(folder, "[speed] ", SURE)
@@ -146,7 +146,7 @@ def test_a_predicted_diagram_says_so_and_is_no_waterfall(run: Run, folder: Machi
     assert not Path("q.svg").exists()
 
 
-def test_a_cut_without_limit_is_said_to_have_none(run: Run, folder: MachineFolder) -> None:
+def test_a_cut_without_limit_is_reported_to_have_none(run: Run, folder: MachineFolder) -> None:
     folder = edit(folder, "radial_n_per_mm2 = 500", "radial_n_per_mm2 = 0")
     for days in (0.0, 300.0):
         tap(folder, 1713.0 - days / 10, days)
@@ -167,7 +167,7 @@ def test_the_verdicts_are_those_of_check_whatever_the_chart(run: Run, folder: Ma
         assert {key: checked[one["name"]][key] for key in one} == one
 
 
-def test_an_frf_beside_the_tip_is_refused(run: Run, folder: MachineFolder) -> None:
+def test_an_frf_next_to_the_tip_is_rejected(run: Run, folder: MachineFolder) -> None:
     folder = edit(folder, "position_mm = 0 ", "position_mm = 60 ")
     tap(folder, 1713.0)
     assert run("lobes", "m").code == 0

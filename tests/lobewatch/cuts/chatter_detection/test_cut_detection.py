@@ -31,7 +31,7 @@ def parts_of(signal: Floats, turn: float = TURN) -> CutParts:
 
 
 @pytest.mark.parametrize(("begin", "end"), [(0.5, 1.3), (0.2, 1.0), (1.1, 1.7)])
-def test_a_cut_lies_between_its_times_and_is_listened_to_from_a_tenth_of_a_second_on(begin: float, end: float) -> None:
+def test_a_cut_is_between_its_times_and_is_listened_to_from_a_tenth_of_a_second_on(begin: float, end: float) -> None:
     parts = parts_of(recording(2.0, (begin, end)))
     assert parts.reason == ""
     assert parts.begin == pytest.approx(begin, abs=PIECE)
@@ -56,7 +56,7 @@ def test_a_cut_is_louder_than_air_by_a_fifth_of_a_decade(power: float, reason: s
 
 
 @pytest.mark.parametrize(("length", "reason"), [(0.1, "no-cut"), (0.25, "too-short"), (0.4, "too-short"), (0.7, "")])
-def test_what_is_short_is_a_knock_or_too_short_to_be_told(length: float, reason: str) -> None:
+def test_what_is_short_is_a_knock_or_too_short_to_be_classified(length: float, reason: str) -> None:
     assert parts_of(recording(2.0, (0.6, 0.6 + length))).reason == reason
 
 
@@ -80,7 +80,7 @@ def test_a_short_pause_belongs_to_a_cut_and_a_long_one_makes_two(
     assert [parts.reason for parts in cuts] == [""] * len(times)
 
 
-def test_what_is_too_short_beside_a_cut_is_none() -> None:
+def test_what_is_too_short_next_to_a_cut_is_none() -> None:
     """A chip, an edge that rubs on its way out."""
     parts = parts_of(recording(4.0, (0.5, 2.5), (3.0, 3.3)))
     assert parts.end == pytest.approx(2.5, abs=PIECE)
@@ -91,7 +91,7 @@ def test_what_is_too_short_beside_a_cut_is_none() -> None:
     assert (parts.begin, parts.end) == pytest.approx((2.5, 7.0), abs=PIECE)
 
 
-def test_air_that_gets_a_little_louder_is_no_cut_beside_one_that_is_far_louder() -> None:
+def test_air_that_gets_a_little_louder_is_no_cut_next_to_one_that_is_far_louder() -> None:
     """As on machines: 4 dB from fans and pumps that start and stop, and a cut of 30 dB."""
     signal = recording(8.0, (3.0, 5.0), power=1000.0)
     signal[round(6.0 * RATE) :] *= np.sqrt(2.5)
@@ -116,14 +116,14 @@ def test_silence_of_the_file_is_no_air() -> None:
     assert parts.air.start / RATE == pytest.approx(2.0, abs=2 * PIECE)
 
 
-def test_several_axes_have_the_cut_of_the_one_that_hears_it() -> None:
+def test_several_axes_have_the_cut_of_the_one_that_detects_it() -> None:
     deaf, clear = recording(3.0), recording(3.0, (1.0, 2.0))
     (parts,) = find_cuts(np.stack([deaf, clear]), RATE, TURN)
     assert (parts.begin, parts.end) == pytest.approx((1.0, 2.0), abs=PIECE)
 
 
 @pytest.mark.parametrize(("air", "reason"), [(0.12, "no-air"), (0.3, "")])
-def test_a_cut_needs_air_beside_it(air: float, reason: str) -> None:
+def test_a_cut_needs_air_next_to_it(air: float, reason: str) -> None:
     parts = parts_of(recording(1.5 + air, (air, 1.5 + air)))
     assert parts.reason == reason
 

@@ -76,12 +76,12 @@ def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
 
 
 @pytest.mark.parametrize("off", [-0.045, -0.019, 0.019, 0.045])
-def test_a_speed_up_to_five_percent_beside_the_one_that_was_set_is_found(off: float) -> None:
+def test_a_speed_up_to_five_percent_next_to_the_one_that_was_set_is_found(off: float) -> None:
     (heard,) = evaluate_recording(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
-def test_chatter_is_told_with_its_frequency_and_its_side_bands() -> None:
+def test_chatter_is_reported_with_its_frequency_and_its_side_bands() -> None:
     heard = listen(recorded(a_cut(chatter=1712.3)))
     assert heard.verdict == "chatter"
     assert heard.chatter is not None
@@ -94,14 +94,14 @@ def test_chatter_is_told_with_its_frequency_and_its_side_bands() -> None:
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
-def test_chatter_without_a_tooth_passing_that_is_heard_spaces_its_side_bands_by_the_spindle() -> None:
+def test_chatter_without_a_tooth_passing_that_is_detected_spaces_its_side_bands_by_the_spindle() -> None:
     lines = [(1712.3 + k * TURN, 20.0 * 0.6 ** abs(k)) for k in range(-8, 9)]
     heard = listen(recorded(sines(lines, round(CUT * RATE), np.random.default_rng(2))))
     assert heard.verdict == "chatter"
     assert heard.speed_rpm == pytest.approx(SPEED, rel=1e-4)
 
 
-def test_period_two_is_told_where_teeth_are_odd_and_not_where_they_are_even() -> None:
+def test_period_two_is_reported_where_teeth_are_odd_and_not_where_they_are_even() -> None:
     odd = listen(recorded(a_cut(3, chatter=1.5 * 3 * TURN)), 3)
     assert odd.verdict == "flip"
     assert odd.chatter is not None
@@ -179,7 +179,7 @@ def test_a_tenth_of_a_second_is_too_short() -> None:
     assert listen(recorded(a_cut()[: round(0.35 * RATE)])).reason == "too-short"
 
 
-def test_several_cuts_in_one_recording_are_told_each() -> None:
+def test_several_cuts_in_one_recording_are_reported_each() -> None:
     signal = np.concatenate([recorded(a_cut()), recorded(a_cut(chatter=1712.3))])
     first, second = evaluate_recording(CutRecording(signal, RATE, 4, 0.5, SET))
     assert (first.verdict, second.verdict) == ("stable", "chatter")
@@ -188,19 +188,19 @@ def test_several_cuts_in_one_recording_are_told_each() -> None:
 
 
 @pytest.mark.parametrize("chatters", [0, 1, 2])
-def test_several_axes_have_one_speed_and_the_word_of_the_one_that_hears_chatter(chatters: int) -> None:
+def test_several_axes_have_one_speed_and_the_verdict_of_the_one_that_detects_chatter(chatters: int) -> None:
     axes = [recorded(0.3 * a_cut(chatter=1712.3 if axis == chatters else None), seed=axis) for axis in range(3)]
     (heard,) = evaluate_recording(CutRecording(np.stack(axes), RATE, 4, 0.5, SET))
     assert (heard.verdict, heard.axis) == ("chatter", chatters)
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
-def test_a_cut_without_air_is_refused() -> None:
+def test_a_cut_without_air_is_rejected() -> None:
     cut = recorded(a_cut())[round((AIR - 0.04) * RATE) : round((AIR + CUT) * RATE)]
     assert listen(cut).reason in ("no-air", "no-cut")
 
 
-def test_a_hammer_in_the_cut_is_told_and_one_beside_it_does_no_harm() -> None:
+def test_a_hammer_in_the_cut_is_reported_and_one_next_to_it_does_no_harm() -> None:
     time = np.arange(round(0.05 * RATE)) / RATE
     hit = 900.0 * np.exp(-time / 0.004) * np.sin(2 * np.pi * 1700.0 * time)
     for at, reason in ((AIR + 0.6, "knock"), (0.1, "")):
@@ -209,7 +209,7 @@ def test_a_hammer_in_the_cut_is_told_and_one_beside_it_does_no_harm() -> None:
         assert listen(signal).reason == reason
 
 
-def test_an_overload_in_the_cut_and_lost_scans_are_told() -> None:
+def test_an_overload_in_the_cut_and_lost_scans_are_reported() -> None:
     signal = recorded(a_cut())
     clipped = np.abs(signal) > 0.9 * np.max(signal)
     assert listen(signal, clipped=clipped).reason == "overload"

@@ -52,7 +52,7 @@ def test_sixteen_weak_multiples_of_which_few_stand_clear_have_one_speed() -> Non
     assert speeds == pytest.approx([TURN] * 20, rel=2e-4)
 
 
-def test_find_speed_hears_them_too() -> None:
+def test_find_speed_detects_them_too() -> None:
     speed = find_spindle_speed(noise(1) + comb(list(range(1, 17))), air_of(2), RATE, TEETH, 60 * TURN * 1.02)
     assert speed is not None
     assert speed.frequency == pytest.approx(TURN, rel=2e-4)
@@ -83,7 +83,7 @@ def test_a_part_of_another_comb_is_none() -> None:
     assert np.isnan(sum_of(noise(3) + heard, air_of(4), TURN * 4 / 3))
 
 
-def test_weak_side_bands_of_a_line_beside_a_multiple_are_no_comb() -> None:
+def test_weak_side_bands_of_a_line_next_to_a_multiple_are_no_comb() -> None:
     """All 1 Hz above multiples, four turns apart: another speed fits them nearly, and none exactly."""
     time = np.arange(SIZE) / RATE
     bands = np.sum([WEAK * np.sin(2 * np.pi * (k * TURN + 1.0) * time + k) for k in (6, 10, 14)], axis=0)
@@ -106,7 +106,7 @@ def test_two_lines_are_no_comb() -> None:
     assert np.isnan(sum_of(noise(3) + comb([4, 5], 1.0), air_of(4)))
 
 
-def test_a_speed_that_is_set_25_percent_too_low_is_named_and_no_word_stands_on_it() -> None:
+def test_a_speed_that_is_set_25_percent_too_low_is_named_and_no_verdict_uses_it() -> None:
     """Order 16 of 3/4 of the speed is order 12, a loud line each: the first two tooth passings would be chatter."""
     cut = noise(7) + comb([4, 8, 12, 16], 1.0) + comb([1, 2, 3, 5, 6, 7, 9, 10, 11])
     heard = evaluate_cut(cut, air_of(8), RATE, TEETH, 0.5, 60 * TURN * 0.75)

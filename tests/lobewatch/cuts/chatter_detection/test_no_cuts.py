@@ -49,7 +49,7 @@ def test_music_is_no_cut(seed: int) -> None:
     assert {heard.verdict for heard in heard_in(music, random.uniform(4000, 15000))} == {"cannot tell"}
 
 
-def test_of_two_spindles_that_which_was_set_is_heard_and_the_other_is_no_chatter() -> None:
+def test_of_two_spindles_that_which_was_set_is_detected_and_the_other_is_no_chatter() -> None:
     """The other cuts all the time, at a speed of its own."""
     (heard,) = heard_in(teeth(157.31, 4.0) + between(1.0, 3.0) * teeth() + noise(1))
     assert heard.verdict == "stable"
@@ -65,7 +65,7 @@ def test_a_speed_that_ramps_is_not_taken_for_one(change: float) -> None:
 
 
 @pytest.mark.parametrize(("seconds", "pause"), [(0.7, 0.3), (0.6, 0.6)])
-def test_interrupted_cuts_are_told_each(seconds: float, pause: float) -> None:
+def test_interrupted_cuts_are_reported_each(seconds: float, pause: float) -> None:
     begins = np.arange(0.5, SECONDS - seconds, seconds + pause)
     cuts = heard_in(sum(between(begin, begin + seconds) for begin in begins) * teeth() + noise(3))
     assert [heard.parts.begin for heard in cuts] == pytest.approx(list(begins), abs=0.04)

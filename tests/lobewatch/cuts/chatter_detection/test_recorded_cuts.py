@@ -210,7 +210,7 @@ def share_right(words: Counter[str]) -> float:
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-def test_simulated_cuts_are_told_right() -> None:
+def test_simulated_cuts_are_reported_right() -> None:
     tally = Tally()
     for seed in range(200, 205):
         judge(seed, CUTS // 5, tally)

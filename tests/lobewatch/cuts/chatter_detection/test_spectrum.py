@@ -44,7 +44,7 @@ def test_the_noise_of_a_spectrum_is_its_mean_power_with_and_without_lines() -> N
 
 
 @pytest.mark.parametrize(("apart", "count"), [(6.0, 2), (2.0, 1)])
-def test_two_sines_are_told_apart_where_the_window_can(apart: float, count: int) -> None:
+def test_two_sines_are_distinguished_where_the_window_can(apart: float, count: int) -> None:
     time = np.arange(25600) / RATE
     both = np.sin(2 * np.pi * 1000 * time) + np.sin(2 * np.pi * (1000 + apart) * time + 1.0)
     assert (

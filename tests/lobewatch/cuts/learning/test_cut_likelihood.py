@@ -49,7 +49,7 @@ def middle(mill: Mill) -> SpindleSamples:
 
 
 @pytest.mark.parametrize("depth", [0.9, 0.95, 1.0, 1.03, 1.1])
-def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_words_that_are_wrong(depth: float) -> None:
+def test_a_cut_is_detected_to_chatter_by_a_normal_edge_of_5_percent_but_for_wrong_labels(depth: float) -> None:
     """3 %, of chatter without a frequency 6 %."""
     chance = predicted(0.0, 0.0, math.log(depth)).label_probability[0]
     assert chance == pytest.approx(0.03 + 0.94 * ndtr(math.log(depth) / 0.05))
@@ -112,7 +112,7 @@ def test_a_frequency_that_is_not_predicted_speaks_neither_for_nor_against_a_spin
     assert log_of(CHATTER, predicted(390.0, 10.0)) < unknown < log_of(CHATTER, predicted(150.0, 150.0))
 
 
-def test_period_two_is_told_from_other_chatter_in_nine_of_ten() -> None:
+def test_period_two_is_distinguished_from_other_chatter_in_nine_of_ten() -> None:
     flip = replace(CHATTER, verdict="flip", frequency=math.nan)
     for cut, base in ((CHATTER, 150.0), (flip, TEETH / 2)):
         is_flip = cut.verdict == "flip"
@@ -125,7 +125,7 @@ def test_period_two_is_told_from_other_chatter_in_nine_of_ten() -> None:
     assert log_of(flip, far) == pytest.approx(math.log(0.97 * 0.9 * (0.95 * (peak + 1) / 2 + 0.05)), abs=1e-6)
 
 
-def test_what_was_not_told_is_as_likely_as_can_be_where_a_cut_chatters() -> None:
+def test_what_was_not_reported_is_as_likely_as_can_be_where_a_cut_chatters() -> None:
     assert max_log_likelihood(replace(CHATTER, frequency=math.nan)) == 0.0
     assert max_log_likelihood(replace(CHATTER, verdict="stable", frequency=math.nan)) == 0.0
 
@@ -139,7 +139,7 @@ def test_a_stable_spindle_is_as_likely_to_be_taken_for_chatter_of_any_sound() ->
         assert mislabel_probability(CHATTER, quiet)[0] == pytest.approx(1.0)
 
 
-def test_a_word_is_wrong_with_3_percent_where_either_is_as_likely_and_chatter_without_a_frequency_with_6() -> None:
+def test_a_verdict_is_wrong_with_3_percent_where_either_is_as_likely_and_chatter_without_a_frequency_with_6() -> None:
     at_limit, untold = predicted(150.0, 150.0, excess=0.0), replace(CHATTER, frequency=math.nan)
     stable = replace(untold, verdict="stable")
     assert mislabel_probability(untold, at_limit)[0] == pytest.approx(0.06)
@@ -162,7 +162,7 @@ def test_of_several_directions_of_feed_the_worst_counts() -> None:
     assert both.excess[0] == max(excess.values())
 
 
-def test_a_speed_that_was_not_found_is_as_far_off_as_the_doubt_of_the_machine_says(mill: Mill) -> None:
+def test_a_speed_that_was_not_found_is_as_far_off_as_the_uncertainty_of_the_machine_says(mill: Mill) -> None:
     draws = mill.prior.samples[:5]
     draws.normal[:] = 0.0
     cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")

@@ -120,7 +120,7 @@ def test_candidates_are_the_best_speeds_apart_by_2_percent_and_depths_likely_sta
     assert list(charts(np.full((3, 5), 0.04)).candidates(0.0)) == []
 
 
-def test_no_more_than_eight_speeds_are_looked_at() -> None:
+def test_no_more_than_eight_speeds_are_inspected() -> None:
     mill = Mill()
     places = {place for place, _ in LimitCharts.of(mill.prior.draw(50), mill.grid).candidates(0.0)}
     assert len(places) == 8

@@ -78,7 +78,7 @@ def test_a_cut_that_contradicts_those_before_it_is_believed_where_those_after_ex
     assert (odd.cut, odd.contradiction) == (stable, Contradiction.STABLE)
 
 
-def test_each_contradiction_is_said_with_its_cause(mill: Mill) -> None:
+def test_each_contradiction_is_reported_with_its_cause(mill: Mill) -> None:
     odd = [
         InconsistentCut(CHATTER, Contradiction.FREQUENCY),
         InconsistentCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS, 0.871),

@@ -53,7 +53,7 @@ def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_m
 @pytest.mark.parametrize(
     ("word", "frequency"), [("chatter", 1450.0), ("chatter", np.nan), ("flip", np.nan), ("stable", np.nan)]
 )
-def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutVerdict, frequency: float) -> None:
+def test_nothing_is_likelier_than_to_do_what_was_detected(mill: Mill, word: CutVerdict, frequency: float) -> None:
     cut = CutEvidence(mill.cut, 12000, 1e-5 if word == "stable" else 0.05, word, frequency)
     most, likelihoods = max_log_likelihood(cut), np.log(likelihood(cut, mill.prior))
     assert np.max(likelihoods) <= most
@@ -62,7 +62,7 @@ def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutVerd
 
 
 @pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(2, 1.0, "down", 1.4e9, 5e8)])
-def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
+def test_the_edge_is_at_the_limit(cut: Cut) -> None:
     mill = Mill(cut=cut)
     middle = mill.prior.samples[:1]
     middle.normal[:] = 0.0
@@ -159,7 +159,7 @@ def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
     assert (learnt.cuts, find_inconsistent_cuts(learnt)) == (tuple(cuts), ())
 
 
-def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
+def test_learning_is_the_same_again_and_few_samples_are_made_again() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
     once, again = (mill.learnt_from(cuts) for _ in range(2))
@@ -208,7 +208,7 @@ def test_intervals_hold_95_percent_of_the_weight() -> None:
     assert interval.std**2 == pytest.approx(np.sum(learnt.weights * values**2) - interval.mean**2)
 
 
-def test_frequencies_stay_open_until_chatter_was_heard_twice(mill: Mill) -> None:
+def test_frequencies_stay_open_until_chatter_was_detected_twice(mill: Mill) -> None:
     chatter = CutEvidence(mill.cut, 12000, 3e-3, "chatter", 1450.0)
     stable, untold = replace(chatter, verdict="stable"), replace(chatter, frequency=np.nan)
     for cuts, is_open in (((chatter, stable, untold), True), ((chatter, chatter), False), ((), True)):
@@ -244,14 +244,14 @@ def test_a_spindle_is_far_off_where_more_than_half_of_the_weight_is_outside_of_9
         assert not replace(learnt, samples=both, log_weight=log_weight, cuts=(chatter,)).is_frequency_unusual
 
 
-def test_draws_that_are_ruled_out_are_not_looked_at_any_more(mill: Mill) -> None:
+def test_samples_that_are_ruled_out_are_not_inspected_any_more(mill: Mill) -> None:
     learnt = weighted(0.0, np.log(1.3e-6), np.log(0.7e-6), -1.0)
     evidence = learnt.predict(CutEvidence(mill.cut, 12000, 2e-3, "stable"))
     assert len(evidence.prior.samples) == len(evidence.prediction.excess) == 3
     assert evidence.prior.log_weight.tolist() == [0.0, np.log(1.3e-6), -1.0]
 
 
-def test_a_cut_weighs_draws_by_its_likelihood_and_an_old_one_less(mill: Mill) -> None:
+def test_a_cut_weights_samples_by_its_likelihood_and_an_old_one_less(mill: Mill) -> None:
     cut = CutEvidence(mill.cut, 12000, 1.2e-3, "stable")
     for moved in (1.0, 1.03):
         evidence = mill.prior.predict(replace(cut, frequency_ratio=moved))
@@ -269,7 +269,7 @@ def test_samples_are_drawn_as_often_as_their_weight_says_but_for_one() -> None:
     assert np.abs(np.array(counts) - [20, 10, 8, 2]).max() <= 1
 
 
-def test_draws_that_are_made_anew_are_those_of_prior_and_likelihood() -> None:
+def test_samples_that_are_made_again_are_those_of_prior_and_likelihood() -> None:
     """Against 12 000 draws that are only weighted: mean and spread of what three cuts have taught."""
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]

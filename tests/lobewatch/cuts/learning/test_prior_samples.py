@@ -59,7 +59,7 @@ def test_one_frequency_in_twenty_is_three_times_as_far_off(side: str, first: int
     assert 0.95 * ndtr(off) + 0.05 * ndtr(off / 3) == pytest.approx(ndtr(deviations), rel=1e-3, abs=1e-6)
 
 
-def test_kt_is_drawn_at_speed_and_as_doubted() -> None:
+def test_kt_is_drawn_at_speed_and_as_uncertain() -> None:
     ratios = draws({6: 1.0}, {7: 1.0}, {8: 1.0}, {6: -9.0}).ratios()
     doubted = 0.8 + 0.4 * ndtr(1.0)
     assert ratios["tangential"] == pytest.approx([1.1 * 1.3, 1.1 * doubted, 1.1, 1.1 * 0.1])
@@ -68,7 +68,9 @@ def test_kt_is_drawn_at_speed_and_as_doubted() -> None:
 
 @pytest.mark.parametrize("span", [KR_OVER_KT, FactorRange(-0.2, 0.5), FactorRange(2.0, 4.0), FactorRange(1.0, 1.0)])
 @pytest.mark.parametrize("deviations", [-3.0, -0.7, 0.0, 1.3, 2.5])
-def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: FactorRange, deviations: float) -> None:
+def test_kr_over_kt_is_as_uncertain_or_with_30_percent_anything_from_0_to_1(
+    span: FactorRange, deviations: float
+) -> None:
     """Quantiles of the mixture; Kr/Kt of the slot is 5/14."""
     drawn = draws({8: deviations}, ratio=span).ratios()["ratio"][0]
     assert 0 <= drawn <= max(2.8, span.high)
@@ -78,7 +80,7 @@ def test_kr_over_kt_is_as_doubted_or_with_30_percent_anything_from_0_to_1(span: 
         assert below == pytest.approx(ndtr(deviations))
 
 
-def test_without_radial_force_kr_over_kt_stays_as_doubted() -> None:
+def test_without_radial_force_kr_over_kt_stays_as_uncertain() -> None:
     bare = Mill(cut=replace(Mill().cut, radial=0.0)).prior.samples
     ratios = bare.ratios()["ratio"]
     assert np.min(ratios) > 0.8

@@ -47,7 +47,7 @@ def test_a_cut_of_a_material_by_another_of_its_names_is_one_of_the_program(shop:
     assert (heard.coefficients, [cut.id for cut in lesson.own_cuts]) == ("42CrMo4", ["c1"])
 
 
-def test_a_power_that_is_not_believed_is_said_and_the_word_of_its_cut_counts(shop: Shop) -> None:
+def test_a_power_that_is_not_believed_is_reported_and_the_verdict_of_its_cut_counts(shop: Shop) -> None:
     """1.4 kW are as much as machine.toml expects at 1 mm."""
     shop.edit("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
     shop.tap_both()

@@ -77,7 +77,7 @@ def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: M
     assert {left: cut.repeats for left, cut in found.items() if cut} == {2: "c2", 1: ""}
 
 
-def test_a_word_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:
+def test_a_verdict_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:
     """An equal depth 1.5 % faster was stable: the label is more likely right than wrong, but worth a cut."""
     speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
     places = [(speed, 1.5e-3, "stable"), (speed, 2e-3, "chatter"), (1.015 * speed, 2e-3, "stable")]
@@ -104,7 +104,7 @@ def test_chatter_is_asked_for_again_where_no_frequency_speaks_for_it(mill: Mill)
         assert found.repeats == repeats
 
 
-def test_chatter_is_not_asked_for_again_where_a_stable_word_is_more_doubtful(mill: Mill) -> None:
+def test_chatter_is_not_asked_for_again_where_a_stable_label_is_more_doubtful(mill: Mill) -> None:
     """Stable between two cuts that chatter, and deeper."""
     first, last = (replace(mill.chatter(speed), frequency=math.nan) for speed in (12000, 12400))
     between = CutEvidence(mill.cut, 12200, 1.1 * first.depth, "stable")

@@ -64,7 +64,7 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
     )
 
 
-def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
+def test_the_history_keeps_the_verdict_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
     shop.tap_both()
     before = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in before}
@@ -85,7 +85,7 @@ def words(logbook: Logbook) -> dict[str, Stability]:
     return {name: ruling.stability for name, ruling in rulings.items()}
 
 
-def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Shop) -> None:
+def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_reported(shop: Shop) -> None:
     shop.tap_both()
     shop.tap(0.2, 1500.0, tool="long")
     for depth, word in ((3.0, "stable"), (3.1, "stable"), (0.3, "chatter")):

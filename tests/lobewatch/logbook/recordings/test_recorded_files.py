@@ -32,7 +32,7 @@ def test_a_name_without_a_date_and_a_pattern_without_a_directive_are_rejected(pa
     assert "Description.date_pattern" in str(error.value)
 
 
-def test_files_of_a_folder_are_recordings_or_passed_over(tmp_path: Path) -> None:
+def test_files_of_a_folder_are_recordings_or_skipped(tmp_path: Path) -> None:
     for name, text in (("a.csv", "1,2\n3,4\n"), ("b.pdf", "x"), (".c.csv", "1,2\n")):
         (tmp_path / name).write_text(text, "utf-8")
     assert find_recordings([tmp_path]) == ([tmp_path / "a.csv"], [tmp_path / "b.pdf"])

@@ -192,7 +192,7 @@ def test_a_flipped_bit_in_a_long_journal_is_named(folder: MachineFolder) -> None
         assert "journal.jsonl: " in told(folder), at
 
 
-def test_only_what_was_appended_is_read_anew(folder: MachineFolder) -> None:
+def test_only_what_was_appended_is_read_again(folder: MachineFolder) -> None:
     path = folder.path / NAMES[0]
     before = scan_journal_file(path, JournalFileState(exists=False))
     assert scan_journal_file(path, before) is before

@@ -72,6 +72,6 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
         ("[reference_cut]", "[drive]\npower_kw = 0\n[reference_cut]", "drive power_kw"),
     ],
 )
-def test_bad_materials_are_told_with_their_place(old: str, new: str, message: str) -> None:
+def test_bad_materials_are_reported_with_their_place(old: str, new: str, message: str) -> None:
     with pytest.raises(ValueError, match=re.escape(message)):
         parse_machine_file(EXAMPLE.replace(old, new))

@@ -54,7 +54,7 @@ def test_a_table_that_is_left_out_says_what_the_fresh_machine_file_says() -> Non
 
 
 @pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
-def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
+def test_the_uncertainty_in_comments_is_the_default_and_complete(text: str) -> None:
     block = text[text.index("# [doubt]") :].partition("\n\n")[0]
     shown = parse_machine_file('[machine]\nname = "m"\n' + re.sub("^# ", "", block, flags=re.MULTILINE)).doubt
     own = {"frequency_percent": 0.3, "damping_percent": 10.0, "stiffness_percent": 3.0}
@@ -96,7 +96,7 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
         machine.model("end mill 13")
 
 
-def test_measured_coefficients_beside_a_material_count_and_leave_it_its_group() -> None:
+def test_measured_coefficients_next_to_a_material_count_and_leave_it_its_group() -> None:
     machine = parse_machine_file(EXAMPLE.replace("tangential_n_per_mm2", 'material = "C45"\ntangential_n_per_mm2'))
     known = machine.coefficients(machine.program[0])
     assert (known.tangential, known.radial, known.iso_group) == (1400e6, 500e6, "P")
@@ -199,7 +199,7 @@ def test_programs_belong_to_their_tool() -> None:
         ("depth_mm = 2.5", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
     ],
 )
-def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:
+def test_every_mistake_is_reported_with_its_place(old: str, new: str, message: str) -> None:
     assert old in EXAMPLE
     with pytest.raises(DataError) as caught:
         parse_machine_file(EXAMPLE.replace(old, new, 1))
@@ -219,7 +219,7 @@ def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) 
         ("length_mm = 26.5", "spindle: segment 1: material='x"),
     ],
 )
-def test_control_characters_in_names_are_refused_with_their_place(old: str, place: str, escaped: str) -> None:
+def test_control_characters_in_names_are_rejected_with_their_place(old: str, place: str, escaped: str) -> None:
     key = old.split(" ")[0].replace("length_mm", "material")
     with pytest.raises(DataError) as caught:
         parse_machine_file(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
@@ -228,7 +228,7 @@ def test_control_characters_in_names_are_refused_with_their_place(old: str, plac
     assert str(caught.value).isprintable()
 
 
-def test_control_characters_in_a_material_are_refused() -> None:
+def test_control_characters_in_a_material_are_rejected() -> None:
     material = '[[material]]\nname = "soft\\u001b"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
     with pytest.raises(DataError, match=r"material 1: name='soft.*' holds the control character"):
         parse_machine_file(f"{EXAMPLE}\n{material}")
@@ -241,7 +241,7 @@ def test_materials_have_names_of_their_own() -> None:
         parse_machine_file(f"{EXAMPLE}\n{material}{material}")
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_bytes(EXAMPLE.replace("SURROGATE", "SURROGÄTE").encode("latin-1"))
     with pytest.raises(DataError, match="no UTF-8 text"):

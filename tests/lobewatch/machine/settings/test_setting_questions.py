@@ -123,7 +123,7 @@ def test_nothing_is_asked_where_all_is_as_it_should_be() -> None:
 
 
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
-def test_every_slip_of_1000_is_refused_or_asked_about(factor: float) -> None:
+def test_every_slip_of_1000_is_rejected_or_asked_about(factor: float) -> None:
     assert {short(place) for place, _ in numbers(TABLES) if not seen(slipped(place, factor))} == set()
 
 

@@ -81,7 +81,7 @@ def test_channels_are_converted_at_the_door() -> None:
         ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
     ],
 )
-def test_every_mistake_is_told_with_its_table_and_key(old: str, new: str, message: str) -> None:
+def test_every_mistake_is_reported_with_its_table_and_key(old: str, new: str, message: str) -> None:
     assert old in DAQ
     with pytest.raises(DataError) as caught:
         parse_machine_file(HEAD + DAQ.replace(old, new, 1))
@@ -117,7 +117,7 @@ BOARD = HEAD + '[tap]\nhammer = "none"\n[daq]\ndriver = "lines"\nsample_rate_hz 
         ([(0, 'direction = "x"'), (1, ""), (3, "")], "the numbers after the counter are the inputs 0, 1 and 2"),
     ],
 )
-def test_axes_that_cannot_be_told_apart_are_refused(axes: list[tuple[int, str]], message: str) -> None:
+def test_axes_that_cannot_be_classified_apart_are_rejected(axes: list[tuple[int, str]], message: str) -> None:
     with pytest.raises(DataError, match=message):
         parse_machine_file(BOARD + "".join(AXIS.format(*axis) for axis in axes))
 

@@ -48,7 +48,7 @@ def test_a_line_is_edited_where_a_person_would(text: str, key: str, value: TomlV
     assert edit_toml(text, TablePath("a"), {key: value}) == edited
 
 
-def test_tables_of_a_list_are_told_apart_and_added() -> None:
+def test_tables_of_a_list_are_distinguished_and_added() -> None:
     text = '[[p]]\nname = "A"\n\n[[p]]\nname = "B"\n\n# about c\n[c]\n'
     assert '"A"\n\n[[p]]\nname = "Z"' in edit_toml(text, TablePath("p", 1), {"name": "Z"})
     added = edit_toml(text, TablePath("p", 2), {"name": "C"})
@@ -56,6 +56,6 @@ def test_tables_of_a_list_are_told_apart_and_added() -> None:
 
 
 @pytest.mark.parametrize("text", ["[a]\nx = [\n 1,\n]\n", "a = { x = 1 }\n", 'a.x = """\n1"""\n', "[ a ]\nx = 1\n"])
-def test_what_only_a_person_can_edit_is_refused(text: str) -> None:
+def test_what_only_a_person_can_edit_is_rejected(text: str) -> None:
     with pytest.raises(DataError, match="edit it by hand"):
         edit_toml(text, TablePath("a"), {"x": 2})

@@ -79,7 +79,7 @@ def test_a_tool_of_which_nothing_is_published_is_no_faster_than_the_fastest_that
     assert not limits(program(), tool('tool_material = "PCD"\ncutting_speed_m_min = 900')).is_guessed
 
 
-def test_a_slot_bears_less_than_a_cut_at_the_side() -> None:
+def test_a_slot_allows_less_than_a_cut_at_the_side() -> None:
     assert limits(program(radial=18.0), tool(CARBIDE)).high_rpm == pytest.approx(rpm(82.5, 18.0), rel=0.01)
 
 
@@ -144,7 +144,7 @@ def test_the_drive_allows_less_depth_the_faster_it_turns_beyond_its_corner() -> 
     assert fast == pytest.approx(4000 / (2 * math.pi * 3000 / 60) / torque * 1e3)
 
 
-def test_no_depth_is_chosen_that_would_be_asked_about_but_one_that_is_asked_for_may_be_judged() -> None:
+def test_no_depth_is_chosen_that_would_be_asked_about_but_one_that_is_asked_for_may_be_evaluated() -> None:
     """Below 0.002 and beyond 2 diameters of 18 mm."""
     read = machine(program(), tool(CARBIDE))
     reach = CutRange.of(read, read.program[0])
@@ -181,7 +181,7 @@ def test_the_drive_counts_with_the_greatest_feed_of_the_tool_where_the_program_h
         ("pitch_deg = [90, 90, 90]\nteeth = 4", "pitch"),
     ],
 )
-def test_a_mistake_in_a_tool_is_told(more: str, message: str) -> None:
+def test_a_mistake_in_a_tool_is_reported(more: str, message: str) -> None:
     with pytest.raises(DataError) as caught:
         machine(tool(more))
     assert message in str(caught.value)
@@ -198,7 +198,7 @@ def test_a_program_that_contradicts_its_tool_is_asked_about(key: str, value: flo
     assert find_all_questions(machine(program(feed=flutes), tool("teeth = 4\ndiameter_mm = 18\n" + flutes))) == []
 
 
-def test_a_cut_deeper_than_the_flutes_of_its_tool_is_refused() -> None:
+def test_a_cut_deeper_than_the_flutes_of_its_tool_is_rejected() -> None:
     with pytest.raises(DataError, match="program 1: depth_mm=2 is deeper than flute_length_mm=1 of tool 'reference'"):
         machine(program(), tool("flute_length_mm = 1"))
 

@@ -136,7 +136,7 @@ def test_chance_of_chatter_once_it_turns(chance: float, text: str) -> None:
     assert chatter_risk_text(a_verdict(chance=chance)) == text
 
 
-def test_a_word_says_what_it_must_in_the_same_breath() -> None:
+def test_a_verdict_says_what_it_must_in_the_same_breath() -> None:
     beyond = a_verdict(drive_limit=1e-3)
     assert verdict_text(beyond) == "stable, beyond the drive (predicted)"
     assert [

@@ -174,7 +174,7 @@ def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> No
 
 
 @pytest.mark.quick
-def test_a_course_falls_on_paper_as_it_does() -> None:
+def test_a_trend_falls_on_paper_as_it_does() -> None:
     assert spark_points([(0.0, 0.0)]) == ""
     assert spark_points([(0.0, 0.0), (10.0, -2.0)]) == "0.0,0.0 140.0,32.0"
     assert spark_points([(5.0, 0.0), (5.0, 0.0)]) == "0.0,0.0 0.0,0.0"
@@ -212,6 +212,6 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 50))])
-def test_dashboard_and_report_show_the_same_light(shop: Shop, tmp_path: Path, seed: int) -> None:
+def test_dashboard_and_report_show_the_same_status(shop: Shop, tmp_path: Path, seed: int) -> None:
     dashboard, *reports = lights(shop, tmp_path / "folder", seed)
     assert reports == [dashboard, dashboard]

@@ -63,7 +63,7 @@ SYMBOLS = dict(zip(TapStep, ("…", "▼", "…", "✓", "✗", "!", "⟳", "■
 
 
 @pytest.mark.parametrize("word", TapStep)
-def test_every_word_has_a_symbol_and_how_far_it_is(word: TapStep) -> None:
+def test_every_verdict_has_a_symbol_and_how_far_it_is(word: TapStep) -> None:
     text = plain(replace(STATE, word=word, verdict="good" if word is TapStep.GOOD else "double hit"))
     shown = "DOUBLE HIT" if word is TapStep.REFUSED else str(word)
     assert f"{SYMBOLS[word]}  {shown}   1 / 10" in text
@@ -71,7 +71,7 @@ def test_every_word_has_a_symbol_and_how_far_it_is(word: TapStep) -> None:
     assert "u undo   q stop   m mute" in text
 
 
-def test_a_trial_hit_is_told_from_a_good_one() -> None:
+def test_a_trial_hit_is_distinguished_from_a_good_one() -> None:
     assert "✓  GOOD (trial hit)   0 / 10" in plain(
         replace(STATE, word=TapStep.GOOD, verdict="good", trial=True, good=0, hits=())
     )
@@ -243,7 +243,7 @@ def test_a_log_has_the_checks_that_tell_something_though_all_is_well() -> None:
     assert console.file.getvalue().splitlines() == ["✓ band: modes up to 1280 Hz are heard"]  # type: ignore[attr-defined]
 
 
-def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
+def test_a_verdict_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
     screen, file = screen_of(Session())
     word = replace(STATE, word=TapStep.GOOD)
     first = replace(word, hits=(*STATE.hits, GOOD))

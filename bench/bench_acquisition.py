@@ -1,4 +1,4 @@
-"""Speed of the way from the wire to the verdict, each part beside what it cannot be faster than, one BLAS thread.
+"""Speed from the wire to the hit verdict, each part against its lower bound, one BLAS thread.
 
     python -m pip install -e .[bench]      (in an environment of its own)
     python bench/bench_acquisition.py [--seconds 60]
@@ -208,7 +208,7 @@ def ten_records() -> list[NDArray[np.float64]]:
 
 
 def races() -> Iterator[Race]:
-    """Beside pyFRF, and beside the transforms that no way can do without."""
+    """Compare with pyFRF and with the bare transforms."""
     records, size = ten_records(), f"{AVERAGED} hits x 2 x {TRIGGER.n_samples}"
     hits, batch = [Hit(f, a, RATE, TRIGGER.pre_trigger) for f, a in records], np.stack(records)
 
@@ -238,7 +238,7 @@ def races() -> Iterator[Race]:
 
 
 def average() -> None:
-    """Averaged H1 and coherence of ten hits, beside the bare batched rfft of their samples and beside pyFRF."""
+    """Averaged H1 and coherence of ten hits, against the bare batched rfft of their samples and against pyFRF."""
     records = ten_records()
     hits = [Hit(force, response, RATE, TRIGGER.pre_trigger) for force, response in records]
     batch = np.stack(records)

@@ -50,7 +50,7 @@ def tap_test() -> TapTest:
 
 
 def plain(path: Path, tap: TapTest, **packed: object) -> None:
-    """The codes and the FRF by h5py alone: no temporary name, no checksum, no sync."""
+    """Write the codes and the FRF with plain h5py: no temporary name, no checksum, no sync."""
     codes = np.stack([hit.codes for hit in tap.hits if hit.codes is not None]).astype(np.int16)
     with h5py.File(path, "w") as file:
         file.create_dataset("codes", data=codes, chunks=(1, 2, codes.shape[2]), **packed)
@@ -58,7 +58,7 @@ def plain(path: Path, tap: TapTest, **packed: object) -> None:
 
 
 def races() -> Iterator[Race]:
-    """Beside h5py."""
+    """Compare with h5py."""
     with TemporaryDirectory() as scratch:
         make_machine_folder(Path(scratch, "m"), "new_machine.toml")
         folder, tap, file, numbers = MachineFolder(Path(scratch, "m")), tap_test(), Path(scratch, "plain.h5"), count()
@@ -71,7 +71,7 @@ def races() -> Iterator[Race]:
 
 
 def cost(work: Callable[[int], object], rounds: int) -> tuple[float, float]:
-    """Median CPU and wall time (s); work: told the number of the round."""
+    """Median CPU and wall time (s); work: called with the number of the round."""
     cpu, wall = [], []
     for number in range(rounds):
         begun, begun_wall = time.process_time(), time.perf_counter()

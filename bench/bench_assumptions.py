@@ -62,7 +62,7 @@ def ratios() -> Iterator[tuple[str, Floats]]:
 
 
 def askew_ratios(rng: np.random.Generator) -> Iterator[float]:
-    """Two modes square to each other, 5 to 85 degrees off and within 18 %, against what direct taps alone show."""
+    """Two modes square to each other, 5 to 85 degrees off and within 18 %, against the limit from direct taps only."""
     for _ in range(RANDOM):
         first, second, cut, speed = random_case(rng, rng.choice([0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1.0]))
         angle = math.radians(rng.uniform(5, 85))
@@ -109,7 +109,7 @@ def damped_ratios(first: int, last: int) -> Iterator[float]:
 
 
 def _damped(mode: Mode, damping: float) -> Mode:
-    """With a damper (Ns/m) beside it."""
+    """With a parallel damper (Ns/m)."""
     added = damping * 2 * math.pi * mode.frequency / (2 * mode.stiffness)
     return replace(mode, damping_ratio=mode.damping_ratio + added)
 

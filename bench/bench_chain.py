@@ -1,6 +1,6 @@
-"""The whole way of one tap test, from its hits to the verdicts on programs, beside the peers' one after the other.
+"""The whole way of one tap test, from its hits to the verdicts on programs, against a chain of peers.
 
-Ours: ten hits judged and averaged, stored for good, modes with errors, bearings calibrated, compared with what was
+Ours: ten hits checked and averaged, stored for good, modes with errors, bearings calibrated, compared with what was
 before, three programs judged over 300 draws of the doubt, in a machine folder with a tap test in y. Theirs: checks and
 H1 by pyFRF, codes and FRF by h5py, modes by sdypy-EMA at frequencies that it is told, bearings by finite elements, each
 program at 20 depths by the textbook loop of semi-discretisation; nothing is compared, no error is known.
@@ -35,7 +35,7 @@ PROGRAMS, DEPTHS = 3, np.linspace(1e-4, 5e-3, 20)
 
 
 def races() -> Iterator[Race]:
-    """One chain beside the other."""
+    """Compare the two chains."""
     hits = hammered_hits()
     with TemporaryDirectory() as scratch:
         make_machine_folder(Path(scratch, "m"), "surrogate_machine.toml")

@@ -1,4 +1,4 @@
-"""Speed and error of the spindle model beside finite elements and ROSS, all in one run and one BLAS thread.
+"""Speed and error of the spindle model compared with finite elements and ROSS, all in one run and one BLAS thread.
 
     python3 -m pip install --editable ".[bench]"    (for ROSS; without it the rest is measured)
     python3 bench/bench_dsm.py                      (about a minute, most of it ROSS)
@@ -248,7 +248,7 @@ def bench_whirl(bench: Bench, given: Spindle) -> None:
 
 
 def races() -> Iterator[Race]:
-    """Beside finite elements and ROSS."""
+    """Compare with finite elements and ROSS."""
     given, f = spindle("euler-bernoulli"), np.linspace(100.0, 4000.0, 1000)
     coarse, (fine, parts) = (
         FiniteElements(given),

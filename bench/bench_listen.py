@@ -1,4 +1,4 @@
-"""CPU time in which `listen` judges 10 s at 25.6 kHz, beside Welch's spectrum of the same samples by scipy, in one run.
+"""CPU time of `listen` for 10 s at 25.6 kHz, compared with scipy's Welch spectrum in the same run.
 
 .venv/bin/python bench/bench_listen.py
 """
@@ -64,7 +64,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def races() -> Iterator[Race]:
-    """Beside Welch's spectrum."""
+    """Compare with Welch's spectrum."""
     for name, axes, speed in recordings():
         if name in ("one cut, chatter, three axes", "seven cuts"):
             yield Race(

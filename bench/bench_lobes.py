@@ -1,4 +1,4 @@
-"""CPU time of lobes/ beside two peers, with the error of each, all in one run on one machine and one BLAS thread.
+"""CPU time of lobes/ compared with two peers, with the error of each, in one run on one machine and one BLAS thread.
 
     .venv/bin/python bench/bench_lobes.py
 
@@ -258,7 +258,7 @@ def mean_force() -> None:
 
 
 def races() -> Iterator[Race]:
-    """Beside first-order semi-discretisation."""
+    """Compare with first-order semi-discretization."""
     some = SPEEDS[::SPARSE], DEPTHS[::20]
     part = some[0].size * some[1].size / (SPEEDS.size * DEPTHS.size)
     for x, y, name in ((X, None, "one mode"), (*FOUR, "two modes each in x and y")):

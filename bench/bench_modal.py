@@ -1,4 +1,4 @@
-"""Speed and errors of modal extraction beside sdypy-EMA, in one process with one BLAS thread each.
+"""Speed and errors of modal extraction compared with sdypy-EMA, in one process with one BLAS thread each.
 
     python -m pip install -e .[bench]      (in an environment of its own)
     python bench/bench_modal.py [FOLDER]
@@ -120,7 +120,7 @@ def five_points() -> list[Frf]:
 
 
 def races() -> Iterator[Race]:
-    """Beside sdypy-EMA."""
+    """Compare with sdypy-EMA."""
     peer, true = "sdypy-EMA of order 60", [mode.frequency for mode in TRUE]
     frf, beam, points = measured(0), estimate_frf(read_hits(BEAM)), five_points()
     seen = [mode.frequency for mode in fit_modes(beam)]

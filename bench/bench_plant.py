@@ -110,7 +110,7 @@ def cpu_of(*arguments: object) -> float:
 
 
 def told(name: str, machines: int, work: Callable[[Path], float], plant: Path, rounds: int) -> None:
-    """A line: all machines, one machine, and what follows for a whole plant; the least of some rounds."""
+    """Return one line: all machines, one machine, the whole fleet; minimum of several rounds."""
     everything, one = (min(work(path) for _ in range(rounds)) for path in (plant, plant / "mill-000"))
     whole = one + (everything - one) / (machines - 1) * (PLANT - 1)
     print(f"  {name:30s} {machines} machines {everything:6.2f} s, one {one:5.2f} s, so {PLANT} machines {whole:6.2f} s")

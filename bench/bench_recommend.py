@@ -1,4 +1,4 @@
-"""CPU time of a recommended setting beside that of one verdict on a program, in one run on one BLAS thread.
+"""CPU time of a recommended setting compared with one verdict on a program, in one run on one BLAS thread.
 
 .venv/bin/python bench/bench_recommend.py
 """

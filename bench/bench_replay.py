@@ -241,7 +241,7 @@ def newest_of(path: Path, to: Path) -> Path:
 
 
 def races() -> Iterator[Race]:
-    """Beside sdypy-EMA."""
+    """Compare with sdypy-EMA."""
     from sdypy import EMA
 
     with tempfile.TemporaryDirectory() as work:

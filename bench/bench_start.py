@@ -43,7 +43,7 @@ IMPORTS = "import h5py, numpy, typer"
 
 
 def races() -> Iterator[Race]:
-    """Beside programs that do nothing with the same libraries."""
+    """Compare with empty programs that import the same libraries."""
     start = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
     lobewatch = [sys.executable, "-m", "lobewatch.cli"]
     yield Race(

@@ -1,4 +1,4 @@
-"""Hit verdicts beside pyFRF's checks on the same labelled hits, and what is found of small second touches.
+"""Hit verdicts beside pyFRF's checks on the same labelled hits, and detection of small double hits.
 
     python -m pip install -e .[bench]      (in an environment of its own)
     python bench/bench_verdicts.py
@@ -47,7 +47,7 @@ BAND = (1300.0, 2200.0)
 
 
 def compare(setting: Setting, seed: int) -> None:
-    """Theirs with its own limit, and with the one that refuses at most 0.5 % of these good hits (in its favour)."""
+    """Compare pyFRF with its own limit, and with one that rejects at most 0.5 % of these good hits."""
     theirs = FRF(int(setting.sample_rate), fft_len=setting.record)
     count, refused, named, overflow = (Counter[str]() for _ in range(4))
     double: dict[str, list[int]] = {kind: [] for kind in KINDS}

@@ -80,7 +80,7 @@ class Blow:
 
 @dataclass(frozen=True, eq=False)
 class LabelledHit:
-    """A hit and what is known of it."""
+    """A hit and its true label."""
 
     kind: str
     hit: Hit
@@ -276,7 +276,7 @@ def _clipped(index: int, *, amplifier: bool, codes: bool = True) -> Callable[[Se
 
 
 def not_decayed(one: Session) -> Hit:
-    """Modes that ring so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
+    """Modes whose decay outlasts the record, which holds 1 to 2.5 time constants."""
     setting = one.setting
     while True:
         blow = replace(one.blow(), width=one.random.uniform(0.3e-3, 0.8e-3))

@@ -1,4 +1,4 @@
-"""All benchmarks that have a peer: writes docs/performance.md, and says what got slower than it stated.
+"""All benchmarks that have a peer: writes docs/performance.md and reports slowdowns.
 
     python3 run.py bench [--quick]         (in an environment with the peers; a quarter of an hour)
 
@@ -68,7 +68,7 @@ class Stated(msgspec.Struct):
 
 
 def races(heading: str) -> Iterator[Race]:
-    """Races of a bench; without those whose peer is not installed, which is said."""
+    """Return the races of a bench whose peers are installed; report the others."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -133,7 +133,7 @@ def read_stated(file: Path) -> Stated:
 
 
 def measured(headings: Sequence[str], quick: bool) -> dict[str, list[Result]]:
-    """Results by headings, each said as soon as it is there."""
+    """Return results by heading; print each at once."""
     results: dict[str, list[Result]] = {}
     for heading in headings:
         for race in races(heading):

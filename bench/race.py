@@ -71,7 +71,7 @@ def run(race: Race, quick: bool = False) -> Result:
 
 
 def cpu() -> float:
-    """CPU time of this process and of those that it has waited for (s)."""
+    """CPU time of this process and its finished children (s)."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return time.process_time() + used.ru_utime + used.ru_stime
 

@@ -1,4 +1,4 @@
-"""Public recordings of real cuts: how many are found, told, and told wrong.
+"""Public recordings of real cuts: how many are detected, classified, and misclassified.
 
     python bench/real_cuts.py FOLDER
 
@@ -142,7 +142,7 @@ class Tally:
 
     @property
     def speed_text(self) -> str:
-        """Speeds right, wrong and silent, of those that are clear."""
+        """Count right, wrong and missing speeds among the clear ones."""
         right, wrong, silent = (self.speeds[word] for word in ("right", "wrong", "silent"))
         return f"{right}, {wrong}, {silent} of {right + wrong + silent}"
 
@@ -182,7 +182,7 @@ def _descriptions(source: Source) -> Iterator[Description]:
 
 
 def loud_part(signal: Floats, rate: float) -> tuple[int, int]:
-    """The longest part above the middle, in log, between the quietest piece and a loud one, by the level alone."""
+    """Return the longest part above the log mean of quiet and loud pieces."""
     size = round(PIECE * rate)
     pieces = signal[: signal.size // size * size].reshape(-1, size)
     level = np.log10(np.std(pieces, axis=1) + np.finfo(np.float64).tiny)
@@ -193,7 +193,7 @@ def loud_part(signal: Floats, rate: float) -> tuple[int, int]:
 
 
 def comb_of(file: list[Axis], part: slice) -> list[Comb]:
-    """The comb of a part of a file: the frequency is that of all axes, how clear it is is told of each."""
+    """The comb of a part of a file: one frequency for all axes, clarity for each axis."""
     scores = [_comb_scores(axis, part) for axis in file]
     tried, together = scores[0][0], np.mean([score for _, score in scores], axis=0)
     best = int(np.argmax(together))
@@ -202,7 +202,7 @@ def comb_of(file: list[Axis], part: slice) -> list[Comb]:
 
 
 def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
-    """Frequencies that are tried (Hz), and the score of each; by code that the judge has nothing of."""
+    """Frequencies that are tried (Hz), and the score of each, by code independent of the detector."""
     signal, turn = axis.signal[part], axis.rpm / 60
     power = np.abs(np.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size), PADDED * signal.size)) ** 2
     above = np.log1p(power / (median_filter(power, NEIGHBOURS) + np.finfo(np.float64).tiny))
@@ -252,7 +252,7 @@ def _is_on_harmonic(heard: CutEvaluation, turn: float) -> bool:
 
 
 def words_on_air(file: list[Axis], only_air: bool) -> Iterator[str]:
-    """Words on windows without a cut: of a recording of air, else of what stands before and after what is loud."""
+    """Verdicts on windows without a cut: an air recording, else the parts before and after the cut."""
     axis, size = file[0], round(WINDOW * file[0].rate)
     begin, end = loud_part(axis.signal, axis.rate)
     spare = round(2 * PIECE * axis.rate)

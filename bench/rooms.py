@@ -93,7 +93,7 @@ class House:
         return joined
 
     def circles(self, package: str = "") -> list[list[str]]:
-        """Rooms that reach each other, the largest circle first; package: those inside it alone."""
+        """Import cycles, largest first; package: only those inside it."""
         return _circles([ends for ends in self.arrows if all(end.startswith(package) for end in ends)])
 
     def file_circles(self, package: str = "") -> list[list[str]]:

@@ -1,4 +1,4 @@
-"""The file calls of a program inside one folder: written down, failing, or the last thing that it does.
+"""The file calls of a program inside one folder: recorded, failing, or fatal.
 
 Every call of os and every opening and writing of a file by Python below the folder is counted; the one with the wished
 number does what it is told to. Files of HDF5 are made in memory and written by Python, so nothing passes by.
@@ -74,11 +74,11 @@ class FaultyFiles:
         return self._made(Call("write", path, data), lambda: real(data), lambda: real(data[: len(data) // 2]))
 
     def truncate(self, path: str, size: int, real: Callable[[], int]) -> int:
-        """Cut off what is behind so many bytes."""
+        """Truncate the file after this number of bytes."""
         return self._made(Call("truncate", path, size=size), real)
 
     def _made(self, call: Call, real: Callable[[], T], half: Callable[[], object] = lambda: None) -> T:
-        """Make the call, or let the fault befall it."""
+        """Make the call, or inject its fault."""
         if not call.path.startswith(self._root):
             return real()
         due = self._count == self._at

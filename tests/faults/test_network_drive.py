@@ -42,7 +42,7 @@ def tapped(tmp_path: Path) -> Shop:
 
 
 def run(shop: Shop, command: list[str]) -> tuple[int, str]:
-    """Exit code, and what is said; an error that nobody has foreseen is one of the test."""
+    """Return the exit code and the output; an unexpected error fails the test."""
     tap = next((shop.path / "taps").iterdir())
     words = {"PLANT": str(shop.path.parent), "MACHINE": str(shop.path), "TAP": tap.stem}
     done = CliRunner().invoke(app, [words.get(word, word) for word in command])

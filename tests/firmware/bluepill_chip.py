@@ -106,7 +106,7 @@ class BluePill:
 
 
 class UsbHost:
-    """A USB host that has this device alone."""
+    """A USB host with this device only."""
 
     def __init__(self, chip: BluePill) -> None:
         self.chip = chip

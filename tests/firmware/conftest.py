@@ -158,6 +158,6 @@ def board(
     codes: NDArray[np.int32],
     events: list[tuple[int, str]],
 ) -> Iterator[Board]:
-    """One that is tapped, as fast as the host reads."""
+    """Run a board that is tapped, as fast as the host reads."""
     with switched_on(request.param, codes, events=events) as running:
         yield running

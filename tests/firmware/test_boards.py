@@ -31,7 +31,7 @@ TRUTH = 1722.0
 
 
 def assert_right(blocks: list[Block], codes: Codes) -> None:
-    """Every sample is the one of its index, and what is missing between two blocks is told before the second."""
+    """Check that every sample has its index and each gap is reported before the next block."""
     for block in blocks:
         places = np.arange(block.first_scan, block.first_scan + block.codes.shape[1]) % codes.shape[1]
         assert np.array_equal(block.codes, codes[:, places])

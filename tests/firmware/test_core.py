@@ -1,4 +1,4 @@
-"""The C core alone: its frames against the codec of Python, its commands, its ring of scans, its size."""
+"""The C core: its frames against the Python codec, its commands, its ring buffer, its size."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Shop:
         self.put("".join(slots))
 
     def put(self, programs: str) -> None:
-        """Write other programs in place of those that are there."""
+        """Replace the programs."""
         text = (self.path / "machine.toml").read_text("utf-8")
         end = text.index("# The spindle of the example")
         self.edit(text[text.index("[[program]]") : end], f"{programs.strip()}\n\n")

@@ -16,7 +16,7 @@ EXACT = synthesize_frf(WING, LINES).accelerance
 
 
 def averaged(hits: NDArray[np.complex128]) -> Frf:
-    """H1 of hits of equal force with a coherence, of which nobody says how many they were."""
+    """H1 of hits of equal force with a coherence, without a hit count."""
     mean = hits.mean(axis=0)
     coherence = np.abs(mean) ** 2 / np.mean(np.abs(hits) ** 2, axis=0)
     return from_accelerance(LINES, mean, coherence)

@@ -19,7 +19,7 @@ PAPER = Mode(1722.0, 0.029136, 3.2289e7)
 
 
 def picked_exactly(mode: Mode) -> tuple[float, float, float]:
-    """Return the result of eqs. (28) and (29) for one mode alone with infinitely fine lines."""
+    """Return the result of eqs. (28) and (29) for a single mode with infinitely fine resolution."""
     z = mode.damping_ratio
     q = (1 - 2 * z**2 + np.sqrt((1 - 2 * z**2) ** 2 + 3)) / 3
     frequency = mode.frequency * np.sqrt(q)

@@ -49,7 +49,7 @@ CUT = Cut(TEETH, 1.0, "down", TANGENTIAL, RATIO * TANGENTIAL)
 
 @dataclass
 class ForeignTruth:
-    """A spindle as it was tapped and as it is: its softest mode alone is shifted, the force is another one."""
+    """A spindle as it was tapped and as it is: only its softest mode is shifted, and the force differs."""
 
     number: int
     mislabelled: int = 0
@@ -156,7 +156,7 @@ def make_cuts(truths: Sequence[ForeignTruth], count: int = CUTS) -> None:
 
 
 def heard(cuts: Sequence[MillingCut]) -> list[float]:
-    """Chatter frequency (Hz) of cuts from their motion alone; NaN of those that repeat from turn to turn."""
+    """Chatter frequency (Hz) of cuts from their motion only; NaN for motion that repeats every turn."""
     sounds = [math.nan] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
         if motion.nonperiodic_share < CHATTERS:

@@ -84,7 +84,7 @@ def _groups(cases: Sequence[Case], steps: NDArray[np.int64]) -> Iterator[list[in
 
 
 def _settle(stepper: Stepper, cases: int) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Growth, doubt and periods of the cases of one stepper."""
+    """Growth, its uncertainty and periods of the cases of one stepper."""
     growth, doubt, periods = np.zeros(cases), np.zeros(cases), np.zeros(cases, dtype=np.int64)
     left, record = np.arange(cases), stepper.run(FIRST)
     while True:
@@ -100,7 +100,7 @@ def _settle(stepper: Stepper, cases: int) -> tuple[Floats, Floats, NDArray[np.in
 
 
 def _look(motion: Floats) -> tuple[float, float, bool]:
-    """Growth, its doubt, and whether more periods would not tell more, from a motion (periods, values)."""
+    """Growth, its uncertainty, and whether it has converged, from a motion (periods, values)."""
     size = np.max(np.abs(motion), axis=1)
     beyond = np.flatnonzero((size > LINEAR) | (size < NOTHING))
     linear = motion[: beyond[0]] if beyond.size else motion

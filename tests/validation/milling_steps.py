@@ -69,7 +69,7 @@ class Case:
     """Axial depth (m)."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated."""
+        """Reject cases that cannot be simulated."""
         modes = self.x + self.y
         if not modes or not all(f > 0 and 0 < zeta < 1 and k > 0 for f, zeta, k, *_ in modes):
             raise ValueError(f"modes {modes} need frequency > 0, damping ratio in (0, 1), stiffness > 0, one at least")
@@ -175,7 +175,7 @@ def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], F
 
 
 def _normals(case: Case, steps: int) -> Floats:
-    """Outward normals of what is in the cut at each step, (steps, 2, e), times the root of its share of the depth.
+    """Outward normals of the engaged edge at each step, (steps, 2, e), times the root of its share of the depth.
 
     Roots, because chip and force carry one factor each. A helical slice stands as two halves, one standard deviation of
     its angles in the cut before and after their mean, so that its force matrix is right to the second moment.

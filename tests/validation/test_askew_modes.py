@@ -1,4 +1,4 @@
-"""Modes that lie askew to x and y, held against a simulation in time that shares nothing with `lobes`."""
+"""Modes with rotated principal directions, compared with a time simulation that shares nothing with `lobes`."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ def test_the_error_of_the_simulation_is_of_second_order_for_complex_modes() -> N
 
 
 def test_in_a_slot_with_four_teeth_limits_and_frequencies_are_those_of_zero_order() -> None:
-    """The force is constant there, so zero order is exact and knows the modes by their receptance alone."""
+    """The force is constant there, so zero order is exact and depends on the receptance only."""
     x, y = map(modes_of, two_and_two())
     speeds = np.linspace(4000.0, 12000.0, 12)
     exact = zero_order_lobes(x, y, cut_of(4, 1.0), speeds)

@@ -19,7 +19,7 @@ def reached(truths: Sequence[ForeignTruth]) -> tuple[float, float]:
 
 
 def test_the_limit_of_a_slot_is_that_of_one_mode_in_closed_form() -> None:
-    """Rigid in y, Kr alone, lobe by lobe: N Kr b / 2 times twice the most negative real part of 1/k ... is 1."""
+    """Rigid in y, only Kr, lobe by lobe: N Kr b / 2 times twice the most negative real part of 1/k ... is 1."""
     f, zeta, k, radial = 1500.0, 0.03, 2e7, 5e8
     lowest = 4 * k * zeta * (1 + zeta) / (2 * radial)
     limits = slot_limits(((f, zeta, k),), ((f, zeta, 1e15),), 1e2, radial, np.geomspace(2000, 6000, 400))

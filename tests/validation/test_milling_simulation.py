@@ -1,4 +1,4 @@
-"""The simulation that judges `lobes`, against exact Floquet theory, a closed form, a plain simulation, and `lobes`.
+"""The simulation that checks `lobes`, against exact Floquet theory, a closed form, a plain simulation, and `lobes`.
 
 Exact numbers: tests/data/milling_stability/SOURCE.txt.
 """

@@ -94,7 +94,7 @@ def test_paper_stiffness_ratio_of_the_aged_spindle() -> None:
 
 @pytest.mark.parametrize(("depth_mm", "chatter", "waves"), [(7.18498, 252.980, 1.75), (9.45843, 151.491, 3.75)])
 def test_altintas_shaping_with_two_oblique_modes(depth_mm: float, chatter: float, waves: float) -> None:
-    """Modes at 30 and -45 deg to the cut weigh cos^2 of their angle; Kf = 1000 MPa, a_lim = -1/(2 Kf Re G)."""
+    """Modes at 30 and -45 deg to the cut count with cos^2 of their angle; Kf = 1000 MPa, a_lim = -1/(2 Kf Re G)."""
     modes = [
         Mode(250.0, 0.012, 2.26e8 / math.cos(math.radians(30)) ** 2),
         Mode(150.0, 0.010, 2.13e8 / math.cos(math.radians(45)) ** 2),

@@ -123,7 +123,7 @@ F = 500.0
 
 
 def spindle(offset: float, theory: Theory, **parts: Any) -> Spindle:
-    """Bearings beside the ends of segments, a mass beside the tip."""
+    """Bearings close to the ends of segments, a mass close to the tip."""
     bearings = [
         Bearing(0.12 + offset, 2e8, housing_stiffness=1e9),
         Bearing(0.32 - offset, 1e8, rotational_stiffness=1e4),
@@ -177,7 +177,7 @@ def test_bounce_of_a_disc_half_a_micrometre_thick() -> None:
 
 @pytest.mark.parametrize("apart_um", [2.0, 2.06, 2.1])
 def test_rocking_on_two_bearings_two_micrometres_apart(apart_um: float) -> None:
-    """Some 0.02 Hz; the matrix beside such a mode is singular to working precision."""
+    """Some 0.02 Hz; the matrix near such a mode is singular to working precision."""
     segments = [
         Segment(0.047, 0.052),
         Segment(0.047, 0.047, 0.033),
@@ -218,7 +218,7 @@ CLOSEST = 2e-9
 
 
 def random_spindle(draw: np.random.Generator) -> Spindle:
-    """Two to eight segments, two to six bearings, up to two masses and two joints; half of them beside others."""
+    """Two to eight segments, two to six bearings, up to two masses and two joints; half of them close to others."""
     segments = [
         Segment(float(10 ** draw.uniform(-2.5, -0.8)), outer, float(draw.choice([0.0, 0.3, 0.7])) * outer)
         for outer in 10 ** draw.uniform(-1.6, -0.8, int(draw.integers(2, 9)))

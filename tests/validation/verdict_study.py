@@ -73,7 +73,7 @@ def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTab
 
 
 def drawn_truths(milling: RandomMilling, table: ProgramTable, count: int, rng: np.random.Generator) -> list[Case]:
-    """Systems within the doubt of a first tap test, fed in one of the directions of the program."""
+    """Systems within the uncertainty of a first tap test, fed in one of the directions of the program."""
     made = []
     for _ in range(count):
         push, share, speed = 1 + np.array([0.2, 0.2, 0.01]) * rng.uniform(-1, 1, 3)
@@ -99,7 +99,7 @@ def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
 
 
 def chattering(truths: list[Case]) -> int:
-    """Return how many cases chatter; one that has not settled counts."""
+    """Return how many cases chatter; one that has not converged counts."""
     simulated = milling_simulation.judge(truths)
     return int(np.sum(simulated.chatters | (simulated.doubt >= np.abs(simulated.growth))))
 
@@ -110,7 +110,7 @@ def upper_limit(number: int, of: int) -> float:
 
 
 def limit_mm(milling: RandomMilling) -> float:
-    """Deepest stable depth (mm) without any doubt."""
+    """Deepest stable depth (mm) without uncertainty."""
     table = program(milling, 2.0)
     cuts = cutting_conditions_of(table, MACHINE, assembly(milling))
     return 1e3 * program_limit(build_program(table, MACHINE), *_modes(milling), cuts).limit

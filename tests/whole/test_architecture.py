@@ -1,4 +1,4 @@
-"""docs/architecture.md says what is there: rooms, layers, nouns."""
+"""docs/architecture.md matches the code: folders, layers, nouns."""
 
 from __future__ import annotations
 

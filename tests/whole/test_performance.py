@@ -1,4 +1,4 @@
-"""`run.py bench`: peers answer what is asked, the page shows what was measured, what got slower is said."""
+"""`run.py bench`: peers solve the same task, the page shows the measurements, slowdowns are reported."""
 
 from __future__ import annotations
 

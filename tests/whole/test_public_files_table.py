@@ -1,4 +1,4 @@
-"""The table of public files is made of those that are there."""
+"""The table of public files lists the files present."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""run.py: the environment is made once, statuses are passed on, and what is missing is said in one sentence."""
+"""run.py: the environment is made once, exit statuses are passed on, and missing parts are reported in one sentence."""
 
 from __future__ import annotations
 

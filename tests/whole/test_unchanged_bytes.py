@@ -234,7 +234,7 @@ class Chapter:
         )
 
     def do_quiet(self, *words: str) -> str:
-        """Without what is shown while a test goes on, whose lines depend on the speed of this computer."""
+        """Run without progress output, which depends on the speed of the computer."""
         code, out, err = run([*map(self._replaced, words)], self._patch)
         return "\n".join([f"exit code {code}", out, *re.findall("^error: .*", err, re.MULTILINE)])
 
@@ -276,7 +276,7 @@ def shape_of(value: object) -> str:
 
 
 def describe(path: Path) -> str:
-    """Return the content of a file as text, with its checksum where its bytes depend on its content alone."""
+    """Return the content of a file as text, with its checksum where the bytes are reproducible."""
     content = path.read_bytes()
     lines = [*DESCRIBERS.get(path.suffix, describe_text)(path)]
     digest = [] if path.suffix in UNSTEADY else [f"sha256 {hashlib.sha256(content).hexdigest()}"]

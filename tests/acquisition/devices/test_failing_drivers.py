@@ -46,7 +46,7 @@ class Stranger(BaseException):
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """Open a pseudo-terminal at which nobody answers."""
+    """Open a pseudo-terminal that never answers."""
     ends = os.openpty()
     tty.setraw(ends[1])
     yield os.ttyname(ends[1])

@@ -98,7 +98,7 @@ def test_a_name_that_nobody_brings() -> None:
 
 @pytest.fixture
 def port() -> Iterator[str]:
-    """Open a pseudo-terminal at which nobody answers."""
+    """Open a pseudo-terminal that never answers."""
     ends = os.openpty()
     tty.setraw(ends[1])
     yield os.ttyname(ends[1])

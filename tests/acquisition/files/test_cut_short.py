@@ -1,4 +1,4 @@
-"""Files of every format, cut at any byte: refused, asked about, or the same numbers; never others, never a crash."""
+"""Files of every format, cut at any byte: rejected, questioned, or read with the same numbers."""
 
 from __future__ import annotations
 

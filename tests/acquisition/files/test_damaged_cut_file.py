@@ -1,4 +1,4 @@
-"""Recordings of cuts with bits flipped, parts zeroed and ends cut off, with and without their seal: refused in time."""
+"""Cut recordings with flipped bits, zeroed parts and lost ends, with and without their checksum: rejected fast."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that other programs have written, each as it is: what is in it, or what is asked."""
+"""Files written by other programs: the content read from each, or the questions raised."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The accelerometer during a cut from files: units, rates, columns, and what is refused."""
+"""The accelerometer during a cut from files: units, rates, columns, and rejected files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tap files: what is written is read back to the bit, and damage is named."""
+"""Tap files: bit-exact round trips, and named damage."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ ABOUT = replace(ABOUT, conditions=Conditions(-4.5, 80.25, 18.0, "wärm", True, "
 
 @pytest.fixture
 def tap(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Channel]) -> TapTest:
-    """Ten hits, some of them refused, with codes."""
+    """Ten hits, some of them rejected, with codes."""
     source = SimulatedSource(tapper(double_hits=0.3, overloads=0.2), channels, 25600.0, 120_000)
     hits = tuple(capture_hits(source, Trigger(20.0, 6400, 512)))
     hits = (*hits[:-1], replace(hits[-1], lost_scans=7))

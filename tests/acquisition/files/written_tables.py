@@ -1,4 +1,4 @@
-"""A table of one FRF and one hit, written in the ways that its tests need, and what is asked about it."""
+"""Tables of one FRF and one hit in several layouts, and the questions they raise."""
 
 from __future__ import annotations
 

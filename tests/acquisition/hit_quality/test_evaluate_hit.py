@@ -34,7 +34,7 @@ TIME = np.arange(6400) / RATE - 0.02
 
 
 def hit(*blows: tuple[float, float, float], noise: float = 0.05) -> Hit:
-    """Blows of peak (N), start (s) and foot width (s) on something that rings."""
+    """Blows of peak (N), start (s) and foot width (s) on a resonant structure."""
     random = np.random.default_rng(3).normal(size=(2, TIME.size))
     force = noise * random[0]
     for peak, start, width in blows:

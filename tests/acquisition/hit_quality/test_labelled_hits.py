@@ -1,4 +1,4 @@
-"""Verdicts on simulated hits whose faults are known: bad ones are refused, good ones pass."""
+"""Verdicts on simulated hits whose faults are known: bad ones are rejected, good ones pass."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ONE_CAUSE = {"swapped channels", "force clipped before it, noise on top", "respo
 
 
 def tally(setting: Setting, sessions: int, seed: int) -> tuple[list[str], list[str], list[str], int, int]:
-    """Bad hits let pass, good ones refused, bad ones refused for the wrong fault; how many are bad, how many good."""
+    """Count missed bad hits, rejected good hits and wrong faults; and the bad and good hits."""
     passed, refused, misnamed, bad, good = [], [], [], 0, 0
     for one in labelled_hits(setting, sessions, seed):
         verdict = evaluate_hit(one.hit, one.mean)

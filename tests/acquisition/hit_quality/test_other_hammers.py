@@ -21,7 +21,7 @@ def half_sine(time: NDArray[np.float64], peak: float, start: float, width: float
 
 
 def hit(width: float, *, second: float = 0.0, high_pass: float = 0.0, before: int = BEFORE) -> Hit:
-    """300 N on what rings at 1 kHz; a second touch 5 widths later; behind a conditioner with a high pass (Hz)."""
+    """300 N on a 1 kHz mode; a second contact 5 widths later; a high-pass conditioner (Hz)."""
     time = (np.arange(12800) - before) / RATE
     random = np.random.default_rng(5).normal(size=(2, time.size))
     force = half_sine(time, 300, 0, width) + half_sine(time, second, 5 * width, width)

@@ -46,7 +46,7 @@ class Recorded:
 
 
 class Ringing(Recorded):
-    """Hits and a response that rings from each of them, on top of noise of 1 code rms."""
+    """Hits and their decaying response, on top of noise of 1 code rms."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Hits that are seen by the acceleration alone."""
+"""Hits detected from the acceleration only."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def falling(first: int, count: int) -> NDArray[np.float64]:
 def printed(
     printing: OutputFormat | None = None, traits: TextBoardTraits | None = None, alone: bool = False
 ) -> Iterator[TextBoardSource]:
-    """Return a source that listens to an emulated board without a clock. alone: acceleration without force."""
+    """Return a source that listens to an emulated board without a clock. alone: acceleration only, no force."""
     inputs = (SensorInput(0, ACCELERATION),) if alone else INPUTS
     sensitivities = tuple(sensor.channel.sensitivity for sensor in inputs)
     signal = falling if alone else ramp

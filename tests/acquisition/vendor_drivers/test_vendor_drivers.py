@@ -59,7 +59,7 @@ KINDS = {
 def inputs(
     range_v: float, numbers: tuple[int, int] = (0, 1), iepe: bool = True, alone: bool = False
 ) -> tuple[SensorInput, ...]:
-    """Return the inputs. alone: acceleration without force."""
+    """Return the inputs. alone: acceleration only, no force."""
     force = SensorInput(numbers[0], Channel("force", 2.25e-3, range_v), iepe)
     acceleration = SensorInput(numbers[1], Channel("acceleration", 1.02e-3, range_v), iepe)
     return (acceleration,) if alone else (force, acceleration)

@@ -34,7 +34,7 @@ def test_without_rotary_inertia_speed_changes_only_the_view_from_the_shaft() -> 
 
 
 def test_a_rigid_rotor_on_two_springs() -> None:
-    """Pitch of a stiff symmetric rotor: I_d w^2 - I_p W w = k a^2/2 for springs k at +-a/2; bounce is left alone."""
+    """Pitch of a stiff symmetric rotor: I_d w^2 - I_p W w = k a^2/2 for springs k at +-a/2; bounce does not change."""
     span, stiffness, diametral, polar = 0.4, 1e4, 0.2, 0.3
     segments = [Segment(span, 0.05)]
     rotor = Spindle(

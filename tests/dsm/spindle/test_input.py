@@ -152,7 +152,7 @@ def test_too_many_segments_are_rejected() -> None:
 @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
 @pytest.mark.parametrize("slenderness", [0.01, 0.05, 1.0, 1e3, 1e5])
 def test_slender_and_stubby_shafts_get_right_modes(slenderness: float, theory: Theory) -> None:
-    """Rigid on springs that are soft beside it: bounce, and pitch about the middle."""
+    """Rigid on much softer springs: bounce, and pitch about the middle."""
     length = 0.05 * slenderness
     shaft = Segment(length, 0.05)
     bending, shear = 210e9 * shaft.second_moment / length**3, 0.1 * 210e9 * shaft.area / length

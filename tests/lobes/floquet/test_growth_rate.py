@@ -73,7 +73,7 @@ def test_two_multipliers_that_are_nearly_one_are_distinguished(tolerance: float)
 
 @pytest.mark.parametrize("seed", [11, 19, 142])
 def test_growth_of_a_multiplier_far_above_all_others_is_of_the_right_size(seed: int) -> None:
-    """The vectors that find it run out soon, in single precision above all: what is left of them is rounding."""
+    """The vectors that find it run out soon, in single precision above all: the remainder is rounding."""
     rows, depths = program(seed), np.geomspace(5e-3, 0.12, 16)[np.newaxis]
     numbers = count_pieces(rows, float(depths.max()))
     exact = np.log(np.abs(largest_multipliers(rows, depths, numbers, 1e-9)))

@@ -148,7 +148,7 @@ def up_over_down(cut: Cut) -> NDArray[np.float64]:
 
 
 def test_mirroring_the_feed_exchanges_up_and_down() -> None:
-    """(x, phi) -> (-x, pi - phi) with Kr alone in the force turns up-milling into down-milling; with Kt it does not."""
+    """(x, phi) -> (-x, pi - phi) with only Kr in the force turns up-milling into down-milling; with Kt it does not."""
     assert up_over_down(Cut(3, 0.4, "up", 1.0, 600e6)) == pytest.approx(1, abs=1e-3)
     assert np.all(np.abs(up_over_down(CUT) - 1) > 0.05)
 
@@ -229,7 +229,7 @@ def limit_of_a_constant_force(x: DirectionModes, y: DirectionModes, cut: Cut, sp
 def test_a_soft_slow_mode_does_not_hide_the_fast_one_that_chatters(
     x: list[Mode], y: DirectionModes, coefficients: tuple[float, float]
 ) -> None:
-    """Robots and thin walls: 18 and 240 Hz beside 2500 Hz. The force of four teeth in a slot is constant."""
+    """Robots and thin walls: 18 and 240 Hz next to 2500 Hz. The force of four teeth in a slot is constant."""
     cut = Cut(4, 1.0, "down", *coefficients)
     found = stability_boundary(x, y, cut, 3000.0, 60e-3)
     assert found.depth[0] == pytest.approx(limit_of_a_constant_force(x, y, cut, 3000.0), rel=0.005)

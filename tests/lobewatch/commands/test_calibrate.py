@@ -1,4 +1,4 @@
-"""`lobewatch calibrate` with frequencies: bearings, another mode, groups, dampers, and what is refused."""
+"""`lobewatch calibrate` with frequencies: bearings, another mode, groups, dampers, and rejected input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`lobewatch calibrate --tool A --tool B`: joint and bearings from tap tests of two tools, and what is refused."""
+"""`lobewatch calibrate --tool A --tool B`: joint and bearings from tap tests of two tools, and rejected input."""
 
 from __future__ import annotations
 

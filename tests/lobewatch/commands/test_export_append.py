@@ -56,7 +56,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def mills(shop: Shop, tmp_path: Path) -> Path:
-    """Two machines tapped in January, February and March 2026, one of them in x alone."""
+    """Two machines tapped in January, February and March 2026, one of them in x only."""
     shop.put("")
     for days in (0.0, 30.0, 60.0):
         shop.tap(days, 1713.0 - days / 10)

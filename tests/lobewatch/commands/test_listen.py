@@ -1,4 +1,4 @@
-"""lobewatch listen with files: word, JSON, what is kept, picture, and what is refused."""
+"""`lobewatch listen` with files: verdict, JSON, stored data, picture, and rejected input."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_chatter_in_a_file_is_reported_kept_and_drawn(shop: Shop, tmp_path: Path
 
 
 def test_the_power_of_a_cut_says_a_kt_at_the_speed_that_was_detected(shop: Shop, tmp_path: Path) -> None:
-    """0.64 % faster than set: as much less Kt. A power that cannot be is refused before anything is heard."""
+    """0.64 % faster than set: as much less Kt. An impossible power is rejected before the analysis."""
     shop.run(("A", 12000, 1.5), more="feed_per_tooth_mm = 0.1")
     place = ("--program", "A", "--file", recording(tmp_path / "cut.csv"))
     told = json.loads(run(shop, *place, "--power", 4.0, "--json").stdout)

@@ -1,4 +1,4 @@
-"""`lobewatch modes --beside`: a mode that other measurements of the structure have, too, is more trusted."""
+"""`lobewatch modes --beside`: a mode that other measurements also show is more trusted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`lobewatch pitch`: what is proposed holds in a simulation in time, where equal pitch will do, and mistakes."""
+"""`lobewatch pitch`: proposals checked by time simulation, cases where equal pitch is enough, and mistakes."""
 
 from __future__ import annotations
 

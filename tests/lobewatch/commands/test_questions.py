@@ -1,4 +1,4 @@
-"""Recordings that are implausible for a machine: stored, asked about, never silently good, answered by --accept."""
+"""Recordings that are implausible for a machine: stored, questioned, never silently good, accepted by --accept."""
 
 from __future__ import annotations
 

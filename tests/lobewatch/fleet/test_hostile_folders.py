@@ -95,7 +95,7 @@ HOSTILE: dict[str, Callable[[Path], None]] = {
 
 @contextmanager
 def in_time() -> Iterator[None]:
-    """TimeoutError for what waits for ever, for instance in opening a pipe that nobody writes to."""
+    """TimeoutError for calls that never return, for instance opening a pipe without a writer."""
 
     def give_up(_signal: int, _frame: FrameType | None) -> NoReturn:
         raise TimeoutError("it hangs")

@@ -22,7 +22,7 @@ WITHOUT = '[tap]\nhammer = "none"\n'
 
 
 def decays(frequency: float, seed: int) -> list[Hit]:
-    """Three hits on a mode of 3 % damping, whose force nobody measured; noise of 1 m/s^2."""
+    """Three hits on a mode of 3 % damping, without a measured force; noise of 1 m/s^2."""
     random, structure = np.random.default_rng(seed), Structure(np.array([frequency]), np.array([0.03]), np.array([3e7]))
     time = np.arange(SIZE - BEFORE) / RATE
     hits = []

@@ -55,7 +55,7 @@ def of(modes: Sequence[Mode]) -> Assembly:
 
 @pytest.fixture
 def machine(shop: Shop) -> Machine:
-    """With one program, and nothing in doubt but the error of the tap test."""
+    """One program, and no uncertainty except that of the tap test."""
     shop.run(("A", 11000, 0.5))
     shop.edit("[speed]", f"{SURE}\n[speed]")
     found: Machine = shop.folder.machine

@@ -1,4 +1,4 @@
-"""Events, exclusions and new baselines: what they alter of all that follows, and what they leave alone."""
+"""Events, exclusions and new baselines: results they change, and results they do not."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows with checksums: what is cut or altered is not read, what is before it is, and it is written over by the next."""
+"""Rows with checksums: truncated or altered rows are skipped and overwritten, earlier rows are read."""
 
 from __future__ import annotations
 

@@ -257,7 +257,7 @@ def damaged_somewhere(folder: MachineFolder, chance: random.Random) -> str:
 
 
 def moved_somewhere(folder: MachineFolder, chance: random.Random) -> str:
-    """One file deleted, swapped with another of its folder, or there twice; its name, of a second one that of this."""
+    """Delete, swap or duplicate one file; return the affected name."""
     files = sorted(path for path in folder.path.rglob("*") if path.is_file() and path.name != ".lock")
     path = chance.choice(files)
     how = chance.choice(("delete", "swap", "duplicate"))
@@ -271,7 +271,7 @@ def moved_somewhere(folder: MachineFolder, chance: random.Random) -> str:
 
 
 def mend(folder: Path, remark: Remark) -> None:
-    """Do what is said."""
+    """Follow the advice."""
     if "move it away" in remark.cure:
         (folder / "machine.toml").rename(folder / "machine.toml.old")
     if "delete this file" in remark.cure + remark.text:
@@ -313,7 +313,7 @@ def results_of(folder: MachineFolder) -> list[bytes]:
 def one_round(
     pristine: Path, work: Path, seed: int, harm: Callable[[MachineFolder, random.Random], str] = damaged_somewhere
 ) -> str:
-    """Damage a copy, and mend it as is said; "named" or "harmless", else what went wrong."""
+    """Damage a copy and repair it as advised; return "named", "harmless", or the failure."""
     shutil.rmtree(work, ignore_errors=True)
     shutil.copytree(pristine, work)
     folder = MachineFolder(work)

@@ -1,4 +1,4 @@
-"""Files of the first version are always read; those of an unknown newer one are refused in a sentence."""
+"""Files of the first version are always read; files of an unknown newer version are rejected with one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Workers that answer rubbish: what is no result of its task is worked out here, and nothing wrong is stored."""
+"""Workers with invalid answers: their tasks are computed locally, and nothing wrong is stored."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def plain_machine(path: Path) -> None:
 
 
 class Killer:
-    """Told how far a replay is, it ends one of the workers once, with work in its hands."""
+    """Progress callback that kills one busy worker once."""
 
     def __init__(self, cluster: LocalCluster) -> None:
         with Client(cluster, set_as_default=False) as client:

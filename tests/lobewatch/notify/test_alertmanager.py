@@ -44,7 +44,7 @@ class Mails(socketserver.StreamRequestHandler):
 
 
 class Calls(http.server.BaseHTTPRequestHandler):
-    """Takes what is posted."""
+    """Accept all posts."""
 
     def do_POST(self) -> None:
         server: Any = self.server
@@ -58,7 +58,7 @@ class Calls(http.server.BaseHTTPRequestHandler):
 
 @contextmanager
 def serving(handler: type[socketserver.BaseRequestHandler]) -> Iterator[tuple[int, list[Any]]]:
-    """Port, and what is received there."""
+    """Port, and the posts received there."""
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
         server.daemon_threads = True
         received = list[Any]()
@@ -69,7 +69,7 @@ def serving(handler: type[socketserver.BaseRequestHandler]) -> Iterator[tuple[in
 
 
 def post(port: int, alerts: list[dict[str, Any]]) -> None:
-    """Say what Prometheus would; ConnectionError for as long as nobody listens."""
+    """Post as Prometheus does; ConnectionError until a server listens."""
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     try:
         connection.request("POST", "/api/v2/alerts", json.dumps(alerts), {"Content-Type": "application/json"})

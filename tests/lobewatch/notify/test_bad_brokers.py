@@ -63,7 +63,7 @@ def unaccepted() -> Iterator[str]:
 
 @pytest.fixture
 def unused() -> str:
-    """Address where nobody listens."""
+    """Address without a listener."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         return f"mqtt://127.0.0.1:{server.getsockname()[1]}"
 
@@ -172,7 +172,7 @@ def test_a_message_that_the_broker_does_not_take_is_kept_and_the_others_arrive(
 
 
 class Parrot:
-    """Says what it is told to each who connects, and hangs up."""
+    """Send a fixed answer to each connection, then close it."""
 
     words = b""
 

@@ -172,7 +172,7 @@ def test_a_wrong_length_begins_nothing(shop: DashboardServer, length: str) -> No
 
 
 def test_a_request_of_two_lengths_begins_nothing(shop: DashboardServer) -> None:
-    """One that a server in front might read as two."""
+    """A proxy in front might read it as two requests."""
     for lengths in ("Content-Length: 18\r\nContent-Length: 0", "Content-Length: 18\r\nTransfer-Encoding: chunked"):
         with connected(shop) as raw:
             raw.sendall(head(shop) + f"{lengths}\r\n\r\n".encode() + X)

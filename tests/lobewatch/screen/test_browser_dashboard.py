@@ -45,7 +45,7 @@ def machine(path: Path, daq: str = "") -> None:
 
 @pytest.fixture(scope="module")
 def mills(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten never tapped, one fallen by 7 %, one good and overdue; the good one alone names a port."""
+    """Ten never tapped, one fallen by 7 %, one good and overdue; only the good one names a port."""
     path = tmp_path_factory.mktemp("plant")
     for number in range(10):
         machine(path / f"new-{number}")

@@ -143,7 +143,7 @@ def middle(browser: Browser, part: str) -> tuple[float, float]:
 def test_until_the_first_hit_a_drawing_shows_where_sensor_and_hammer_go(
     browser: Browser, session: Session, server: ScreenServer, direction: str, along: tuple[int, int]
 ) -> None:
-    """The sensor on the side of the negative axis, the hammer on that of the positive one; no empty curve beside it."""
+    """The sensor on the side of the negative axis, the hammer on that of the positive one; no empty curve."""
     browser.open(server.url, (1280, 657))
     session.show(TapStep.TAP, direction=direction)
     browser.see("text", "TAP")

@@ -46,7 +46,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def check_page(browser: Browser) -> None:
-    """Nothing has run, nothing is beside the page, and no element has come from a name."""
+    """No script ran, nothing overflows the page, and no element came from a name."""
     for width in (1280, 390):
         browser.resize((width, 844))
         browser.wait(lambda width=width: browser.ask("innerWidth") == width)

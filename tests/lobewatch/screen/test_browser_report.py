@@ -134,7 +134,7 @@ def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser:
 
 
 def test_the_slider_marks_the_test_cuts_known_at_each_test(browser: Browser, shop: Shop, tmp_path: Path) -> None:
-    """A ring from the second test on, and with the third a cross beside it that was cut after it."""
+    """A ring from the second test on, and from the third a cross for a later cut."""
     shop.run(("A", 12900, 0.5))
     shop.tap(0, 1690.0, direction="y")
     for days, frequency in ((0, 1713.0), (30, 1700.0), (60, 1690.0)):

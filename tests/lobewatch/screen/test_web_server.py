@@ -140,7 +140,7 @@ class Watched:
 
 
 def test_nothing_is_inspected_while_nothing_changes(session: Session) -> None:
-    """But once a second, for the sign of life; what has changed is sent at once, and a page that is gone not told."""
+    """Except once a second for the heartbeat; changes are sent at once, and closed pages are dropped."""
     watched, kinds = Watched(session), []
 
     async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:

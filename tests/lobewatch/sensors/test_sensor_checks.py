@@ -1,4 +1,4 @@
-"""lobewatch sensors against emulated devices: what is plugged in, a hung mass, a common signal."""
+"""lobewatch sensors against emulated devices: connected sensors, a hung mass, a common signal."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture
 def cable(tmp_path: Path) -> Iterator[dict[str, str]]:
-    """Return the environment of programs that see one sound device, "wire", which records what is played to it."""
+    """Return an environment with one sound device, "wire", that records its own output."""
     (tmp_path / ".asoundrc").write_text('pcm.wire { type pulse device "wire.monitor" }\n', "utf-8")
     (tmp_path / "run").mkdir()
     environment = os.environ | {"HOME": str(tmp_path), "XDG_RUNTIME_DIR": str(tmp_path / "run")}

@@ -1,4 +1,4 @@
-"""Stick-out and state divide tap tests into series; what is unknown divides nothing."""
+"""Stick-out and state divide tap tests into series; unknown values do not divide."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ Shop = Any
 
 @pytest.fixture
 def judged(shop: Shop) -> Any:
-    """Judge a program of the reference tool with lines changed."""
+    """Evaluate a program of the reference tool with changed lines."""
     shop.tap(0, 1713.0, stiffness=3e7)
     shop.tap(0.1, 1650.0, "y", stiffness=3.4e7)
 

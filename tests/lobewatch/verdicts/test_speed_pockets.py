@@ -1,4 +1,4 @@
-"""Speeds of pockets without a stiffness, against the same spindle tapped with force; depths that cuts alone tell."""
+"""Speeds of pockets without a stiffness, against the same spindle tapped with force; depths known from cuts only."""
 
 from __future__ import annotations
 

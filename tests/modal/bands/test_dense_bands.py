@@ -85,7 +85,7 @@ def test_a_mode_alone_is_never_reported_to_be_several(level: float, damping: flo
 
 
 def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_reported() -> None:
-    """The larger has the stiffness that is told; a hundredth of its size beside it is a trifle."""
+    """The larger mode has the reported stiffness; a neighbour of a hundredth of its size does not matter."""
     modes = [Mode(1722.0, 0.03, 3.5e7), Mode(1722.0 * 1.02, 0.03, 3.5e9)]
     assert "several-modes" not in codes_between(noisy(modes, 1e-3, 0))
 

@@ -1,4 +1,4 @@
-"""Noise that grows with the FRF: weights from what the fit leaves."""
+"""Noise that grows with the FRF: weights from the fit residual."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mode whose modal constant is not real: its receptance, and what is no such mode."""
+"""A mode whose modal constant is not real: its receptance, and invalid modes."""
 
 from __future__ import annotations
 

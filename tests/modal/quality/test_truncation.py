@@ -1,4 +1,4 @@
-"""A record that ends before the decay does: what is off by it, and errors that hold."""
+"""A record shorter than the decay: the resulting bias, and error bounds that hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which modes to believe follows from their figures alone."""
+"""Trust in a mode follows from its figures only."""
 
 from __future__ import annotations
 

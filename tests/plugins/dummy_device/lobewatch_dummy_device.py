@@ -100,7 +100,7 @@ class DummySource:
 
 
 def packets_in(received: bytes) -> Iterator[bytes]:
-    """Whole packets, and at last what is left over."""
+    """Whole packets, then the remainder."""
     start = max(received.find(MARK), 0)
     while len(received) - start >= PACKET:
         yield received[start : start + PACKET]

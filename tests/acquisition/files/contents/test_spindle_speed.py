@@ -1,4 +1,4 @@
-"""The speed of a spindle by the pulses of a tachometer: exact turns over their time, and what is no tachometer."""
+"""Spindle speed from tachometer pulses: exact turns over their time, and signals that are not tachometers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units of recorded files: what is known is exact, what is not is not guessed."""
+"""Units of recorded files: known units are exact, missing units are not guessed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MATLAB files of all versions with bits flipped, lengths garbled, parts zeroed and ends cut off: read or refused."""
+"""MATLAB files of all versions with bits flipped, lengths garbled, parts zeroed and ends cut off: read or rejected."""
 
 from __future__ import annotations
 

@@ -177,7 +177,7 @@ def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
 
 
 def test_objects_of_matlab_are_skipped(tmp_path: Path) -> None:
-    """Source: MAT-File Format (The MathWorks), level 5; class 17 is an object that MATLAB alone knows."""
+    """Source: MAT-File Format (The MathWorks), level 5; class 17 is an object that only MATLAB can read."""
 
     def element(kind: int, content: bytes) -> bytes:
         return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)

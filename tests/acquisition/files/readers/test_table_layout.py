@@ -1,4 +1,4 @@
-"""Text tables as analysers, loggers and spreadsheets write them: read as they are, or asked about in one message."""
+"""Text tables of analysers, loggers and spreadsheets: read, or one message that names all missing facts."""
 
 from __future__ import annotations
 

@@ -29,14 +29,14 @@ def chatter(*pairs: tuple[float, float]) -> tuple[float, Sequence[float]]:
 
 
 def test_chatter_is_named_by_its_largest_displacement_and_has_all_lines_of_its_family() -> None:
-    """Beside it a line that is louder, of less displacement and alone."""
+    """A single louder line of less displacement is present too."""
     family = [(912.0, 0.05), (112.0, 0.001), (1712.0, 10.0), (2512.0, 9.0), (688.0, 0.2), (1488.0, 0.04)]
     assert chatter(*family, (3050.0, 12.0)) == (1712.0, [frequency for frequency, loud in family if loud > 0.01])
     assert chatter(*family, (3050.0, 12.0))[1][0] == 912.0
 
 
 def test_multiples_of_chatter_with_side_bands_speak_for_it() -> None:
-    """Chatter at 1300 Hz that leaves the cut sounds louder at 2 f and 3 f with side bands; those alone explain less."""
+    """Chatter at 1300 Hz that leaves the cut sounds louder at 2 f and 3 f with side bands; each alone explains less."""
     base = [(1300.0, 5.0), (2100.0, 1.0)]
     double = [(2600.0, 9.0), (1800.0, 9.0), (1000.0, 2.0)]
     triple = [(3900.0, 9.0), (3100.0, 2.0)]

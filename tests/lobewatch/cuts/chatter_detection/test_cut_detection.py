@@ -17,7 +17,7 @@ PIECE = 0.02
 
 
 def recording(length: float, *loud: tuple[float, float], power: float = 4.0, low: float = 0.0) -> Floats:
-    """Noise over a length (s) with so many times the power between times (s); low: amplitude of 60 Hz beside it."""
+    """Noise over a length (s) with so many times the power between times (s); low: amplitude of an added 60 Hz tone."""
     random, time = np.random.default_rng(11), np.arange(round(length * RATE)) / RATE
     scale = np.ones(time.size)
     for begin, end in loud:
@@ -134,7 +134,7 @@ def test_air_may_be_a_twentieth_of_a_recording_and_anywhere_in_it() -> None:
 
 
 def test_what_is_below_100_hz_makes_no_cut() -> None:
-    """A floor that shakes 20 times as hard for a second, at 60 Hz; at 200 Hz it would be heard."""
+    """A floor that shakes 20 times as hard for a second, at 60 Hz; at 200 Hz it would be detected."""
     time = np.arange(round(2.0 * RATE)) / RATE
     for frequency, reason in ((60.0, "no-cut"), (200.0, "")):
         shake = np.where((time > 0.5) & (time < 1.5), 5.0 * np.sin(2 * np.pi * frequency * time), 0.0)

@@ -23,7 +23,7 @@ AIR, CUT, AFTER = 0.5, 1.2, 0.3
 
 
 def sines(lines: Any, n: int, random: np.random.Generator) -> Floats:
-    """Lines (Hz, m/s^2) sampled without a filter: what is above half the sample rate is folded."""
+    """Lines (Hz, m/s^2) sampled without a filter: lines above half the sample rate are aliased."""
     time = np.arange(n) / RATE
     signal = np.zeros(n)
     for frequency, amplitude in lines:
@@ -276,7 +276,7 @@ def slow(orders: Any, rate: float = 1650.0) -> CutEvaluation:
 
 
 def test_tooth_passing_that_a_slow_sensor_folds_back_is_no_chatter() -> None:
-    """604 Hz stands, 1208, 1812 and 2415 Hz are heard at 442, 162 and 765 Hz."""
+    """604 Hz is in band; 1208, 1812 and 2415 Hz alias to 442, 162 and 765 Hz."""
     heard = slow([(3, 5.0), (6, 2.0), (9, 12.0), (12, 0.5), (1, 0.1), (2, 0.3)])
     assert heard.verdict == "stable"
     assert heard.speed_rpm == pytest.approx(SPEED, rel=1e-3)
@@ -356,7 +356,7 @@ def test_a_speed_that_wavers_several_times_a_second_is_no_chatter(rate: float, c
 
 
 def test_loud_lines_near_multiples_are_chatter_all_the_same() -> None:
-    """0.1 % beside the 28th, with the energy of the comb: no speed that wavers leaves its multiples so faint."""
+    """0.1 % off the 28th, with the energy of the comb: an unsteady speed never leaves such faint multiples."""
     heard = listen(recorded(a_cut(chatter=28.03 * TURN, loud=30.0)))
     assert heard.verdict == "chatter"
     assert heard.chatter is not None

@@ -115,7 +115,7 @@ def test_a_line_belongs_to_the_exact_lattice_within_0_6_bins(bins: float, is_tak
 
 
 def test_where_lines_say_nothing_or_pull_too_far_the_speed_stays_what_it_was() -> None:
-    """A line of chatter alone says nothing of the speed; 0.5 % is too far."""
+    """A single chatter line does not determine the speed; 0.5 % is too far."""
     nothing = refine_speed(TURN, lines([CHATTER]), BIN)
     assert (nothing.frequency, nothing.error, nothing.share, nothing.agreeing) == (TURN, np.inf, 0.0, 0)
     assert nothing.misfit == 10**2

@@ -42,7 +42,7 @@ def sum_of(cut: Floats, air: Floats, frequency: float = TURN) -> float:
 
 
 def test_sixteen_weak_multiples_of_which_few_stand_clear_have_one_speed() -> None:
-    """0.02 % is less than a bin at the sixteenth; lines alone give a speed in less than half of these."""
+    """0.02 % is less than a bin at the sixteenth; single lines give a speed in less than half of these."""
     speeds, by_lines = [], 0
     for seed in range(20):
         cut = noise(seed) + comb(list(range(1, 17)))

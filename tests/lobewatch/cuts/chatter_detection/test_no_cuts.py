@@ -97,7 +97,7 @@ def test_coolant_that_is_switched_on_is_no_cut_and_hides_none() -> None:
 
 
 def test_a_clipped_cut_is_no_chatter() -> None:
-    """Clipping makes multiples of the turns only; where it is told of, it is an overload."""
+    """Clipping creates multiples of the spindle frequency only; reported clipping is an overload."""
     signal = np.clip(between(1.0, 3.0) * teeth() + noise(9), -12.0, 12.0)
     assert [heard.verdict for heard in heard_in(signal)] == ["stable"]
     clipped = np.abs(signal) >= 12.0
@@ -106,7 +106,7 @@ def test_a_clipped_cut_is_no_chatter() -> None:
 
 
 def tone(loud: float = 4.0) -> Floats:
-    """One that no multiple explains, alone."""
+    """Return a single tone that no multiple explains."""
     return loud * np.sin(2 * np.pi * 1234.5 * TIME)
 
 

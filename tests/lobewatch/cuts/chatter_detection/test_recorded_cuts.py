@@ -61,7 +61,7 @@ class Case:
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Depths over the limit that are simulated: its own, those beside it, and one where nothing chatters."""
+        """Simulated depths over the limit: its own, its neighbours, and a stable one."""
         return (self.share, *(self.share * near for near in NEAR), 0.4)
 
     def milled(self, share: float) -> MillingCut:
@@ -86,7 +86,7 @@ class TipRecord(NamedTuple):
     """Displacement over depth."""
 
     def chatters(self, quiet: TipRecord) -> bool:
-        """Return whether it chatters, compared with one that does not."""
+        """Return whether the cut chatters, compared with a stable one."""
         return self.beside > CHATTERS or self.per_depth > LOCKED * quiet.per_depth
 
 

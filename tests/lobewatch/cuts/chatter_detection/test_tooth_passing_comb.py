@@ -48,7 +48,7 @@ def test_lines_anywhere_are_no_comb() -> None:
 
 
 def test_multiples_that_a_slow_sample_rate_folds_back_are_a_comb_too() -> None:
-    """At 1650 Hz: 201, 403, 604 and 805 Hz stand, 1208 and 1610 Hz are heard at 442 and 40 Hz."""
+    """At 1650 Hz: 201, 403, 604 and 805 Hz are in band, 1208 and 1610 Hz alias to 442 and 40 Hz."""
     rate, orders = 1650.0, np.array([3, 4, 5, 6, 9])
     heard = fold_frequency(orders * TURN, rate)
     assert comb_of(heard, rate=rate) == pytest.approx(TURN, rel=1e-6)

@@ -139,7 +139,7 @@ DOUBT = Uncertainty(
 
 
 def heard(cuts: Sequence[MillingCut]) -> list[tuple[CutVerdict, float]]:
-    """Word and chatter frequency (Hz) of cuts, from their motion alone."""
+    """Verdict and chatter frequency (Hz) of cuts, from their motion only."""
     found: list[tuple[CutVerdict, float]] = [("stable", np.nan)] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
         teeth = round(motion.sample_rate * cuts[number].tooth_period)

@@ -198,7 +198,7 @@ def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
 
 
 def test_intervals_hold_95_percent_of_the_weight() -> None:
-    """For 700 samples of which half have ten times the weight, against the weighted distribution itself."""
+    """For 700 samples, half with ten times the weight, against the weighted distribution."""
     log_weight = np.where(np.arange(700) % 2 == 0, 0.0, np.log(10.0))
     learnt = replace(Mill().prior, log_weight=log_weight)
     values, interval = learnt.samples.ratios()["tangential"], learnt.intervals["tangential"]
@@ -270,7 +270,7 @@ def test_samples_are_drawn_as_often_as_their_weight_says_but_for_one() -> None:
 
 
 def test_samples_that_are_made_again_are_those_of_prior_and_likelihood() -> None:
-    """Against 12 000 draws that are only weighted: mean and spread of what three cuts have taught."""
+    """Against 12 000 weighted samples: mean and spread after three cuts."""
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
     few, many = mill.prior, build_prior(mill.middle, doubt(), 12000, seed=1)

@@ -21,7 +21,7 @@ KR_OVER_KT = FactorRange(0.5, 1.1)
 
 
 def draws(*rows: dict[int, float], ratio: FactorRange = KR_OVER_KT) -> SpindleSamples:
-    """Draws in the middle of the prior, but for some standard deviations of some numbers; ratio: doubt of Kr/Kt."""
+    """Return samples at the prior centre, shifted by standard deviations; ratio: uncertainty of Kr/Kt."""
     middle = Mill().prior.samples[: len(rows)]
     middle.normal[:] = 0.0
     for number, row in enumerate(rows):

@@ -130,7 +130,7 @@ def test_the_gain_is_that_over_the_best_cut_so_far_by_the_chance_that_it_is_stab
 
 
 def test_a_gain_below_half_a_percent_of_the_best_so_far_is_none(mill: Mill) -> None:
-    """One speed, at which any spindle is stable to the end of the flutes: what is gained is certain."""
+    """One speed, at which any spindle is stable over the whole flute length: the gain is certain."""
     grid = replace(mill.grid, speeds=np.array([12000.0]), max_depths=np.array([2e-4]), zero_order_trust=np.ones(1))
     rate = 12000 * 2e-4
     for gain, is_worth in ((0.0055, True), (0.0045, False)):
@@ -158,7 +158,7 @@ def test_a_cut_settles_what_its_outcome_depends_on_most() -> None:
 
 
 def test_where_zero_order_is_not_exact_a_cut_is_made_shallower_until_it_is_likely_stable() -> None:
-    """Zero order is told to be three times too shallow: what it proposes chatters."""
+    """Zero order is made three times too shallow: its proposals chatter."""
     mill = Mill(cut=Cut(2, 0.3, "down", 1.4e9, 5e8))
     grid = replace(mill.grid, zero_order_trust=np.full(mill.grid.speeds.shape, 1.7))
     suggestion = suggest_cut(mill.prior, grid, (), 1)

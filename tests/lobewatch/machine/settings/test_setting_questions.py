@@ -1,4 +1,4 @@
-"""A slip of 1000 in any number of machine.toml is refused, asked about, or in the table of docs/plausible.md."""
+"""A factor of 1000 in any number of machine.toml is rejected, questioned, or in the table of docs/plausible.md."""
 
 from __future__ import annotations
 

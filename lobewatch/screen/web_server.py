@@ -1,6 +1,7 @@
 """Serve pages, live feeds and session routes from a thread."""
 
 import asyncio
+import contextlib
 import logging
 import socket
 import threading
@@ -213,6 +214,9 @@ class WebServerThread:
         serving = self._loop.create_task(self.limiter.serve(listener, server))
         self._ready.set()
         await self._stop.wait()
+        with contextlib.suppress(NotImplementedError):  # Windows closes what it accepts when cancelled
+            self._loop.remove_reader(listener)
+        await asyncio.sleep(0)  # serve takes a connection that was accepted in this turn, or nobody would close it
         serving.cancel()
         await asyncio.wait([serving])
 

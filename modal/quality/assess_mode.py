@@ -10,6 +10,7 @@ from acquisition import Frf, Remark, is_smoothed
 from modal.arrays import Floats
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
+from modal.bands.frf_lines import mean_coherence
 from modal.bands.residual_analysis import residual_near_mode
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.modes.measurement_effects import common_delay
@@ -94,12 +95,8 @@ def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
 
 
 def _mode_coherence(state: Extraction, mode: Mode) -> float | None:
-    frf = state.frf
-    if frf.coherence is None or not frf.has_random_error:
-        return None
-    distance = np.abs(frf.frequency - mode.frequency)
-    near = distance <= max(mode.damping_ratio * mode.frequency, distance.min())
-    return float(np.mean(frf.coherence[near]))
+    distance = np.abs(state.frf.frequency - mode.frequency)
+    return mean_coherence(state.frf, distance <= max(mode.damping_ratio * mode.frequency, distance.min()))
 
 
 def _edge_distance(state: Extraction, mode: Mode) -> float:

@@ -164,8 +164,8 @@ def stabilisation_charts(state: Extraction) -> list[StabilisationChart]:
     list of StabilisationChart
         Charts of the bands by rising frequency, then those of the gaps.
     """
-    between = [state.data(lines).chart for lines in _gaps_between_bands(state)]
-    return [*(band.data.chart for band in state.bands), *between]
+    gaps = [state.data(lines) for lines in _gaps_between_bands(state)]
+    return [data.chart for data in (*(band.data for band in state.bands), *gaps)]
 
 
 def candidate_frequencies(state: Extraction) -> Floats:
@@ -185,7 +185,8 @@ def candidate_frequencies(state: Extraction) -> Floats:
         Natural frequencies (Hz), rising.
     """
     modes = np.array([frequency for band in state.bands for frequency in band.fit.frequency])
-    return np.sort([frequency for frequency, zeta in _visible_poles(state) if _is_unfitted(frequency, zeta, modes)])
+    reach = ((f, max(zeta, FITTED_MODE_DISTANCE) * f) for f, zeta in _visible_poles(state))
+    return np.sort([f for f, near in reach if np.min(np.abs(modes - f), initial=np.inf) > near])
 
 
 def _visible_poles(state: Extraction) -> Iterator[tuple[float, float]]:
@@ -196,10 +197,6 @@ def _visible_poles(state: Extraction) -> Iterator[tuple[float, float]]:
             there = measured[np.argmin(np.abs(state.frf.frequency - frequency))]
             if np.pi * frequency * largest / zeta > MIN_CANDIDATE_SHARE * there:
                 yield float(frequency), float(zeta)
-
-
-def _is_unfitted(frequency: float, zeta: float, modes: Floats) -> bool:
-    return bool(np.min(np.abs(modes - frequency), initial=np.inf) > max(zeta, FITTED_MODE_DISTANCE) * frequency)
 
 
 def _gaps_between_bands(state: Extraction) -> Iterator[slice]:

@@ -104,18 +104,13 @@ def systematic_error(band: FittedBand) -> SystematicError:
     of its peak, may hide an error of four times that share of its half-width, its damping ratio and its size, whatever
     its correlation: several sensors of the same hits differ by that.
     """
-    fit = band.fit
-    hidden = _hidden_error(band)
-    independent = _count_independent_values(fit)
-    share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(fit.residual.size / 2)
-    is_white = independent > fit.degrees_of_freedom * share
-    if is_white or has_rounding_residual(band):
-        return SystematicError(1.0, fit.degrees_of_freedom, np.diag(hidden**2))
+    hidden, independent, freedom = _hidden_error(band), _count_independent_values(band.fit), band.fit.degrees_of_freedom
+    share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(band.fit.residual.size / 2)
+    if independent > freedom * share or has_rounding_residual(band):
+        return SystematicError(1.0, freedom, np.diag(hidden**2))
     moved = np.array(list(_trial_changes(band))).reshape(-1, hidden.size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
-    freedom = fit.degrees_of_freedom
-    covariance = np.diag(most**2 + hidden**2)
-    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), covariance)
+    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), np.diag(most**2 + hidden**2))
 
 
 def _hidden_error(band: FittedBand) -> Floats:
@@ -145,13 +140,10 @@ def _count_independent_values(fit: BandFit) -> float:
 def _trial_changes(band: FittedBand) -> Iterator[Floats]:
     """Yield the changes of the modes in trial fits, in the order of `BandFit`; 0 for modes whose peak a trial cuts."""
     fit, data, n = band.fit, band.data, band.data.frequency.size
-    everything = slice(0, n)
     counts = range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
-    trials = [(everything, terms) for terms in counts if terms != band.terms]
-    for part, terms in [
-        *trials,
-        *((slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES),
-    ]:
+    trials = [(slice(0, n), terms) for terms in counts if terms != band.terms]
+    trials += [(slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES]
+    for part, terms in trials:
         values = refit_nearby(fit, data.frequency[part], data.target[:, part], data.weight[:, part], terms)
         if values is not None:
             moved = _change_of_values(fit, *values).reshape(-1, fit.frequency.size)

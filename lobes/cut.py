@@ -7,9 +7,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Floats
 from lobes.coefficients import check_coefficients
 from modal import Mode
+from modal.arrays import Floats
 
 Direction = Literal["up", "down"]
 """Direction of milling: up (conventional) or down (climb)."""

@@ -10,8 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.arrays import Floats
 from lobes.stability_lobes import check_speeds
+from modal.arrays import Floats
 
 Column = Floats | NDArray[np.str_]
 ColumnT = TypeVar("ColumnT", Floats, Column)

@@ -6,11 +6,11 @@ from functools import partial
 import numpy as np
 
 from acquisition import Remark
-from lobes.arrays import Complexes, Floats, Indices, Integers
 from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
 from lobes.tooth_force import mean_regeneration
+from modal.arrays import Complexes, Floats, Indices, Integers
 
 MIN_UNEVEN_RESPONSE = 0.02
 """Least response that is searched, over its largest value."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Frf
-from lobes.arrays import Complexes, Floats, Integers
 from lobes.tip_response import check_modes
 from modal import Mode
+from modal.arrays import Complexes, Floats, Integers
 
 MAX_UNDERDAMPED_RATIO = 0.99
 """Largest damping ratio of a complex mode; a larger one, as of a sample, is replaced by it."""

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Floats, Indices
 from lobes.stability_lobes import StabilityLobes
+from modal.arrays import Floats, Indices
 
 
 def find_curve_peaks(values: Floats, prominence: float) -> Indices:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition import Remark
-from lobes.arrays import Flags, Floats
 from lobes.cut import Cut
+from modal.arrays import Flags, Floats
 
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:

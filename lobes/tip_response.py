@@ -7,8 +7,8 @@ import numpy as np
 import scipy
 
 from acquisition import Frf
-from lobes.arrays import Complexes, Floats
 from modal import Mode
+from modal.arrays import Complexes, Floats
 
 TipData = Frf | Sequence[Mode]
 """Data of the tool tip in one direction: its measured FRF, or its modes."""

@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from lobes.arrays import Complexes, Floats
 from lobes.cut import Cut
+from modal.arrays import Complexes, Floats
 
 
 def mean_force(cut: Cut) -> Floats:

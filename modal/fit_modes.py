@@ -19,7 +19,7 @@ from modal.hit_scatter import (
     jackknife_covariance,
     leave_one_out_frfs,
 )
-from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
+from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 
 
@@ -351,10 +351,8 @@ def _decay_covariance(band: FittedBand) -> Floats:
 def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
     """Remove the values of a mode that need the force."""
     return replace(
-        mode,
+        change_covariances(mode, _pole_covariance),
         stiffness=np.nan,
-        covariance=_pole_covariance(mode.covariance),
-        jackknife=_pole_covariance(mode.jackknife),
         phase_deg=0.0,
         phase_deg_std=0.0,
         phase_correlation=None,
@@ -364,10 +362,8 @@ def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
     )
 
 
-def _pole_covariance(covariance: Floats | None) -> Floats | None:
+def _pole_covariance(covariance: Floats) -> Floats:
     """Return the covariance with NaN for the stiffness."""
-    if covariance is None:
-        return None
     known = np.full((3, 3), np.nan)
     known[:2, :2] = covariance[:2, :2]
     return known

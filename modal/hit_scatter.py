@@ -1,16 +1,15 @@
 """Estimate errors of modes from single hits: hammer noise, jackknife, linearity check."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from acquisition import Frf, Hit, Remark, remove_sensor_mass
+from acquisition import Frf, Hit, remove_sensor_mass
 from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.arrays import Complexes, Floats
 from modal.bands.extraction import Extraction, FittedBand
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, add_remark
 from modal.quality.trust import Trust, assess_trust
 
 
@@ -107,12 +106,9 @@ def add_linearity_remarks(
     if len(hits) < MIN_HITS_FOR_LINEARITY or np.max(peaks) < MIN_LINEARITY_FORCE_RATIO * np.min(peaks):
         return [*modes]
     alone = band_changes(state, band, 0, without, state.frf.receptance[band.lines])[:, : len(modes)]
-    return [_add_linearity_remark(mode, peaks, _change_per_hit(alone[:, i], peaks**2)) for i, mode in enumerate(modes)]
-
-
-def _change_per_hit(change: Floats, power: Floats) -> Floats:
-    """Return the frequency changes (Hz) of single hits against all, from those without each."""
-    return np.asarray(-change * (np.sum(power) - power) / power)
+    power = (peaks**2)[:, np.newaxis]
+    changes = -alone * (np.sum(power) - power) / power
+    return [_add_linearity_remark(mode, peaks, change) for mode, change in zip(modes, changes.T, strict=True)]
 
 
 def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
@@ -125,8 +121,7 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     forces = f"from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
     shift = f"{per * slope:+.2g} ± {per * error:.1g} % for 100 N more, {forces}"
     text = f"{words} with the force of the hit: f_n changes by {shift}"
-    cure = "look at joints and clamping; hit equally hard"
-    return replace(mode, remarks=(*mode.remarks, Remark("force-dependent", f"{mode.frequency:.0f} Hz", text, cure)))
+    return add_remark(mode, "force-dependent", text, "look at joints and clamping; hit equally hard")
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:

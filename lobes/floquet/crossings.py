@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, count_pieces
 from lobes.floquet.multipliers import growth_rate, largest_multipliers
+from modal.arrays import Complexes, Flags, Floats, Indices, Integers
 
 SCAN_DEPTHS = 24
 """Depths that are evaluated before anything is refined."""

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from lobes.arrays import Flags, Floats, Integers
 from lobes.cut import Cut
 from lobes.milling_system import MillingSystem, tip_participation
+from modal.arrays import Flags, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)

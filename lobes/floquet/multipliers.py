@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, divide_segments, is_out_of_cut, segment_ends
 from lobes.floquet.period_map import PeriodMap, UnevenMap, build_period_map
 from lobes.floquet.piece_response import gauss_nodes
+from modal.arrays import Complexes, Flags, Floats, Indices, Integers
 
 ARNOLDI_ATTEMPTS = ((10, 8), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt for cases that have not converged.

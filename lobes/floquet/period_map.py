@@ -31,10 +31,10 @@ from typing import Any
 
 import numpy as np
 
-from lobes.arrays import Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, is_out_of_cut, segment_ends
 from lobes.floquet.piece_response import PieceResponse, free_response, gauss_nodes, interpolation_weights
 from lobes.tooth_force import feed_rotation, force_shares
+from modal.arrays import Floats, Indices, Integers
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
 
-from lobes.arrays import Complexes, Floats
 from lobes.floquet.milling_rows import MillingRows
+from modal.arrays import Complexes, Floats
 
 NODES_PER_PIECE = 8
 """Nodes of one piece: a polynomial of degree 7 for the displacement, of order 16 at the end of the piece."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Flags, Integers
 from lobes.cut import CHECKED_DEPTH_SHARES, Cut, DirectionModes, Program
 from lobes.floquet.crossings import converged_crossings
 from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
@@ -14,6 +13,7 @@ from lobes.floquet.multipliers import growth_rate
 from lobes.floquet.stability_boundary import chatter_at_limits
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
+from modal.arrays import Flags, Integers
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
 """Largest searched limit over the depth of the program."""

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.arrays import Complexes, Floats, Integers
 from lobes.cut import Cut
 from lobes.floquet.crossings import converged_crossings, is_flip
 from lobes.floquet.milling_rows import MillingRows, count_pieces, rows_at_speeds
@@ -14,6 +13,7 @@ from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import StabilityLobes, check_speeds
 from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
 from modal import Mode
+from modal.arrays import Complexes, Floats, Integers
 
 MAX_CHATTER_FREQUENCY_RATIO = 2.0
 """Highest searched frequency over the highest natural frequency, to which three tooth frequencies are added."""

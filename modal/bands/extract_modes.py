@@ -22,7 +22,8 @@ from modal.bands.residual_analysis import has_rounding_residual
 
 def limit_to_one_thread() -> AbstractContextManager[object]:
     """Limit the numerical libraries to one thread: with two, small matrices take three times as long."""
-    return _thread_controller().limit(limits=1)
+    limited: AbstractContextManager[object] = _thread_controller().limit(limits=1)
+    return limited
 
 
 @cache

@@ -50,7 +50,8 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
     """
     bases = _term_bases(frequency, weight, terms)
     values = _project_out(bases, split_complex(weight * receptance)[:, np.newaxis])
-    return ProjectedBand(1j * frequency, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
+    root = np.asarray(1j * frequency)
+    return ProjectedBand(root, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
 
 
 def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
@@ -220,7 +221,8 @@ def _poles_for_real_constants(fit: BandFit) -> Floats:
 
 def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     real, held = np.zeros(state.constant.shape), np.array(~state.free[: state.poles.shape[1]])
-    return BandFit(*state.poles, state.constant, state.degrees_of_freedom, with_phases, state.residual, real, held)
+    (f, zeta), freedom = state.poles, state.degrees_of_freedom
+    return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, real, held)
 
 
 def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -244,15 +244,9 @@ class Mode:
             Scaled mode.
         """
         scale = np.outer(*2 * [np.array([frequency, 1.0, stiffness])])
-        covariance, jackknife = (None if c is None else c * scale for c in (self.covariance, self.jackknife))
-        return replace(
-            self,
-            frequency=self.frequency * frequency,
-            stiffness=self.stiffness * stiffness,
-            covariance=covariance,
-            jackknife=jackknife,
-            method=f"{self.method}, {method}".removeprefix(", "),
-        )
+        scaled = change_covariances(self, lambda covariance: covariance * scale)
+        words = f"{self.method}, {method}".removeprefix(", ")
+        return replace(scaled, frequency=self.frequency * frequency, stiffness=self.stiffness * stiffness, method=words)
 
     def receptance(self, frequency: Floats) -> Complexes:
         """Return the receptance of this mode alone.
@@ -275,6 +269,22 @@ class Mode:
 def ratio_or_zero(value: Floats, error: Floats) -> Floats:
     """Return values over errors; 0 for a value without error."""
     return np.divide(value, error, out=np.zeros(value.shape), where=error != 0)
+
+
+def change_covariances(mode: Mode, change: Callable[[Floats], Floats]) -> Mode:
+    """Return the mode with both covariances changed, as far as they are known."""
+    covariance, jackknife = (None if own is None else change(own) for own in (mode.covariance, mode.jackknife))
+    return replace(mode, covariance=covariance, jackknife=jackknife)
+
+
+def mode_remark(mode: Mode, code: str, text: str, cure: str = "") -> Remark:
+    """Return a remark at the frequency of a mode."""
+    return Remark(code, f"{mode.frequency:.0f} Hz", text, cure)
+
+
+def add_remark(mode: Mode, code: str, text: str, cure: str) -> Mode:
+    """Return the mode with one remark more."""
+    return replace(mode, remarks=(*mode.remarks, mode_remark(mode, code, text, cure)))
 
 
 def _root_of_diagonal(covariance: Floats | None) -> Floats:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Frf
-from lobes.tip_response import check_modes
+from lobes.coefficients import check_number
+from lobes.tip_response import TipModes, check_modes
 from modal import Mode
 from modal.arrays import Complexes, Floats, Integers
 
@@ -64,9 +65,7 @@ def tip_participation(damping_ratio: Floats, phase: Floats) -> tuple[Floats, Flo
     return np.cos(phase) + velocity * damping_ratio, velocity
 
 
-def build_milling_system(
-    x: Sequence[Mode] | None, y: Sequence[Mode] | None, vectors: ArrayLike | None = None
-) -> MillingSystem:
+def build_milling_system(x: TipModes, y: TipModes, vectors: ArrayLike | None = None) -> MillingSystem:
     """Build the system of the modes in the feed (x) and normal (y) direction.
 
     Parameters
@@ -223,8 +222,7 @@ def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio:
             f"rule={rule!r} is none of {', '.join(get_args(StiffnessRule))}; choose what K does when f_n falls"
         )
     for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name}={value} is not a finite number > 0; give new over old")
+        check_number(name, value, "is not a finite number > 0; give new over old")
     if rule == "measured" and stiffness_ratio is None:
         raise ValueError('rule="measured" needs stiffness_ratio, K of the new tap test over K of the baseline')
     if rule == "paper" and stiffness_ratio is not None:

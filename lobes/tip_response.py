@@ -10,6 +10,8 @@ from acquisition import Frf
 from modal import Mode
 from modal.arrays import Complexes, Floats
 
+TipModes = Sequence[Mode] | None
+"""Modes of the tool tip in one direction; None if it is rigid or unknown."""
 TipData = Frf | Sequence[Mode]
 """Data of the tool tip in one direction: its measured FRF, or its modes."""
 

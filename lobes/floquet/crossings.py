@@ -9,6 +9,7 @@ import numpy as np
 
 from lobes.floquet.milling_rows import MillingRows, count_pieces
 from lobes.floquet.multipliers import growth_rate, largest_multipliers
+from lobes.stability_lobes import pad_columns
 from modal.arrays import Complexes, Flags, Floats, Indices, Integers
 
 SCAN_DEPTHS = 24
@@ -168,8 +169,7 @@ def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, In
             return crossings, number
         number[moved] *= 2
         again = find_crossings(_growth_function(rows[moved], number[moved]), moved.size, max_depth)
-        width = max(crossings.shape[1], again.shape[1])
-        crossings, again = (_pad_columns(table, width) for table in (crossings, again))
+        crossings, again = pad_columns([crossings, again])
         crossings[moved] = again
     limit_holds, _ = _has_converged(rows, crossings[:, 0], number)
     if np.all(limit_holds):
@@ -189,10 +189,6 @@ def _has_converged(rows: MillingRows, depth: Floats, number: Integers) -> tuple[
         limit[limited] = (np.abs(fine[:, 0]) < 1) & (np.abs(fine[:, 1]) > 1)
         kind[limited] = is_flip(fine[:, 1]) == is_flip(coarse[:, 0])
     return limit, kind
-
-
-def _pad_columns(table: Floats, width: int) -> Floats:
-    return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=np.inf)
 
 
 def is_flip(multiplier: Complexes) -> Flags:

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.cut import CHECKED_DEPTH_SHARES, Cut, DirectionModes, Program
+from lobes.cut import CHECKED_DEPTH_SHARES, Cut, Program
 from lobes.floquet.crossings import converged_crossings
 from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
 from lobes.floquet.multipliers import growth_rate
 from lobes.floquet.stability_boundary import chatter_at_limits
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
+from lobes.tip_response import TipModes
 from modal.arrays import Flags, Integers
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
@@ -49,11 +50,7 @@ class ProgramLimit:
 
 
 def program_limit(
-    program: Program,
-    x: DirectionModes,
-    y: DirectionModes,
-    cuts: Sequence[Cut] | None = None,
-    vectors: ArrayLike | None = None,
+    program: Program, x: TipModes, y: TipModes, cuts: Sequence[Cut] | None = None, vectors: ArrayLike | None = None
 ) -> ProgramLimit:
     """Compute stability and limit of a program by semi-discretization, for the worst of its cuts.
 

@@ -1,18 +1,17 @@
 """Stability boundary over speed by semi-discretisation, and its chatter frequencies."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.coefficients import check_number
 from lobes.cut import Cut
 from lobes.floquet.crossings import converged_crossings, is_flip
 from lobes.floquet.milling_rows import MillingRows, count_pieces, rows_at_speeds
 from lobes.floquet.multipliers import largest_multipliers, spectral_radii
 from lobes.milling_system import MillingSystem, build_milling_system
-from lobes.stability_lobes import StabilityLobes, check_speeds
+from lobes.stability_lobes import StabilityLobes, check_speeds, check_vector
+from lobes.tip_response import TipModes
 from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
-from modal import Mode
 from modal.arrays import Complexes, Floats, Integers
 
 MAX_CHATTER_FREQUENCY_RATIO = 2.0
@@ -73,9 +72,7 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
 
 def check_depths(depth: ArrayLike) -> Floats:
     """Return axial depths (m) as a 1-D array; ValueError unless there is one and all are finite and >= 0."""
-    depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
-    if depths.ndim != 1 or depths.size == 0:
-        raise ValueError(f"depth has shape {depths.shape}; a 1-D array of at least one depth (m) is needed")
+    depths = check_vector("depth", depth, "depth (m)")
     bad = np.flatnonzero(~(np.isfinite(depths) & (depths >= 0)))
     if bad.size:
         raise ValueError(f"depth[{bad[0]}]={depths[bad[0]]} is not a finite depth >= 0 m; 1 mm is 1e-3")
@@ -83,12 +80,7 @@ def check_depths(depth: ArrayLike) -> Floats:
 
 
 def spectral_radius(
-    x: Sequence[Mode] | None,
-    y: Sequence[Mode] | None,
-    cut: Cut,
-    speed_rpm: ArrayLike,
-    depth: ArrayLike,
-    vectors: ArrayLike | None = None,
+    x: TipModes, y: TipModes, cut: Cut, speed_rpm: ArrayLike, depth: ArrayLike, vectors: ArrayLike | None = None
 ) -> Floats:
     """Return the largest magnitude of the Floquet multipliers over a tooth period; < 1 is stable.
 
@@ -141,12 +133,7 @@ def spectral_radius(
 
 
 def stability_boundary(
-    x: Sequence[Mode] | None,
-    y: Sequence[Mode] | None,
-    cut: Cut,
-    speed_rpm: ArrayLike,
-    max_depth: float,
-    vectors: ArrayLike | None = None,
+    x: TipModes, y: TipModes, cut: Cut, speed_rpm: ArrayLike, max_depth: float, vectors: ArrayLike | None = None
 ) -> StabilityLobes:
     """Compute the stability boundary over speed by semi-discretization.
 
@@ -196,8 +183,7 @@ def stability_boundary(
     ['1.11 mm, hopf', '1.53 mm, hopf', '2.12 mm, hopf', '0.96 mm, flip', '5.30 mm, flip']
     """
     system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
-    if not (np.isfinite(max_depth) and max_depth > 0):
-        raise ValueError(f"max_depth={max_depth} m is not a finite depth > 0; give the deepest cut of interest")
+    check_number("max_depth", max_depth, "m is not a finite depth > 0; give the deepest cut of interest")
     rows = rows_at_speeds(system, cut, speed)
     crossings, number = converged_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
@@ -206,15 +192,8 @@ def stability_boundary(
     if limited.size:
         chatter[limited], kind[limited] = chatter_at_limits(system, rows[limited], depth[limited], number[limited])
     low, high = int(np.min(number)), int(np.max(number))
-    return StabilityLobes(
-        speed_rpm=speed,
-        depth=depth,
-        chatter_frequency=chatter,
-        kind=kind,
-        crossings=crossings,
-        method="semi-discretisation",
-        detail=f"{low if low == high else f'{low} to {high}'} pieces of order 16 a tooth period",
-    )
+    detail = f"{low if low == high else f'{low} to {high}'} pieces of order 16 a tooth period"
+    return StabilityLobes(speed, depth, chatter, kind, crossings, "semi-discretisation", detail=detail)
 
 
 def chatter_at_limits(

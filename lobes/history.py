@@ -1,11 +1,8 @@
 """History of the stability-lobe diagrams (SLD) of one machine."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,14 +11,11 @@ from lobes.stability_lobes import check_speeds
 from modal.arrays import Floats
 
 Column = Floats | NDArray[np.str_]
-ColumnT = TypeVar("ColumnT", Floats, Column)
 
 
 @dataclass(frozen=True, eq=False)
 class SldHistory:
     """Limiting depths of n measurements over one speed grid, for each cut, with further measured values.
-
-    A history begins with arrays of no rows (n = 0), which fix the names and the row shapes.
 
     Raises
     ------
@@ -32,11 +26,10 @@ class SldHistory:
     Examples
     --------
     >>> speeds = np.linspace(4000.0, 18000.0, 8)  # rpm
-    >>> columns, depth = {"frequency": np.empty(0)}, {"slot": np.empty((0, 8))}
-    >>> empty = SldHistory("", "lobewatch", speeds, columns, depth, {"frequency": "Hz"})
-    >>> history = empty.append({"frequency": 696.2}, {"slot": np.full(8, 1.2e-3)})
-    >>> history.columns["frequency"].tolist(), history.depth["slot"].shape
-    ([696.2], (1, 8))
+    >>> columns, depth = {"frequency": [696.2, 695.8]}, {"slot": np.full((2, 8), 1.2e-3)}
+    >>> history = SldHistory("", "lobewatch", speeds, columns, depth, {"frequency": "Hz"})
+    >>> len(history), history.columns["frequency"].tolist(), history.depth["slot"].shape
+    (2, [696.2, 695.8], (2, 8))
     """
 
     settings_hash: str
@@ -85,43 +78,6 @@ class SldHistory:
     def __len__(self) -> int:
         """Return the number of measurements n."""
         return len(next(iter((*self.columns.values(), *self.depth.values())), ()))
-
-    def append(self, row_columns: Mapping[str, ArrayLike], row_depth: Mapping[str, ArrayLike]) -> SldHistory:
-        """Return a history with one more measurement.
-
-        Parameters
-        ----------
-        row_columns : mapping of str to array_like
-            One value, or (k,) values, for each column.
-        row_depth : mapping of str to array_like
-            Depths (m), shape (m,), for each cut.
-
-        Returns
-        -------
-        SldHistory
-            Longer history.
-
-        Raises
-        ------
-        ValueError
-            If names or shapes differ from those of this history.
-        """
-        return replace(self, columns=_append_row(self.columns, row_columns), depth=_append_row(self.depth, row_depth))
-
-
-def _append_row(table: Mapping[str, ColumnT], row: Mapping[str, ArrayLike]) -> dict[str, ColumnT]:
-    if table.keys() != row.keys():
-        raise ValueError(f"the new row has {sorted(row)}, the history {sorted(table)}; give a value for each of these")
-    return {name: _append_value(name, values, row[name]) for name, values in table.items()}
-
-
-def _append_value(name: str, values: ColumnT, row: ArrayLike) -> ColumnT:
-    new = np.asarray(row)
-    if new.shape != values.shape[1:]:
-        raise ValueError(f"the new row of {name!r} has shape {new.shape}, the history {values.shape[1:]} a row")
-    if (new.dtype.kind == "U") != (values.dtype.kind == "U"):
-        raise ValueError(f"the new row of {name!r} is {new.dtype}, the history {values.dtype}; keep text and numbers")
-    return np.concatenate((values, new[np.newaxis]))
 
 
 def _check_column(name: str, values: ArrayLike) -> Column:

@@ -54,12 +54,8 @@ def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
     """
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", userblock_size=HISTORY_HEAD_SIZE) as file:
-        file.attrs.update(
-            format=HISTORY_FORMAT,
-            version=HISTORY_FORMAT_VERSION,
-            settings_hash=history.settings_hash,
-            software=history.software,
-        )
+        file.attrs.update(format=HISTORY_FORMAT, version=HISTORY_FORMAT_VERSION)
+        file.attrs.update(settings_hash=history.settings_hash, software=history.software)
         speed = file.create_dataset("speed_rpm", data=history.speed_rpm)
         speed.attrs["units"] = "rpm"
         speed.make_scale("speed_rpm")
@@ -110,16 +106,13 @@ def read_history(path: str | os.PathLike[str]) -> SldHistory:
 
 
 def _file_head(body: bytes) -> bytes:
-    return f"{HISTORY_FORMAT} {HISTORY_FORMAT_VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n".encode().ljust(
-        HISTORY_HEAD_SIZE, b"\0"
-    )
+    head = f"{HISTORY_FORMAT} {HISTORY_FORMAT_VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n"
+    return head.encode().ljust(HISTORY_HEAD_SIZE, b"\0")
 
 
 def _write_column(columns: h5py.Group, name: str, values: Column, units: str | None) -> None:
-    if values.dtype.kind == "U":
-        dataset = columns.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
-    else:
-        dataset = columns.create_dataset(name, data=values)
+    data, kind = (values.astype(object), h5py.string_dtype()) if values.dtype.kind == "U" else (values, None)
+    dataset = columns.create_dataset(name, data=data, dtype=kind)
     if units is not None:
         dataset.attrs["units"] = units
 

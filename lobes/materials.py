@@ -69,25 +69,17 @@ def listed_materials() -> tuple[CuttingCoefficients, ...]:
     return tuple(_material_coefficients(row) for row in read_table("materials.csv"))
 
 
-@cache
-def _specific_forces_by_group() -> dict[str, list[SpecificForce]]:
-    by_name: dict[str, list[SpecificForce]] = {}
-    for row in read_table("specific_cutting_forces.csv"):
-        force = SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"])
-        by_name.setdefault(row["of"], []).append(force)
-    return by_name
-
-
-@cache
-def _force_ratios() -> dict[str, dict[str, str]]:
-    return {row["of"]: row for row in read_table("force_ratios.csv")}
+def _specific_forces(name: str) -> list[SpecificForce]:
+    rows = [row for row in read_table("specific_cutting_forces.csv") if row["of"] == name]
+    return [SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"]) for row in rows]
 
 
 def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     vdi, cmc = f"VDI {row['vdi_3323_group']}", f"CMC {row['cmc_code']}"
-    forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces_by_group().get(name, ())]
+    forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces(name)]
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
-    ratio = _force_ratios().get(vdi) or _force_ratios()[row["iso_group"]]
+    ratios = {each["of"]: each for each in read_table("force_ratios.csv")}
+    ratio = ratios.get(vdi) or ratios[row["iso_group"]]
     tangential = np.mean([f.tangential(REFERENCE_CHIP_THICKNESS) for f in forces] + [t.tangential for t in tests])
     edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
     edge = np.mean(edges + [test.tangential_edge for test in tests])

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import ArrayLike
 
 from lobes import SldHistory, read_history, write_history
 
@@ -86,45 +85,11 @@ def test_what_is_written_is_read(whole: SldHistory, tmp_path_factory: pytest.Tem
     assert_same(whole, read_history(path))
 
 
-def test_append_adds_a_row_and_leaves_the_old_history_alone() -> None:
-    old = history(1)
-    full = history()
-    new = old.append(
-        {name: values[1] for name, values in full.columns.items()},
-        {name: values[1] for name, values in full.depth.items()},
-    )
-    assert_same(full, new)
-    assert (len(old), len(new)) == (1, 2)
-    assert old.depth["reference"].shape == (1, 3)
-
-
 def test_a_history_begins_with_no_rows(tmp_path: Path) -> None:
     path = tmp_path / "history.h5"
     write_history(path, history(0))
     empty = read_history(path)
     assert len(empty) == 0
-    first: dict[str, ArrayLike] = {
-        "time": "2026-01-05",
-        "natural_frequency": [1722.0, 3010.0],
-        "bearing_stiffness": 2e8,
-    }
-    one = empty.append(first, {name: np.full(3, np.inf) for name in empty.depth})
-    assert one.columns["time"].tolist() == ["2026-01-05"]
-    assert one.columns["natural_frequency"].tolist() == [[1722.0, 3010.0]]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"time": "t"}, "the new row has"),
-        ({"time": 3.0, "natural_frequency": [1.0, 2.0], "bearing_stiffness": 2e8}, "keep text and numbers"),
-        ({"time": "t", "natural_frequency": [1.0], "bearing_stiffness": 2e8}, "'natural_frequency' has shape \\(1,\\)"),
-    ],
-)
-def test_rows_of_another_form_are_refused(change: dict[str, Any], message: str) -> None:
-    depth = {name: np.ones(3) for name in history().depth}
-    with pytest.raises(ValueError, match=message):
-        history().append(change, depth)
 
 
 @pytest.mark.parametrize(

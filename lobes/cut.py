@@ -27,15 +27,13 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
     """
     if not pitch:
         return ()
-    shown = ", ".join(f"{np.degrees(angle):g}" for angle in pitch)
+    shown = f"pitch [{', '.join(f'{np.degrees(angle):g}' for angle in pitch)}]"
     if len(pitch) != teeth:
-        raise ValueError(f"pitch [{shown}] degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
+        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
     if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
-        raise ValueError(
-            f"pitch [{shown}] degrees holds an angle that is not > 0; each tooth follows the one before it"
-        )
+        raise ValueError(f"{shown} degrees holds an angle that is not > 0; each tooth follows the one before it")
     if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:
-        raise ValueError(f"pitch [{shown}] sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
+        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
     alike = [next(other for other in pitch if abs(other - angle) < PITCH_TOLERANCE) for angle in pitch]
     return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
 
@@ -86,9 +84,8 @@ class Cut:
         if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1; give the number of cutting edges")
         if not 0 < self.immersion <= 1:
-            raise ValueError(
-                f"immersion={self.immersion} is not in (0, 1]; give radial depth divided by cutter diameter"
-            )
+            text = "is not in (0, 1]; give radial depth divided by cutter diameter"
+            raise ValueError(f"immersion={self.immersion} {text}")
         if self.direction not in get_args(Direction):
             raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
         check_coefficients(self.tangential, self.radial)

@@ -70,10 +70,8 @@ class SldHistory:
         if depth.ndim != 2 or depth.shape[1] != self.speed_rpm.size:
             raise ValueError(f"depth of {name!r} has shape {depth.shape}, not (n, {self.speed_rpm.size})")
         if np.any(depth <= 0):
-            raise ValueError(
-                f"depth of {name!r} has values that are not > 0 m; "
-                "give inf where there is no limit and nan where none was computed"
-            )
+            advice = "give inf where there is no limit and nan where none was computed"
+            raise ValueError(f"depth of {name!r} has values that are not > 0 m; {advice}")
 
     def __len__(self) -> int:
         """Return the number of measurements n."""
@@ -85,9 +83,8 @@ def _check_column(name: str, values: ArrayLike) -> Column:
         raise ValueError(f"column name {name!r} is not made of letters, digits and underscores; rename it")
     column = np.asarray(values)
     if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if column.dtype.kind == "U" else (1, 2)):
-        raise ValueError(
-            f"column {name!r} is {column.dtype} of shape {column.shape}; give numbers (n,) or (n, k), or text (n,)"
-        )
+        given = f"{column.dtype} of shape {column.shape}"
+        raise ValueError(f"column {name!r} is {given}; give numbers (n,) or (n, k), or text (n,)")
     if column.dtype.kind == "U":
         for text in column:
             _check_text(text)

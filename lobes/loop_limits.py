@@ -117,7 +117,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
     parts = [(branch.grid, response) for branch, response in zip(branches, responses, strict=True)]
     loops = [(*part, np.unique(waves[limited & (setting == i)])) for i, part in enumerate(parts) if not cut.pitch]
     grid, weakest = min(parts, key=lambda part: float(np.min(part[1].real)))
-    frequency = float(grid[np.argmin(weakest.real)])
+    lowest = float(grid[np.argmin(weakest.real)])
     return StabilityLobes(
         speed_rpm=speed_rpm,
         depth=depth,
@@ -126,7 +126,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         crossings=depth[:, np.newaxis],
         method=method,
         curves=lambda: chain.from_iterable(_lobes_of_loop(*loop, cut, speed_rpm) for loop in loops),
-        remarks=_band_remarks(grid, weakest.real) or _mean_force_remarks(method, cut, frequency, speed_rpm),
+        remarks=_band_remarks(grid, weakest.real) or _mean_force_remarks(method, cut, lowest, speed_rpm),
     )
 
 

@@ -122,9 +122,8 @@ def check_directions(vectors: ArrayLike, number: int) -> Floats:
     """Return the directions of the modes, shape (n, 2); ValueError if shape or values are wrong."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):
-        raise ValueError(
-            f"vectors has shape {vector.shape}; ({number}, 2) is needed, the parts in x and y of each mode"
-        )
+        needed = f"({number}, 2) is needed, the parts in x and y of each mode"
+        raise ValueError(f"vectors has shape {vector.shape}; {needed}")
     if not np.all(np.isfinite(vector)):
         raise ValueError("vectors holds a value that is not finite; give the parts in x and y of each mode")
     return vector
@@ -218,9 +217,8 @@ def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio:
     (900, 17.0)
     """
     if rule not in get_args(StiffnessRule):
-        raise ValueError(
-            f"rule={rule!r} is none of {', '.join(get_args(StiffnessRule))}; choose what K does when f_n falls"
-        )
+        known = ", ".join(get_args(StiffnessRule))
+        raise ValueError(f"rule={rule!r} is none of {known}; choose what K does when f_n falls")
     for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
         check_number(name, value, "is not a finite number > 0; give new over old")
     if rule == "measured" and stiffness_ratio is None:

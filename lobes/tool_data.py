@@ -122,9 +122,8 @@ def published_feed_per_tooth(
     """
     rows = _finest_group_rows("feeds_per_tooth.csv", material, tool, cut)
     sources = dict.fromkeys(row["source"] for row in rows)
-    return _join_ranges(
-        [_feed_at_diameter([row for row in rows if row["source"] == name], diameter) for name in sources], rows
-    )
+    by_source = [[row for row in rows if row["source"] == name] for name in sources]
+    return _join_ranges([_feed_at_diameter(own, diameter) for own in by_source], rows)
 
 
 def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> PublishedRange | None:
@@ -186,6 +185,5 @@ def _join_ranges(ranges: Sequence[tuple[float, float]], rows: Sequence[dict[str,
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     middle = (low + high) / 2
     sources = tuple(dict.fromkeys(row["source"] for row in rows))
-    return PublishedRange(
-        min(low, (1 - MIN_PUBLISHED_RANGE) * middle), max(high, (1 + MIN_PUBLISHED_RANGE) * middle), sources
-    )
+    low, high = min(low, (1 - MIN_PUBLISHED_RANGE) * middle), max(high, (1 + MIN_PUBLISHED_RANGE) * middle)
+    return PublishedRange(low, high, sources)

@@ -95,8 +95,7 @@ class _EditPlan:
     """Mark of what a person did to each mode."""
 
     def without(self, i: int) -> _EditPlan:
-        words = tuple(np.delete(np.array(self.words, dtype=object), i))
-        return replace(self, poles=np.delete(self.poles, i, axis=1), words=words)
+        return replace(self, poles=np.delete(self.poles, i, axis=1), words=(*self.words[:i], *self.words[i + 1 :]))
 
     def with_mode(self, frequency: float, zeta: float, word: str) -> _EditPlan:
         return replace(self, poles=np.column_stack([self.poles, [frequency, zeta]]), words=(*self.words, word))
@@ -130,35 +129,28 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    request = f"add {frequency:g} Hz"
+    request, advice = f"add {frequency:g} Hz", "look at the picture, or hold its damping ratio, too, with fix"
     plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
-            raise ValueError(
-                f"{request}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
-            )
+            mode = f"the mode at {known[0]:.1f} Hz"
+            raise ValueError(f"{request}: {mode} is there already; fix holds it, drop leaves it out")
     tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
     fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
-        raise ValueError(
-            f"{request}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix"
-        )
+        raise ValueError(f"{request}: no mode fits there; {advice}")
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
-        raise ValueError(
-            f"{request}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain "
-            f"by {100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
-        )
+        mode = f"{best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain by {100 * max(errors):.0f} %"
+        raise ValueError(f"{request}: no mode fits there: the best is at {mode}; {advice}")
     return replace_band(state, plan.band, best)
 
 
 def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
     request = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
     place = _find_mode(state, frequency)
-    plan = (
-        _plan_at_frequency(state, frequency, request) if place is None else _plan_for_band(place[0]).without(place[1])
-    )
+    plan = _plan_for_band(place[0]).without(place[1]) if place else _plan_at_frequency(state, frequency, request)
     fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
     if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
         raise ValueError(f"{request}: nothing of it is to be seen there; look at the picture")

@@ -101,21 +101,21 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     """
     if hits and len(hits) != len(state.frfs):
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
-    without = [leave_one_out_frfs(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
-    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, hits, without)]
+    pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
+    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
     return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
 
 
 def _modes_with_scatter(
-    state: Extraction, band: FittedBand, hits: Sequence[Sequence[Hit]], without: Sequence[Sequence[Frf]]
+    state: Extraction, band: FittedBand, pairs: list[tuple[Sequence[Hit], list[Frf]]]
 ) -> list[Mode]:
-    by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
-    n_hits = min(map(len, without), default=0)
-    jackknives = [jackknife_covariance(state, band, *pair) for pair in enumerate(without)] if n_hits else []
-    over_hits = np.sum(jackknives, axis=0) if n_hits else None
-    assessed = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, assessed, hits[0], without[0]) if n_hits else assessed
+    by_hammer = sum(hammer_covariance(state, band, i, hits) for i, (hits, _) in enumerate(pairs))
+    n_hits = min((len(without) for _, without in pairs), default=0)
+    if not n_hits:
+        return modes_from_band(state, band, by_hammer, None, 0)
+    over_hits = np.sum([jackknife_covariance(state, band, i, without) for i, (_, without) in enumerate(pairs)], axis=0)
+    return add_linearity_remarks(state, band, modes_from_band(state, band, by_hammer, over_hits, n_hits), *pairs[0])
 
 
 def modes_from_band(

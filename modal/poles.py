@@ -235,14 +235,12 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     >>> poles.frequency.round(1).tolist(), poles.damping_ratio.round(3).tolist()  # Hz, -
     ([500.0], [0.02])
     """
-    taken = np.zeros(chart.order.size, bool)
-    rows = []
-    lengths = _chain_lengths(chart)
-    for end in np.argsort(-lengths, kind="stable"):
-        if lengths[end] < MIN_STABLE_ORDERS:
-            break
-        chain = _trace_chain(chart, int(end))
-        if not taken[chain].any():
+    taken, rows = np.zeros(chart.order.size, bool), []
+    chains: list[list[int]] = []  # the last pole of each comes first
+    for i, previous in enumerate(chart.previous.tolist()):
+        chains.append([i, *(chains[previous] if previous >= 0 else ())])
+    for chain in sorted(chains, key=len, reverse=True):
+        if len(chain) > MIN_STABLE_ORDERS and not taken[chain].any():
             rows.append(_median_flexibility(chart, chain))
         taken[chain] = True
     rows.sort(key=lambda row: float(row[0].real))
@@ -250,24 +248,8 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     return PhysicalPoles(table[:, 0].real, table[:, 1].real, table[:, 3:], table[:, 2].real.astype(np.int64))
 
 
-def _chain_lengths(chart: StabilisationChart) -> Integers:
-    """Return the number of stable poles in the chain that ends at each pole."""
-    lengths = np.zeros(chart.order.size, dtype=np.int64)
-    for i in np.flatnonzero(chart.stable):
-        lengths[i] = lengths[chart.previous[i]] + 1
-    return lengths
-
-
-def _trace_chain(chart: StabilisationChart, end: int) -> Integers:
-    """Return the indices of the poles of the chain that ends here, the last one first."""
-    chain = [end]
-    while chart.previous[chain[-1]] >= 0:
-        chain.append(int(chart.previous[chain[-1]]))
-    return np.array(chain)
-
-
-def _median_flexibility(chart: StabilisationChart, chain: Integers) -> Complexes:
-    upper = chain[: (chain.size + 1) // 2]
+def _median_flexibility(chart: StabilisationChart, chain: list[int]) -> Complexes:
+    upper = chain[: (len(chain) + 1) // 2]
     a = chart.flexibility[upper]
-    poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), chain.size - 1]
+    poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), len(chain) - 1]
     return np.concatenate([poles, np.median(a.real, axis=0) + 1j * np.median(a.imag, axis=0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,10 +39,9 @@ def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Float
     could reach zero and come back: so short excursions and islands inside a step are found. Growth
     is negative at depth 0. k is at least 1.
     """
-    rows = np.arange(n_rows)
     depths = deepest * (np.arange(1, SCAN_DEPTHS + 1) / SCAN_DEPTHS) ** SCAN_EXPONENT
     depth = np.broadcast_to(depths, (n_rows, SCAN_DEPTHS))
-    value = growth(rows, depth, GROWTH_SIGN_ACCURACY)
+    value = growth(np.arange(n_rows), depth, GROWTH_SIGN_ACCURACY)
     brackets = _bracket_crossings(growth, _scan_steps(depth, value))
     return _pad_rows(brackets.row, _refine_crossings(growth, brackets), n_rows)
 
@@ -56,8 +55,7 @@ def _pad_rows(row: Indices, crossing: Floats, n_rows: int) -> Floats:
     return table
 
 
-@dataclass(frozen=True, eq=False)
-class _DepthSteps:
+class _DepthSteps(NamedTuple):
     """Steps between two depths, arrays of one shape (n,)."""
 
     row: Indices
@@ -70,8 +68,8 @@ class _DepthSteps:
     after: Floats
     """Steepness of growth in the step after."""
 
-    def __getitem__(self, which: Flags) -> _DepthSteps:
-        return _DepthSteps(*(getattr(self, field.name)[which] for field in fields(self)))
+    def where(self, which: Flags) -> _DepthSteps:
+        return _DepthSteps(*(column[which] for column in self))
 
     @property
     def crosses(self) -> Flags:
@@ -94,7 +92,7 @@ class _DepthSteps:
 
 
 def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
-    return _DepthSteps(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(_DepthSteps)))
+    return _DepthSteps(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:
@@ -112,13 +110,13 @@ def _bracket_crossings(growth: GrowthFunction, steps: _DepthSteps) -> _DepthStep
     done = []
     for _ in range(MAX_STEP_HALVINGS):
         may_hide = steps.may_hide
-        done.append(steps[~may_hide & steps.crosses])
-        steps = steps[may_hide]
+        done.append(steps.where(~may_hide & steps.crosses))
+        steps = steps.where(may_hide)
         if not steps.row.size:
             break
         middle = (steps.low + steps.high)[:, np.newaxis] / 2
         steps = steps.halves(growth(steps.row, middle, GROWTH_SIGN_ACCURACY)[:, 0])
-    return _join_steps(*done, steps[steps.crosses])
+    return _join_steps(*done, steps.where(steps.crosses))
 
 
 def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps) -> Floats:

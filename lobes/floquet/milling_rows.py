@@ -84,11 +84,6 @@ class MillingRows:
         """Time after which the cut repeats (s), shape (r,): the tooth period of evenly spaced teeth."""
         return self.tooth_period * len(self.cut.pitch_pattern)
 
-    @property
-    def force(self) -> Floats:
-        """Largest possible entry of the force matrix of a tooth, Ks (Pa), shape (r,)."""
-        return np.asarray(np.hypot(self.tangential, self.radial))
-
 
 _VARYING_FIELDS = [field.name for field in fields(MillingRows) if field.name not in ("cut", "direction", "axes")]
 
@@ -209,7 +204,8 @@ def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER
         Numbers of pieces.
     """
     dynamic_stiffness = 2 * rows.stiffness * rows.damping_ratio
-    loop = deepest * rows.force[:, np.newaxis] / dynamic_stiffness * np.hypot(*rows.tip_participation)
+    force = np.hypot(rows.tangential, rows.radial)[:, np.newaxis]  # largest possible entry of the matrix of a tooth
+    loop = deepest * force / dynamic_stiffness * np.hypot(*rows.tip_participation)
     loop = loop * np.sum(rows.vector**2, axis=-1)
     significant = np.where(loop > MIN_LOOP_GAIN, rows.frequency, 0.0)
     fastest = np.maximum(np.max(significant, axis=1), np.min(rows.frequency, axis=1))

@@ -161,7 +161,8 @@ class _KrylovSpace:
     @classmethod
     def of(cls, over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], steps: int) -> _KrylovSpace:
         """Return the first vectors (k = 0): a random one after some power steps."""
-        start = np.random.default_rng(0).normal(size=over_period.states).astype(over_period.kind)
+        zero = over_period.zero_state
+        start = np.random.default_rng(0).normal(size=zero.size).astype(zero.dtype)
         state = np.broadcast_to(start / np.linalg.norm(start), (*shape, start.size))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             for _ in range(steps):

@@ -92,19 +92,15 @@ class UnevenMap:
     """Number of directions p."""
 
     @property
-    def kind(self) -> np.dtype[Any]:
-        """Precision of the numbers."""
-        return self.pieces[0].matrix.dtype
-
-    @property
     def cutting(self) -> int:
         """Number of pieces in which teeth cut."""
         return sum(bool(piece.surfaces) for piece in self.pieces)
 
     @property
-    def states(self) -> int:
-        """Number of values of a state."""
-        return 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
+    def zero_state(self) -> Floats:
+        """State of zeros, shape (states,), in the precision of the matrices."""
+        size = 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
+        return np.zeros(size, self.pieces[0].matrix.dtype)
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenMap:
         """Select c of the cases as rows of one depth each."""
@@ -174,14 +170,9 @@ class PeriodMap:
     """Displacements in each piece with a cut, nodes times p."""
 
     @property
-    def kind(self) -> np.dtype[Any]:
-        """Precision of the numbers."""
-        return self.pieces[0][1].dtype
-
-    @property
-    def states(self) -> int:
-        """Number of values of a state."""
-        return 2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces)
+    def zero_state(self) -> Floats:
+        """State of zeros, shape (states,), in the precision of the matrices."""
+        return np.zeros(2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces), self.pieces[0][1].dtype)
 
     def __getitem__(self, which: tuple[Indices, Indices]) -> PeriodMap:
         """Select c of the cases as rows of one depth each."""

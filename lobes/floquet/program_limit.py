@@ -43,11 +43,6 @@ class ProgramLimit:
     limits: tuple[float, ...]
     """Limits of all cuts (m)."""
 
-    @property
-    def feed_angle(self) -> float:
-        """Angle from x to the worst feed direction (rad)."""
-        return self.cut.feed_angle
-
 
 def program_limit(
     program: Program, x: TipModes, y: TipModes, cuts: Sequence[Cut] | None = None, vectors: ArrayLike | None = None
@@ -84,8 +79,7 @@ def program_limit(
     'True, up to 1.25 mm, then hopf at 498 Hz'
     """
     cuts, system = cuts or (program.cut,), build_milling_system(x, y, vectors)
-    limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)
-    crossing = np.empty(len(cuts))
+    (limit, crossing), number = np.empty((2, len(cuts))), np.empty(len(cuts), dtype=np.int64)
     for places in group_by_engagement(cuts):
         rows = _program_rows(system, program, [cuts[place] for place in places])
         crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth)
@@ -93,11 +87,8 @@ def program_limit(
         unstable = _is_unstable(rows, program, number[places])
         limit[places] = np.where(unstable, np.minimum(crossing[places], program.depth), crossing[places])
     worst = int(np.argmin(limit))
-    chatter, kind = np.array([np.nan]), np.array([""])
-    if np.isfinite(crossing[worst]):
-        here = slice(worst, worst + 1)
-        row = _program_rows(system, program, [cuts[worst]])
-        chatter, kind = chatter_at_limits(system, row, crossing[here], number[here])
+    row, here = _program_rows(system, program, [cuts[worst]]), slice(worst, worst + 1)
+    chatter, kind = chatter_at_limits(system, row, crossing[here], number[here])
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),

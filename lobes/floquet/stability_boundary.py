@@ -187,10 +187,7 @@ def stability_boundary(
     rows = rows_at_speeds(system, cut, speed)
     crossings, number = converged_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
-    chatter, kind = np.full(speed.shape, np.nan), np.full(speed.shape, "", dtype="<U4")
-    limited = np.flatnonzero(np.isfinite(depth))
-    if limited.size:
-        chatter[limited], kind[limited] = chatter_at_limits(system, rows[limited], depth[limited], number[limited])
+    chatter, kind = chatter_at_limits(system, rows, depth, number)
     low, high = int(np.min(number)), int(np.max(number))
     detail = f"{low if low == high else f'{low} to {high}'} pieces of order 16 a tooth period"
     return StabilityLobes(speed, depth, chatter, kind, crossings, "semi-discretisation", detail=detail)
@@ -199,7 +196,12 @@ def stability_boundary(
 def chatter_at_limits(
     system: MillingSystem, rows: MillingRows, depth: Floats, number: Integers
 ) -> tuple[Floats, NDArray[np.str_]]:
-    """Return chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
-    multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]
-    chatter = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
-    return chatter, np.where(is_flip(multiplier), "flip", "hopf")
+    """Return chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,); nan and "" without a limit."""
+    chatter, kind = np.full(depth.shape, np.nan), np.full(depth.shape, "", dtype="<U4")
+    limited = np.flatnonzero(np.isfinite(depth))
+    if limited.size:
+        rows, depth = rows[limited], depth[limited]
+        multiplier = largest_multipliers(rows, depth[:, np.newaxis], number[limited])[:, 0]
+        chatter[limited] = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
+        kind[limited] = np.where(is_flip(multiplier), "flip", "hopf")
+    return chatter, kind

@@ -80,31 +80,25 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
     ratios = {each["of"]: each for each in read_table("force_ratios.csv")}
     ratio = ratios.get(vdi) or ratios[row["iso_group"]]
-    tangential = np.mean([f.tangential(REFERENCE_CHIP_THICKNESS) for f in forces] + [t.tangential for t in tests])
+    of_tests = [test.tangential for test in tests]
+    tangential = float(np.mean([force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + of_tests))
     edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
-    edge = np.mean(edges + [test.tangential_edge for test in tests])
+    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + of_tests
+    limits = [(1 + side * MIN_COEFFICIENT_RANGE) * tangential for side in (-1, 1)]
     return CuttingCoefficients(
         material=row["material"],
-        tangential=float(tangential),
-        radial=float(tangential) * float(ratio["middle"]),
-        tangential_edge=float(edge),
+        tangential=tangential,
+        radial=tangential * float(ratio["middle"]),
+        tangential_edge=float(np.mean(edges + [test.tangential_edge for test in tests])),
         source="; ".join(_source_texts(forces, tests, ratio["source"])),
         alloy=row["alloy"],
         iso_group=row["iso_group"],
         vdi_3323_group=row["vdi_3323_group"],
         equivalents=tuple(row["equivalents"].split(";")),
-        tangential_range=_coefficient_range(float(tangential), forces, tests),
+        tangential_range=(min(*published, *limits), max(*published, *limits)),
         ratio_range=(float(ratio["low"]), float(ratio["high"])),
         specific_forces=tuple(forces),
     )
-
-
-def _coefficient_range(
-    middle: float, forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients]
-) -> tuple[float, float]:
-    """Return the range over all publications and chip thicknesses."""
-    published = [f.tangential(c) for f in forces for c in CHIP_THICKNESS_RANGE] + [t.tangential for t in tests]
-    return min(*published, (1 - MIN_COEFFICIENT_RANGE) * middle), max(*published, (1 + MIN_COEFFICIENT_RANGE) * middle)
 
 
 def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:

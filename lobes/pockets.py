@@ -21,10 +21,9 @@ def find_curve_peaks(values: Floats, prominence: float) -> Indices:
     starts = np.concatenate(([0], np.flatnonzero(np.diff(values)) + 1))
     ends = np.concatenate((starts[1:], [values.size])) - 1
     height = values[starts]
-    tops = map(int, np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])) + 1)
-    kept = [
-        top for top in tops if height[top] - max(_peak_base(height, top, -1), _peak_base(height, top, 1)) >= prominence
-    ]
+    tops = (np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])) + 1).tolist()
+    bases = [max(_peak_base(height, top, -1), _peak_base(height, top, 1)) for top in tops]
+    kept = [top for top, base in zip(tops, bases, strict=True) if height[top] - base >= prominence]
     return np.asarray((starts[kept] + ends[kept]) // 2)
 
 

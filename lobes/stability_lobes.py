@@ -12,21 +12,24 @@ from lobes.cut import Cut
 from modal.arrays import Flags, Floats
 
 
-def check_vector(name: str, values: ArrayLike, item: str) -> Floats:
-    """Return values as a 1-D array; ValueError unless there is one at least."""
+def check_vector(name: str, values: ArrayLike, item: str, text: str = "", may_be_zero: bool = False) -> Floats:
+    """Return values as a 1-D array; ValueError unless there is one at least.
+
+    With a text all must be finite and > 0, or 0 where that is allowed.
+    """
     vector = np.atleast_1d(np.asarray(values, dtype=np.float64))
     if vector.ndim != 1 or vector.size == 0:
         raise ValueError(f"{name} has shape {vector.shape}; a 1-D array of at least one {item} is needed")
+    bad = np.flatnonzero(~(np.isfinite(vector) & ((vector >= 0) if may_be_zero else (vector > 0))))
+    if text and bad.size:
+        raise ValueError(f"{name}[{bad[0]}]={vector[bad[0]]} {text}")
     return vector
 
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:
     """Return spindle speeds (rpm) as a 1-D array; ValueError unless there is one and all are finite and > 0."""
-    speed = check_vector("speed_rpm", speed_rpm, "speed (rpm)")
-    bad = np.flatnonzero(~(np.isfinite(speed) & (speed > 0)))
-    if bad.size:
-        raise ValueError(f"speed_rpm[{bad[0]}]={speed[bad[0]]} is not a finite speed > 0 rpm; leave such speeds out")
-    return speed
+    text = "is not a finite speed > 0 rpm; leave such speeds out"
+    return check_vector("speed_rpm", speed_rpm, "speed (rpm)", text)
 
 
 MethodName = Literal["average angle", "zero order", "semi-discretisation"]

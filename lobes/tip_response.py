@@ -90,10 +90,8 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
     low = max(tip.grid[0] for tip in tips)
     high = min(tip.grid[-1] for tip in tips)
     if not low < high:
-        raise ValueError(
-            f"x and y have no band in common: one ends at {high:g} Hz, the other begins at {low:g} Hz; "
-            "give FRFs that overlap"
-        )
+        ends = f"one ends at {high:g} Hz, the other begins at {low:g} Hz"
+        raise ValueError(f"x and y have no band in common: {ends}; give FRFs that overlap")
     if all(np.array_equal(tip.grid, tips[0].grid) for tip in tips[1:]):
         return tips[0].grid
     grid = np.unique(np.concatenate([tip.grid for tip in tips]))

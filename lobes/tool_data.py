@@ -85,7 +85,7 @@ def published_cutting_speed(material: CuttingCoefficients, tool: ToolMaterial, c
     >>> f"{speed.low * 60:.0f} to {speed.high * 60:.0f} m/min"
     '148 to 1250 m/min'
     """
-    rows = _finest_group_rows("cutting_speeds.csv", material, tool, cut)
+    rows = _finest_rows("cutting_speeds.csv", material, tool, cut)
     ranges = [(float(row["low_m_per_min"]) / 60, float(row["high_m_per_min"]) / 60) for row in rows]
     return _join_ranges(ranges, rows)
 
@@ -120,7 +120,7 @@ def published_feed_per_tooth(
     >>> f"{feed.low * 1e3:.3f} to {feed.high * 1e3:.3f} mm"
     '0.075 to 0.150 mm'
     """
-    rows = _finest_group_rows("feeds_per_tooth.csv", material, tool, cut)
+    rows = _finest_rows("feeds_per_tooth.csv", material, tool, cut)
     sources = dict.fromkeys(row["source"] for row in rows)
     by_source = [[row for row in rows if row["source"] == name] for name in sources]
     return _join_ranges([_feed_at_diameter(own, diameter) for own in by_source], rows)
@@ -154,9 +154,7 @@ def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> 
     return PublishedRange(0.0, fastest.high, fastest.sources)
 
 
-def _finest_group_rows(
-    name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind
-) -> list[dict[str, str]]:
+def _finest_rows(name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind) -> list[dict[str, str]]:
     """Return the rows of the finest group that has any."""
     table = [row for row in read_table(name) if tool in row["tool_material"].split(";") and cut == row["cut"]]
     any_group = [ANY_MATERIAL_GROUP] if material.iso_group else []

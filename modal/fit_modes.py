@@ -125,9 +125,11 @@ def modes_from_band(
     fit, beyond = band.fit, systematic_error(band)
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
-    freedom = beyond.degrees_of_freedom
+    freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
+    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
+    method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
     modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
-    return [assess_mode(state, band, i, replace(m, method=_method_text(state, band))) for i, m in enumerate(modes)]
+    return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]
 
 
 def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: Floats | None, n_hits: int) -> Mode:
@@ -152,12 +154,6 @@ def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: F
         phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),
         shape=_mode_shape(fit.constant[:, i]),
     )
-
-
-def _method_text(state: Extraction, band: FittedBand) -> str:
-    f, p, m = state.frf.frequency[band.lines], len(state.frfs), band.height.size
-    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
-    return f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
 
 
 def _mode_shape(constants: Complexes) -> Floats | None:

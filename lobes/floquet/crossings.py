@@ -69,7 +69,7 @@ class _DepthSteps(NamedTuple):
     """Steepness of growth in the step after."""
 
     def where(self, which: Flags) -> _DepthSteps:
-        return _DepthSteps(*(column[which] for column in self))
+        return _DepthSteps._make(column[which] for column in self)
 
     @property
     def crosses(self) -> Flags:

@@ -147,8 +147,7 @@ class PieceResponse:
 
     def as_precision(self, kind: type[np.floating[Any]]) -> PieceResponse:
         """Return the response with numbers of another precision."""
-        parts = (self.end_state, self.node_displacement, self.node_flexibility, self.end_state_per_force)
-        return PieceResponse(*(values.astype(kind) for values in parts))
+        return PieceResponse(*(values.astype(kind) for values in vars(self).values()))
 
     def cutting(self, force: Floats) -> Floats:
         """Return the maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes.
@@ -167,7 +166,8 @@ class PieceResponse:
         """
         inverse, push = self._closed(force)
         states, size = push.shape[-2:]
-        maps = self._maps(inverse, push, inverse @ self._given()[:, np.newaxis])
+        given = np.moveaxis(self.node_flexibility, 2, 3).reshape(-1, 1, size, size)
+        maps = self._maps(inverse, push, inverse @ given)
         maps[..., :states, states:] += self.end_state_per_force.reshape(-1, 1, states, size)
         return maps
 
@@ -199,11 +199,6 @@ class PieceResponse:
             push += pushes[:, np.newaxis, :, np.newaxis] * forces[direction]
         push = push.reshape(states, size, *forces.shape[3:])
         return _cases_first(invert_matrices(loop), cases), _cases_first(push, cases)
-
-    def _given(self) -> Floats:
-        """Return the displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
-        r, p, _, s, _ = self.node_flexibility.shape
-        return np.moveaxis(self.node_flexibility, 2, 3).reshape(r, p * s, p * s)
 
 
 def _cases_first(matrices: Floats, cases: Sequence[int]) -> Floats:

@@ -14,7 +14,6 @@ from lobes.floquet.stability_boundary import chatter_at_limits
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
 from lobes.tip_response import TipModes
-from modal.arrays import Flags, Integers
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
 """Largest searched limit over the depth of the program."""
@@ -84,7 +83,8 @@ def program_limit(
         rows = _program_rows(system, program, [cuts[place] for place in places])
         crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth)
         crossing[places] = crossings[:, 0]
-        unstable = _is_unstable(rows, program, number[places])
+        depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
+        unstable = np.any(growth_rate(rows, depths, number[places]) >= 0, axis=1)
         limit[places] = np.where(unstable, np.minimum(crossing[places], program.depth), crossing[places])
     worst = int(np.argmin(limit))
     row, here = _program_rows(system, program, [cuts[worst]]), slice(worst, worst + 1)
@@ -114,9 +114,3 @@ def _program_rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) 
     """Return a system at the speed of the program, with cuts that differ in their feed angle only."""
     rows = rows_at_speeds(system, cuts[0], np.full(len(cuts), program.speed_rpm))
     return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
-
-
-def _is_unstable(rows: MillingRows, program: Program, number: Integers) -> Flags:
-    """Return whether the program is unstable at its depth or a share of it, shape (r,)."""
-    depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
-    return np.asarray(np.any(growth_rate(rows, depths, number) >= 0, axis=1))

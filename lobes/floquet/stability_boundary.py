@@ -70,15 +70,6 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
     return np.asarray(harmonics[:, order[:, np.newaxis] - order])
 
 
-def check_depths(depth: ArrayLike) -> Floats:
-    """Return axial depths (m) as a 1-D array; ValueError unless there is one and all are finite and >= 0."""
-    depths = check_vector("depth", depth, "depth (m)")
-    bad = np.flatnonzero(~(np.isfinite(depths) & (depths >= 0)))
-    if bad.size:
-        raise ValueError(f"depth[{bad[0]}]={depths[bad[0]]} is not a finite depth >= 0 m; 1 mm is 1e-3")
-    return depths
-
-
 def spectral_radius(
     x: TipModes, y: TipModes, cut: Cut, speed_rpm: ArrayLike, depth: ArrayLike, vectors: ArrayLike | None = None
 ) -> Floats:
@@ -126,7 +117,9 @@ def spectral_radius(
     >>> round(float(np.exp(-0.02 * 2 * np.pi * 500.0 * 60 / (2 * 12000.0))), 3)
     0.855
     """
-    system, speed, deep = build_milling_system(x, y, vectors), check_speeds(speed_rpm), check_depths(depth)
+    system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
+    text = "is not a finite depth >= 0 m; 1 mm is 1e-3"
+    deep = check_vector("depth", depth, "depth (m)", text, may_be_zero=True)
     rows = rows_at_speeds(system, cut, speed)
     grid = np.broadcast_to(deep, (speed.size, deep.size))
     return spectral_radii(rows, grid, count_pieces(rows, float(np.max(deep))))

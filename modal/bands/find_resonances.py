@@ -78,7 +78,11 @@ def find_resonances(frf: Frf) -> list[Resonance]:
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
-    _check_frf(frf)
+    n = frf.frequency.size
+    if n < MIN_FRF_LINES:
+        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
+    if not np.any(frf.receptance):
+        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
     frf = remove_drift(frf)
     peaks = _find_peaks_at_all_scales(frf)
     if peaks and not np.any(frf.receptance.imag):
@@ -113,14 +117,6 @@ def _is_separate_resonance(known: Sequence[Resonance], new: Resonance) -> bool:
         return False
     tail = np.array([old.height * old.half_width for old in known]) / distance
     return new.height > MIN_RESIDUAL_PEAK_SHARE * known[int(np.argmax(tail))].height
-
-
-def _check_frf(frf: Frf) -> None:
-    n = frf.frequency.size
-    if n < MIN_FRF_LINES:
-        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
-    if not np.any(frf.receptance):
-        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
 
 
 def _check_phase(frf: Frf, peaks: list[Resonance]) -> None:

@@ -166,8 +166,9 @@ def fit_band(
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         fixed = np.zeros(m, bool) if held is None else held
-        state = _solve(project_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
-        if state is not None and np.all(np.isfinite(state.covariance)):
+        band = project_band(frequency, receptance, weight, terms, fixed)
+        state, has_converged = _descend(band, starts, is_complex=True, trials=MAX_FIT_EVALUATIONS)
+        if has_converged and np.all(np.isfinite(state.covariance)):
             return _band_fit(state, state)
     return None
 
@@ -184,8 +185,9 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
     allowed = AKAIKE_PENALTY * fit.constant.size * fit.sum_of_squares / fit.degrees_of_freedom
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         band = project_band(frequency, receptance, weight, terms, fit.held)
-        state = _solve(band, _poles_for_real_constants(fit), is_complex=False)
-        if state is not None and state.cost - fit.sum_of_squares <= allowed:
+        starts = _poles_for_real_constants(fit)
+        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS)
+        if has_converged and state.cost - fit.sum_of_squares <= allowed:
             across = fit.constant / state.constant
             return replace(_band_fit(state, fit.complex_fit), phase_if_complex=np.angle(across * np.sign(across.real)))
     return fit
@@ -223,12 +225,6 @@ def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     real, held = np.zeros(state.constant.shape), np.array(~state.free[: state.poles.shape[1]])
     (f, zeta), freedom = state.poles, state.degrees_of_freedom
     return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, real, held)
-
-
-def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:
-    """Run Levenberg-Marquardt; None if it does not converge."""
-    state, has_converged = _descend(band, starts, is_complex, MAX_FIT_EVALUATIONS)
-    return state if has_converged else None
 
 
 def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:

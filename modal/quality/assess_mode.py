@@ -77,16 +77,11 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
         half_power_damping=_half_power_damping(band, mode),
     )
     mode = with_truncation_error(figures)
-    of_value = *_value_remarks(band, i, mode), *_error_remarks(mode)
-    remarks = (*_edit_remarks(band, i, mode), *_position_remarks(state, band, i, mode), *of_value)
-    return replace(mode, remarks=remarks)
-
-
-def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     word = band.edits[i] if band.edits else ""
-    if word:
-        text = "f_n and zeta held by hand, known without error" if word == FIXED_MODE else f"{word} by hand"
-        yield mode_remark(mode, "by-hand", text)
+    text = "f_n and zeta held by hand, known without error" if word == FIXED_MODE else f"{word} by hand"
+    by_hand = (mode_remark(mode, "by-hand", text),) if word else ()
+    of_value = *_value_remarks(band, i, mode), *_error_remarks(mode)
+    return replace(mode, remarks=(*by_hand, *_position_remarks(state, band, i, mode), *of_value))
 
 
 def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:

@@ -4,9 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-KIENZLE_THICKNESS = 1e-3
-"""Chip thickness at which kc is kc1.1 (m)."""
-
 
 @dataclass(frozen=True)
 class SpecificForce:
@@ -66,7 +63,7 @@ class SpecificForce:
         return self.exponent * self._at(thickness) * thickness
 
     def _at(self, thickness: float) -> float:
-        return self.at_1_mm * float((thickness / KIENZLE_THICKNESS) ** -self.exponent)
+        return self.at_1_mm * float((thickness / 1e-3) ** -self.exponent)
 
 
 @dataclass(frozen=True)

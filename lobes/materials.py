@@ -16,9 +16,6 @@ import numpy as np
 
 from lobes.coefficients import CuttingCoefficients, SpecificForce
 
-MIN_TESTS_FOR_RANGE = 2
-"""Fewest tests of an alloy that define a range."""
-
 
 @cache
 def read_table(name: str) -> tuple[dict[str, str], ...]:
@@ -48,7 +45,7 @@ def _read_test(row: dict[str, str]) -> CuttingCoefficients:
 
 
 def _with_range(test: CuttingCoefficients, alike: Sequence[CuttingCoefficients]) -> CuttingCoefficients:
-    if len(alike) < MIN_TESTS_FOR_RANGE:
+    if len(alike) == 1:
         return test
     tangential = [other.tangential for other in alike]
     ratio = [other.radial / other.tangential for other in alike]

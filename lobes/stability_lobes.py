@@ -158,9 +158,8 @@ class StabilityLobes:
         low, high = float(np.min(self.speed_rpm)), float(np.max(self.speed_rpm))
         outside = ~((wanted >= low) & (wanted <= high))
         if np.any(outside):
-            raise ValueError(
-                f"{wanted[outside].flat[0]:g} rpm is outside the chart ({low:g}..{high:g} rpm); compute lobes there too"
-            )
+            chart = f"the chart ({low:g}..{high:g} rpm)"
+            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}; compute lobes there too")
         order = np.argsort(self.speed_rpm)
         speed, depth = self.speed_rpm[order], self.depth[order]
         right = np.searchsorted(speed, wanted)

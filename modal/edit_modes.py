@@ -1,7 +1,5 @@
 """Edit the modes of an extraction by hand: drop one, add one, or fix its frequency and damping ratio."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,10 +92,10 @@ class _EditPlan:
     words: tuple[str, ...]
     """Mark of what a person did to each mode."""
 
-    def without(self, i: int) -> _EditPlan:
+    def without(self, i: int) -> "_EditPlan":
         return replace(self, poles=np.delete(self.poles, i, axis=1), words=(*self.words[:i], *self.words[i + 1 :]))
 
-    def with_mode(self, frequency: float, zeta: float, word: str) -> _EditPlan:
+    def with_mode(self, frequency: float, zeta: float, word: str) -> "_EditPlan":
         return replace(self, poles=np.column_stack([self.poles, [frequency, zeta]]), words=(*self.words, word))
 
     def fitted(self, state: Extraction) -> FittedBand | None:

@@ -1,7 +1,5 @@
 """Find all depths where stability changes, with converged pieces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -68,7 +66,7 @@ class _DepthSteps(NamedTuple):
     after: Floats
     """Steepness of growth in the step after."""
 
-    def where(self, which: Flags) -> _DepthSteps:
+    def where(self, which: Flags) -> "_DepthSteps":
         return _DepthSteps._make(column[which] for column in self)
 
     @property
@@ -81,7 +79,7 @@ class _DepthSteps(NamedTuple):
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 
-    def halves(self, middle: Floats) -> _DepthSteps:
+    def halves(self, middle: Floats) -> "_DepthSteps":
         """Return both halves, given growth at the middles."""
         half = (self.low + self.high) / 2
         left, right = (np.abs(middle - end) / (half - self.low) for end in (self.at_low, self.at_high))

@@ -1,7 +1,5 @@
 """Many milling systems of one kind, and the pieces their tooth period is divided into."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -45,11 +43,11 @@ class MillingRows:
         """Return the number of rows."""
         return self.speed_rpm.size
 
-    def __getitem__(self, which: Any) -> MillingRows:
+    def __getitem__(self, which: Any) -> "MillingRows":
         """Select rows by an index array or a mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in _VARYING_FIELDS})
 
-    def with_feed_angle(self, angle: float) -> MillingRows:
+    def with_feed_angle(self, angle: float) -> "MillingRows":
         """Return all rows with one feed angle.
 
         Parameters
@@ -59,7 +57,7 @@ class MillingRows:
         """
         return replace(self, feed_angle=np.full(len(self), angle))
 
-    def with_cut(self, cut: Cut) -> MillingRows:
+    def with_cut(self, cut: Cut) -> "MillingRows":
         """Return all rows with the teeth, immersion and feed of a cut; their coefficients stay.
 
         Parameters
@@ -135,15 +133,11 @@ def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> Millin
         cut=cut,
         direction=system.direction,
         axes=system.axes,
-        frequency=ones * system.frequency,
-        damping_ratio=ones * system.damping_ratio,
+        **{name: ones * getattr(system, name) for name in ("frequency", "damping_ratio", "phase")},
         stiffness=ones * (system.frequency / system.shape) ** 2,
-        phase=ones * system.phase,
         vector=np.tile(system.vector, (speed_rpm.size, 1, 1)),
         speed_rpm=speed_rpm,
-        tangential=np.full(speed_rpm.shape, cut.tangential),
-        radial=np.full(speed_rpm.shape, cut.radial),
-        feed_angle=np.full(speed_rpm.shape, cut.feed_angle),
+        **{name: np.full(speed_rpm.shape, getattr(cut, name)) for name in ("tangential", "radial", "feed_angle")},
     )
 
 

@@ -1,7 +1,5 @@
 """Response of the modes over one piece of time, with and without a cut."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +14,10 @@ from modal.arrays import Complexes, Floats
 
 NODES_PER_PIECE = 8
 """Nodes of one piece: a polynomial of degree 7 for the displacement, of order 16 at the end of the piece."""
+
+
+Precision = type[np.floating[Any]]
+"""Type of the numbers of a map: float32 or float64."""
 
 
 class GaussNodes(NamedTuple):
@@ -110,7 +112,7 @@ class PieceResponse:
     """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
 
     @classmethod
-    def of(cls, rows: MillingRows, time: Floats) -> PieceResponse:
+    def of(cls, rows: MillingRows, time: Floats) -> "PieceResponse":
         """Compute the response over pieces of a length (r,) in s.
 
         With x = D at the roots of A (`lobes.floquet.period_map`, `GaussNodes.root`) and t = theta root, all of it is
@@ -145,7 +147,7 @@ class PieceResponse:
         per_force = np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1)
         return cls(end_state, _tip_displacements(rows, place), _weighted_sums(flexible, nodes.share), per_force)
 
-    def as_precision(self, kind: type[np.floating[Any]]) -> PieceResponse:
+    def as_precision(self, kind: Precision) -> "PieceResponse":
         """Return the response with numbers of another precision."""
         return PieceResponse(*(values.astype(kind) for values in vars(self).values()))
 

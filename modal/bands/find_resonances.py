@@ -1,7 +1,5 @@
 """Find the resonances of an FRF: mobility peaks above the noise whose phase turns as that of a mode."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,7 +61,7 @@ class Resonance:
     coherence: float | None = None
     """Mean coherence over the peak; None if unknown."""
 
-    def overlaps(self, other: Resonance) -> bool:
+    def overlaps(self, other: "Resonance") -> bool:
         """Return whether one resonance is within the half-width of the other."""
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 

@@ -137,13 +137,9 @@ def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float
     """
     by_size, by_zeta = (size - mode.damping_ratio / tau) / w, -size / tau / w
     k = 2 * mode.stiffness * w / size**2
-    slope = np.array(
-        [
-            [by_size, by_zeta, 0],
-            [mode.damping_ratio / w - decay / w**2 * by_size, size / w - decay / w**2 * by_zeta, 0],
-            [k * (by_size - w / size), k * by_zeta, (w / size) ** 2],
-        ]
-    )
+    of_zeta = [mode.damping_ratio / w - decay / w**2 * by_size, size / w - decay / w**2 * by_zeta, 0]
+    of_stiffness = [k * (by_size - w / size), k * by_zeta, (w / size) ** 2]
+    slope = np.array([[by_size, by_zeta, 0], of_zeta, of_stiffness])
     hertz = np.diag([2 * np.pi, 1, 1])
     return np.asarray(np.linalg.inv(hertz) @ slope @ hertz)
 

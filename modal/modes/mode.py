@@ -1,7 +1,5 @@
 """A vibration mode as seen in one FRF, and the FRF of several modes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -226,7 +224,7 @@ class Mode:
         value = np.array([self.frequency, self.damping_ratio, self.stiffness])
         return np.stack([value - reach, value + reach], axis=1)
 
-    def scaled(self, frequency: float, stiffness: float, method: str) -> Mode:
+    def scaled(self, frequency: float, stiffness: float, method: str) -> "Mode":
         """Return the mode with scaled frequency and stiffness, covariances included.
 
         Parameters

@@ -1,7 +1,5 @@
 """Edits of the modes of an FRF by a person."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -64,7 +62,7 @@ class ModeEdits:
         edits = ((name, ":".join(f"{value:.10g}" for value in values)) for name, values in self._edits())
         return ", ".join(map(" ".join, edits))
 
-    def with_window(self, time_constant: float) -> ModeEdits:
+    def with_window(self, time_constant: float) -> "ModeEdits":
         """Return the edits for a response under an exponential window, which adds to the fixed damping.
 
         Parameters

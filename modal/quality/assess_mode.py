@@ -139,9 +139,8 @@ def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
         text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
         yield mode_remark(mode, "uncertain", text, "average more hits")
     if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
-        yield mode_remark(
-            mode, "misfit", f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
-        )
+        text = f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
+        yield mode_remark(mode, "misfit", text)
     is_near = np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
     is_wide = np.sum(is_near) >= MIN_HALF_POWER_LINES
     differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
@@ -182,10 +181,8 @@ def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
     narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
     if not any(narrow) or not is_smoothed(frf):
         return [*modes]
-    text = (
-        f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: "
-        "zeta too large, K too small by percents"
-    )
+    effect = "zeta too large, K too small by percents"
+    text = f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: {effect}"
     cure = "export the lines without smoothing or window"
     pairs = zip(modes, narrow, strict=True)
     return [add_remark(mode, "smoothed-lines", text, cure) if is_narrow else mode for mode, is_narrow in pairs]

@@ -24,8 +24,6 @@ MIN_SLOT_IMMERSION = 0.4
 """Least immersion of a slot, as in the tables of Tungaloy."""
 MIN_PUBLISHED_RANGE = 0.25
 """Least relative half-width of a range, the error of a single source."""
-ANY_MATERIAL_GROUP = "any"
-"""Group of rows that hold for every material."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> 
 def _finest_rows(name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind) -> list[dict[str, str]]:
     """Return the rows of the finest group that has any."""
     table = [row for row in read_table(name) if tool in row["tool_material"].split(";") and cut == row["cut"]]
-    any_group = [ANY_MATERIAL_GROUP] if material.iso_group else []
+    any_group = ["any"] if material.iso_group else []
     for group in (f"VDI {material.vdi_3323_group}", material.iso_group, *any_group):
         rows = [row for row in table if group in row["of"].split(";")]
         if rows:

@@ -12,13 +12,7 @@ from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting.band_fit import BandFit
-from modal.hit_scatter import (
-    MIN_HITS_FOR_JACKKNIFE,
-    add_linearity_remarks,
-    hammer_covariance,
-    jackknife_covariance,
-    leave_one_out_frfs,
-)
+from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 
@@ -107,15 +101,10 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
 
 
-def _modes_with_scatter(
-    state: Extraction, band: FittedBand, pairs: list[tuple[Sequence[Hit], list[Frf]]]
-) -> list[Mode]:
-    by_hammer = sum(hammer_covariance(state, band, i, hits) for i, (hits, _) in enumerate(pairs))
-    n_hits = min((len(without) for _, without in pairs), default=0)
-    if not n_hits:
-        return modes_from_band(state, band, by_hammer, None, 0)
-    over_hits = np.sum([jackknife_covariance(state, band, i, without) for i, (_, without) in enumerate(pairs)], axis=0)
-    return add_linearity_remarks(state, band, modes_from_band(state, band, by_hammer, over_hits, n_hits), *pairs[0])
+def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
+    by_hammer, over_hits, n_hits = hit_covariances(state, band, pairs)
+    modes = modes_from_band(state, band, by_hammer, over_hits, n_hits)
+    return add_linearity_remarks(state, band, modes, *pairs[0]) if n_hits else modes
 
 
 def modes_from_band(
@@ -328,20 +317,10 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
     """Return the modes of a band with their peak heights, rms over the decays."""
-    enough = len(state.frfs) >= MIN_HITS_FOR_JACKKNIFE
-    scatter, n_hits = (_decay_covariance(band), len(state.frfs)) if enough else (None, 0)
-    modes = modes_from_band(state, band, 0, scatter, n_hits)
+    scatter = decay_covariance(band)
+    modes = modes_from_band(state, band, 0, scatter, 0 if scatter is None else len(state.frfs))
     heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
     return list(zip(modes, heights.tolist(), strict=True))
-
-
-def _decay_covariance(band: FittedBand) -> Floats:
-    """Return the covariance of the values of a band from the scatter of its decays; shape as `BandFit.covariance`."""
-    fit, count = band.fit, len(band.fit.constant)
-    parts = fit.residual.reshape(count, -1)
-    pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
-    outer = np.transpose(pulls) @ np.array(pulls)
-    return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
 
 
 def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:

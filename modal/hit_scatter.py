@@ -12,6 +12,19 @@ from modal.bands.extraction import Extraction, FittedBand
 from modal.modes.mode import Mode, add_remark
 from modal.quality.trust import Trust, assess_trust
 
+HitsOfFrf = tuple[Sequence[Hit], list[Frf]]
+"""Hits that an FRF was averaged from, and the FRFs without one of them each."""
+
+
+def hit_covariances(
+    state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]
+) -> tuple[Floats | int, Floats | None, int]:
+    """Return the covariances of a band by the noise of the hammer and over the hits, and the number of these hits."""
+    by_hammer = sum(hammer_covariance(state, band, i, hits) for i, (hits, _) in enumerate(pairs))
+    n_hits = min((len(without) for _, without in pairs), default=0)
+    jackknives = [jackknife_covariance(state, band, i, without) for i, (_, without) in enumerate(pairs) if n_hits]
+    return by_hammer, np.sum(jackknives, axis=0) if n_hits else None, n_hits
+
 
 def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> Floats:
     """Return the covariance of a band by the hammer noise inside the force windows of the hits of FRF i.
@@ -71,6 +84,20 @@ def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: S
     all_hits = np.mean([frf.receptance[band.lines] for frf in without], axis=0)
     steps, n = band_changes(state, band, i, without, all_hits), len(without)
     return np.asarray((n - 1) / n * steps.T @ steps)
+
+
+def decay_covariance(band: FittedBand) -> Floats | None:
+    """Return the covariance of the values of a band from the scatter of its decays; None for fewer than three.
+
+    Shape as `BandFit.covariance`.
+    """
+    fit, count = band.fit, len(band.fit.constant)
+    if count < MIN_HITS_FOR_JACKKNIFE:
+        return None
+    parts = fit.residual.reshape(count, -1)
+    pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
+    outer = np.transpose(pulls) @ np.array(pulls)
+    return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
 
 
 def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:

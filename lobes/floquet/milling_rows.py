@@ -1,7 +1,7 @@
 """Many milling systems of one kind, and the pieces their tooth period is divided into."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -43,11 +43,11 @@ class MillingRows:
         """Return the number of rows."""
         return self.speed_rpm.size
 
-    def __getitem__(self, which: Any) -> "MillingRows":
+    def __getitem__(self, which: Any) -> Self:
         """Select rows by an index array or a mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in _VARYING_FIELDS})
 
-    def with_feed_angle(self, angle: float) -> "MillingRows":
+    def with_feed_angle(self, angle: float) -> Self:
         """Return all rows with one feed angle.
 
         Parameters
@@ -57,7 +57,7 @@ class MillingRows:
         """
         return replace(self, feed_angle=np.full(len(self), angle))
 
-    def with_cut(self, cut: Cut) -> "MillingRows":
+    def with_cut(self, cut: Cut) -> Self:
         """Return all rows with the teeth, immersion and feed of a cut; their coefficients stay.
 
         Parameters

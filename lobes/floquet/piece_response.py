@@ -1,9 +1,9 @@
 """Response of the modes over one piece of time, with and without a cut."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
@@ -112,7 +112,7 @@ class PieceResponse:
     """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
 
     @classmethod
-    def of(cls, rows: MillingRows, time: Floats) -> "PieceResponse":
+    def of(cls, rows: MillingRows, time: Floats) -> Self:
         """Compute the response over pieces of a length (r,) in s.
 
         With x = D at the roots of A (`lobes.floquet.period_map`, `GaussNodes.root`) and t = theta root, all of it is
@@ -145,11 +145,13 @@ class PieceResponse:
         flexible = forced / rows.stiffness[..., np.newaxis]
         flexible = np.einsum("rnk,rnp,rnq->rpqk", flexible, rows.vector, rows.vector)
         per_force = np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1)
-        return cls(end_state, _tip_displacements(rows, place), _weighted_sums(flexible, nodes.share), per_force)
+        shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
+        at_nodes = shown.reshape(*shown.shape[:3], -1)
+        return cls(end_state, at_nodes, _weighted_sums(flexible, nodes.share), per_force)
 
-    def as_precision(self, kind: Precision) -> "PieceResponse":
+    def as_precision(self, kind: Precision) -> Self:
         """Return the response with numbers of another precision."""
-        return PieceResponse(*(values.astype(kind) for values in vars(self).values()))
+        return replace(self, **{name: values.astype(kind) for name, values in vars(self).items()})
 
     def cutting(self, force: Floats) -> Floats:
         """Return the maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes.
@@ -215,9 +217,3 @@ def _weighted_sums(values: Complexes, shares: Complexes) -> Floats:
     weights = 2 * np.concatenate((shares.real, -shares.imag))
     flat = parts.reshape(-1, parts.shape[-1]) @ weights.reshape(len(weights), -1)
     return np.asarray(flat.reshape(*values.shape[:-1], *shares.shape[1:]))
-
-
-def _tip_displacements(rows: MillingRows, place: Floats) -> Floats:
-    """Return displacements from z: places (r, n, s, 2) of the modes along their vectors, shape (r, p, s, 2n)."""
-    shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
-    return np.asarray(shown.reshape(*shown.shape[:3], -1))

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy
@@ -61,7 +61,7 @@ class Resonance:
     coherence: float | None = None
     """Mean coherence over the peak; None if unknown."""
 
-    def overlaps(self, other: "Resonance") -> bool:
+    def overlaps(self, other: Self) -> bool:
         """Return whether one resonance is within the half-width of the other."""
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 

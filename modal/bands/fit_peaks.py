@@ -11,7 +11,7 @@ from modal.arrays import Flags, Floats
 from modal.bands.extraction import BandData, Extraction, FittedBand
 from modal.bands.find_resonances import Resonance
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit
-from modal.fitting.fit_band import fit_band, fit_real_constants, remove_residual_terms
+from modal.fitting.fit_band import fit_band, fit_real_constants, project_band
 from modal.poles import select_physical_poles
 
 JOINT_FIT_DISTANCE = 4.0
@@ -172,7 +172,8 @@ def _has_converged(band: FittedBand, data: BandData) -> bool:
     off, most = data.target - band.data.target, TAIL_CHANGE_TOLERANCE * np.sqrt(band.fit.sum_of_squares)
     if np.linalg.norm(off * data.weight) < most:
         return True
-    return bool(np.linalg.norm(remove_residual_terms(data.frequency, off, data.weight, band.terms)) < most)
+    projected = project_band(data.frequency, off, data.weight, band.terms, band.fit.held)
+    return bool(np.linalg.norm(projected.data) < most)
 
 
 def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:

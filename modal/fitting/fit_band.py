@@ -54,11 +54,6 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
     return ProjectedBand(root, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
 
 
-def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
-    """Return weighted receptances without residual terms, (p, 2 n); arguments as `project_band`."""
-    return _project_out(_term_bases(frequency, weight, terms), split_complex(weight * receptance)[:, np.newaxis])[:, 0]
-
-
 def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
     """Return the first-order drop of the sum of squares by one more residual term in each FRF."""
     power = residual_powers(frequency, terms + 1)[-1]

@@ -119,11 +119,10 @@ def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool
     if at_edge and band.terms > MIN_RESIDUAL_TERMS:
         return True
     own, frequency = band.fit.mobility_peak[i], band.fit.frequency[i]
-    fits = [other.fit for other in state.bands]
-    peak = np.concatenate([fit.mobility_peak for fit in fits])
-    distance = np.abs(np.concatenate([fit.frequency for fit in fits]) - frequency)
-    reach = np.concatenate([np.prod(fit.poles, axis=0) for fit in fits])
-    return bool(np.any((peak > DOMINANT_NEIGHBOUR_RATIO * own) & (peak * reach > own * distance)))
+    peak = np.concatenate([other.fit.mobility_peak for other in state.bands])
+    poles = np.hstack([other.fit.poles for other in state.bands])
+    is_near = peak * np.prod(poles, axis=0) > own * np.abs(poles[0] - frequency)
+    return bool(np.any((peak > DOMINANT_NEIGHBOUR_RATIO * own) & is_near))
 
 
 def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:

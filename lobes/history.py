@@ -82,14 +82,13 @@ def _check_column(name: str, values: ArrayLike) -> Column:
     if not name.isidentifier():
         raise ValueError(f"column name {name!r} is not made of letters, digits and underscores; rename it")
     column = np.asarray(values)
-    if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if column.dtype.kind == "U" else (1, 2)):
+    is_text = column.dtype.kind == "U"
+    if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if is_text else (1, 2)):
         given = f"{column.dtype} of shape {column.shape}"
         raise ValueError(f"column {name!r} is {given}; give numbers (n,) or (n, k), or text (n,)")
-    if column.dtype.kind == "U":
-        for text in column:
-            _check_text(text)
-        return column
-    return column.astype(np.float64)
+    for text in column if is_text else ():
+        _check_text(text)
+    return column if is_text else column.astype(np.float64)
 
 
 def _check_text(text: str) -> None:

@@ -183,9 +183,10 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
         if not rows.size:
             break
         block = order[begin : begin + max(1, min(size, MAX_BLOCK_VALUES // rows.size))]
-        real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
-        lower = real < best[rows]
-        best[rows[lower]], step[rows[lower]], whole[rows[lower]] = real[lower], where[lower], number[lower]
+        row, real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
+        lower = real < best[rows[row]]
+        at = rows[row[lower]]
+        best[at], step[at], whole[at] = real[lower], where[lower], number[lower]
         begin, size = begin + block.size, 2 * size
     chatter = np.full(tooth_frequency.shape, np.nan)
     negative = np.flatnonzero(best < 0)
@@ -196,11 +197,11 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
 
 def _lowest_step(
     grid: Floats, turn: Floats, real: Floats, block: Indices, tooth_frequency: Floats
-) -> tuple[Floats, Indices, Floats]:
-    """Return real part, grid step and whole number of the lowest crossing in a block for each tooth frequency.
+) -> tuple[Indices, Floats, Indices, Floats]:
+    """Return index, real part, grid step and whole number of the lowest crossing in a block for tooth frequencies.
 
-    If several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
-    real part is 0 if there is no crossing.
+    If several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. Tooth
+    frequencies without a crossing are left out.
     """
     lower = block + (real[block + 1] < real[block])
     upper = 2 * block + 1 - lower
@@ -215,11 +216,7 @@ def _lowest_step(
     at_crossing = real[lower[column]] + share * (real[upper[column]] - real[lower[column]])
     order = np.lexsort((at_crossing, row))
     first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-    best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
-    best[row[first]] = at_crossing[first]
-    step[row[first]] = block[column[first]]
-    whole[row[first]] = number[first]
-    return best, step, whole
+    return row[first], at_crossing[first], block[column[first]], number[first]
 
 
 def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_frequency: Floats) -> Floats:

@@ -146,10 +146,8 @@ def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> 
     1250
     """
     known = [speed for tool in TOOL_MATERIALS if (speed := published_cutting_speed(material, tool, cut))]
-    if not known:
-        return None
-    fastest = max(known, key=lambda speed: speed.high)
-    return PublishedRange(0.0, fastest.high, fastest.sources)
+    fastest = max(known, key=lambda speed: speed.high, default=None)
+    return fastest and PublishedRange(0.0, fastest.high, fastest.sources)
 
 
 def _finest_rows(name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind) -> list[dict[str, str]]:

@@ -6,16 +6,9 @@ import numpy as np
 
 from modal.arrays import Floats
 from modal.bands.extract_modes import limit_to_one_thread
-from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
+from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand, replace_band
 from modal.bands.find_resonances import Resonance
-from modal.bands.fit_peaks import (
-    MAX_PEAK_FIT_ERROR,
-    are_modes,
-    group_into_bands,
-    iterate_bands,
-    refit_with_real_constants,
-    replace_band,
-)
+from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR, are_modes, group_into_bands, iterate_bands, refit_real_constants
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.fitting.fit_band import fit_band
 from modal.modes.mode_edits import ModeEdits
@@ -76,7 +69,7 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
         for frequency, zeta in edits.fix:
             edited = _fix_mode(edited, frequency, zeta)
         settled = iterate_bands(edited)
-        bands = (b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
+        bands = (b if b in state.bands else refit_real_constants(b) for b in settled.bands)
         return replace(settled, bands=tuple(bands))
 
 

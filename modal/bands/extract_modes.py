@@ -15,7 +15,7 @@ from modal.arrays import Complexes, Flags, Floats
 from modal.bands.dense_bands import mark_close_modes, refine_dense_band
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.find_resonances import Resonance, add_residual_resonances, find_resonances
-from modal.bands.fit_peaks import fit_peaks, group_into_bands, iterate_bands, refit_with_real_constants
+from modal.bands.fit_peaks import fit_peaks, group_into_bands, iterate_bands, refit_real_constants
 from modal.bands.frf_lines import line_weights, usable_lines
 from modal.bands.residual_analysis import has_rounding_residual
 
@@ -149,7 +149,7 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     if np.any(stray):
         state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))
     state = _reweight(state)
-    return replace(state, bands=tuple(refit_with_real_constants(mark_close_modes(band)) for band in state.bands))
+    return replace(state, bands=tuple(refit_real_constants(mark_close_modes(band)) for band in state.bands))
 
 
 def _reweight(state: Extraction) -> Extraction:

@@ -1,7 +1,7 @@
 """Result of a modal extraction, and stabilisation charts of all its lines."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -139,6 +139,14 @@ class Extraction:
         """
         weight = self.weight[:, band.lines]
         return np.asarray(band.fit.complex_residual / np.where(weight > 0, weight, np.inf))
+
+
+def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:
+    """Replace a band, add a new one if `old` is None, or remove one if `new` is None."""
+    if new is old:
+        return state
+    bands = [*(band for band in state.bands if band is not old), *([] if new is None else [new])]
+    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))
 
 
 MAX_GAP_CHART_LINES = 200

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from modal.arrays import Flags, Floats
-from modal.bands.extraction import BandData, Extraction, FittedBand
+from modal.bands.extraction import BandData, Extraction, FittedBand, replace_band
 from modal.bands.find_resonances import Resonance
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit
 from modal.fitting.fit_band import fit_band, fit_real_constants, project_band
@@ -101,7 +101,7 @@ def refit_band(band: FittedBand, data: BandData) -> FittedBand | None:
     return None if fitted is None else replace(band, data=data, fit=fitted[0], height=fitted[1])
 
 
-def refit_with_real_constants(band: FittedBand) -> FittedBand:
+def refit_real_constants(band: FittedBand) -> FittedBand:
     """Fit real modal constants if they describe the band as well."""
     data = band.data
     fit = fit_real_constants(band.fit, data.frequency, data.target, data.weight, band.terms)
@@ -174,11 +174,3 @@ def _has_converged(band: FittedBand, data: BandData) -> bool:
         return True
     projected = project_band(data.frequency, off, data.weight, band.terms, band.fit.held)
     return bool(np.linalg.norm(projected.data) < most)
-
-
-def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:
-    """Replace a band, add a new one if `old` is None, or remove one if `new` is None."""
-    if new is old:
-        return state
-    bands = [*(band for band in state.bands if band is not old), *([] if new is None else [new])]
-    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))

@@ -26,19 +26,6 @@ def has_white_residual(fit: BandFit) -> bool:
     return bool(size < expected * (1 + MAX_WHITENESS_EXCESS / np.sqrt(blocks[..., 0].size)))
 
 
-def passes_f_test(more: BandFit, fewer: BandFit, least: float) -> bool:
-    """Return whether further unknowns lower the sum of squares by more than `least` times what chance would."""
-    gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.degrees_of_freedom - more.degrees_of_freedom, 1)
-    return gain > least * more.sum_of_squares / more.degrees_of_freedom
-
-
-def has_lower_aic(fit: BandFit, other: BandFit) -> bool:
-    """Return whether a fit has the lower Akaike information criterion."""
-    variance = min(candidate.sum_of_squares / candidate.degrees_of_freedom for candidate in (fit, other))
-    own, others = (each.sum_of_squares - 2 * variance * each.degrees_of_freedom for each in (fit, other))
-    return own < others
-
-
 NEAR_MODE_HALF_WIDTHS, MIN_NEAR_MODE_LINES = 3.0, 16
 """Half-widths around a mode, and lines at least, that its own residual is taken from."""
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -255,6 +256,17 @@ class BandFit:
     def sum_of_squares(self) -> float:
         """Sum of the squared weighted residuals."""
         return float(self.residual @ self.residual)
+
+    def passes_f_test(self, fewer: Self, least: float) -> bool:
+        """Return whether these unknowns lower the sum of squares of a fit with fewer by over `least` times chance."""
+        gain = (fewer.sum_of_squares - self.sum_of_squares) / max(fewer.degrees_of_freedom - self.degrees_of_freedom, 1)
+        return gain > least * self.sum_of_squares / self.degrees_of_freedom
+
+    def has_lower_aic(self, other: Self) -> bool:
+        """Return whether this fit has the lower Akaike information criterion."""
+        variance = min(fit.sum_of_squares / fit.degrees_of_freedom for fit in (self, other))
+        own, others = (fit.sum_of_squares - 2 * variance * fit.degrees_of_freedom for fit in (self, other))
+        return own < others
 
     def influence_of(self, i: int) -> Floats:
         """Return the influence of FRF i, shape (2 m + 2 p m, 2 n)."""

@@ -120,14 +120,10 @@ def _pocket_ends(speed: Floats, depth: Floats, peak: int) -> tuple[float, float]
     level = POCKET_DEPTH_SHARE * depth[peak]
     low = np.flatnonzero(depth < level)
     before, after = low[low < peak], low[low > peak]
-    slowest, fastest = speed[0], speed[-1]
-    if before.size:
-        sides = [before[-1], before[-1] + 1]
-        slowest = np.interp(level, depth[sides], speed[sides])
-    if after.size:
-        sides = [after[0], after[0] - 1]
-        fastest = np.interp(level, depth[sides], speed[sides])
-    return float(slowest), float(fastest)
+    left = [before[-1], before[-1] + 1] if before.size else [0]
+    right = [after[0], after[0] - 1] if after.size else [-1]
+    slowest, fastest = (float(np.interp(level, depth[sides], speed[sides])) for sides in (left, right))
+    return slowest, fastest
 
 
 def rank_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:

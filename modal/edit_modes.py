@@ -94,12 +94,11 @@ class _EditPlan:
     def fitted(self, state: Extraction) -> FittedBand | None:
         """Fit these modes; None if nothing fits."""
         data = state.data(self.lines, without=self.band)
-        terms = MIN_RESIDUAL_TERMS if self.band is None else self.band.terms
+        terms, resonances = (self.band.terms, self.band.resonances) if self.band else (MIN_RESIDUAL_TERMS, ())
         held = np.array([word == FIXED_MODE for word in self.words])
         fit = fit_band(data.frequency, data.target, data.weight, self.poles, terms, held)
         if fit is None:
             return None
-        resonances = () if self.band is None else self.band.resonances
         return FittedBand(data, resonances, np.zeros(held.size), fit, terms, edits=self.words)
 
 

@@ -155,9 +155,8 @@ def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[Resonance]:
 
 def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
     """Apply a box mean over this many lines twice."""
-    if length == 1:
-        return values
-    return np.asarray(scipy.ndimage.uniform_filter1d(scipy.ndimage.uniform_filter1d(values, length), length))
+    mean = scipy.ndimage.uniform_filter1d
+    return values if length == 1 else np.asarray(mean(mean(values, length), length))
 
 
 def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> list[Resonance]:

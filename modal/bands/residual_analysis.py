@@ -1,7 +1,7 @@
 """Test the residual of a band fit: whiteness, model comparison, systematic errors."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,8 +68,7 @@ TRIAL_PEAK_HALF_WIDTHS = 2.0
 """Half-widths around a mode that a trial range must hold completely; else the peak is cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class SystematicError:
+class SystematicError(NamedTuple):
     """Errors to be added to those of a band because its residual is not white noise."""
 
     factor: float

@@ -137,9 +137,8 @@ class Mode:
     @property
     def peak(self) -> float:
         """Receptance at resonance, 1 / (2 |K| zeta) (m/N); for free decays `relative_peak`."""
-        if self.relative_peak is not None:
-            return self.relative_peak
-        return float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
+        absolute = float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
+        return absolute if self.relative_peak is None else self.relative_peak
 
     @property
     def constant(self) -> complex:

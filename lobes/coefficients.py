@@ -4,9 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-KIENZLE_THICKNESS = 1e-3
-"""Chip thickness at which kc is kc1.1 (m)."""
-
 
 @dataclass(frozen=True)
 class SpecificForce:
@@ -66,7 +63,7 @@ class SpecificForce:
         return self.exponent * self._at(thickness) * thickness
 
     def _at(self, thickness: float) -> float:
-        return self.at_1_mm * float((thickness / KIENZLE_THICKNESS) ** -self.exponent)
+        return self.at_1_mm * float((thickness / 1e-3) ** -self.exponent)
 
 
 @dataclass(frozen=True)
@@ -128,10 +125,14 @@ class CuttingCoefficients:
 
 def check_coefficients(tangential: float, radial: float) -> None:
     """Raise ValueError unless Ktc is > 0 and Krc >= 0, both finite (Pa)."""
-    if not (np.isfinite(tangential) and tangential > 0):
-        raise ValueError(f"tangential={tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-    if not (np.isfinite(radial) and radial >= 0):
-        raise ValueError(f"radial={radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    check_number("tangential", tangential, "Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    check_number("radial", radial, "Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa", may_be_zero=True)
+
+
+def check_number(name: str, value: float, text: str, may_be_zero: bool = False) -> None:
+    """Raise ValueError with this text unless a value is finite and > 0, or 0 where that is allowed."""
+    if not (np.isfinite(value) and (value >= 0 if may_be_zero else value > 0)):
+        raise ValueError(f"{name}={value} {text}")
 
 
 def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[float, float]:
@@ -162,8 +163,7 @@ def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[fl
     >>> round(float(ktc) / 1e6, 1), round(float(krc) / 1e6, 1)  # N/mm2
     (695.4, 281.0)
     """
-    if not (np.isfinite(specific_force) and specific_force > 0):
-        raise ValueError(f"specific_force={specific_force} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    check_number("specific_force", specific_force, "Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
     if not 0 < force_angle <= np.pi / 2:
         raise ValueError(f"force_angle={force_angle} rad is not in (0, pi/2]; 68 degrees are 1.187 rad")
     return specific_force * float(np.sin(force_angle)), max(specific_force * float(np.cos(force_angle)), 0.0)

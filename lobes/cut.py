@@ -7,9 +7,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Floats
-from lobes.coefficients import check_coefficients
-from modal import Mode
+from lobes.coefficients import check_coefficients, check_number
+from modal.arrays import Floats
 
 Direction = Literal["up", "down"]
 """Direction of milling: up (conventional) or down (climb)."""
@@ -28,15 +27,13 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
     """
     if not pitch:
         return ()
-    shown = ", ".join(f"{np.degrees(angle):g}" for angle in pitch)
+    shown = f"pitch [{', '.join(f'{np.degrees(angle):g}' for angle in pitch)}]"
     if len(pitch) != teeth:
-        raise ValueError(f"pitch [{shown}] degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
+        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
     if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
-        raise ValueError(
-            f"pitch [{shown}] degrees holds an angle that is not > 0; each tooth follows the one before it"
-        )
+        raise ValueError(f"{shown} degrees holds an angle that is not > 0; each tooth follows the one before it")
     if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:
-        raise ValueError(f"pitch [{shown}] sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
+        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
     alike = [next(other for other in pitch if abs(other - angle) < PITCH_TOLERANCE) for angle in pitch]
     return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
 
@@ -87,16 +84,13 @@ class Cut:
         if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1; give the number of cutting edges")
         if not 0 < self.immersion <= 1:
-            raise ValueError(
-                f"immersion={self.immersion} is not in (0, 1]; give radial depth divided by cutter diameter"
-            )
+            text = "is not in (0, 1]; give radial depth divided by cutter diameter"
+            raise ValueError(f"immersion={self.immersion} {text}")
         if self.direction not in get_args(Direction):
             raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
         check_coefficients(self.tangential, self.radial)
-        if not (np.isfinite(self.helix_lag) and self.helix_lag >= 0):
-            raise ValueError(
-                f"helix_lag={self.helix_lag} rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
-            )
+        text = "rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
+        check_number("helix_lag", self.helix_lag, text, may_be_zero=True)
         if not np.isfinite(self.feed_angle):
             raise ValueError(f"feed_angle={self.feed_angle} rad is not finite; 0 feeds along x, pi/2 along y")
         object.__setattr__(self, "pitch", normalize_pitch(self.pitch, self.teeth))
@@ -167,9 +161,6 @@ class Cut:
         return round(float(np.sin(force) * np.sin(phi)), 15), round(float(np.cos(force) * np.cos(phi)), 15)
 
 
-DirectionModes = Sequence[Mode] | None
-"""Modes of one direction; None if it is rigid or unknown."""
-
 CHECKED_DEPTH_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Shares of its depth at which a stable program must be stable: a stable island above a limit is not usable."""
 
@@ -201,10 +192,8 @@ class Program:
 
     def __post_init__(self) -> None:
         """Check speed and depth."""
-        if not (np.isfinite(self.speed_rpm) and self.speed_rpm > 0):
-            raise ValueError(f"speed_rpm={self.speed_rpm} is not a finite speed > 0 rpm; give that of the program")
-        if not (np.isfinite(self.depth) and self.depth > 0):
-            raise ValueError(f"depth={self.depth} m is not a finite depth > 0; 1 mm is 1e-3")
+        check_number("speed_rpm", self.speed_rpm, "is not a finite speed > 0 rpm; give that of the program")
+        check_number("depth", self.depth, "m is not a finite depth > 0; 1 mm is 1e-3")
 
 
 def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0) -> Floats:
@@ -251,10 +240,9 @@ def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: flo
     672
     """
     for name, value in (("diameter", diameter), ("feed_per_tooth", feed_per_tooth)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name}={value} m is not a finite number > 0; 1 mm is 1e-3")
-    if not (np.isfinite(edge) and edge >= 0):
-        raise ValueError(f"edge={edge} N/m is not a finite number >= 0; 1 N/mm is 1e3, leave it out where not known")
+        check_number(name, value, "m is not a finite number > 0; 1 mm is 1e-3")
+    text = "N/m is not a finite number >= 0; 1 N/mm is 1e3, leave it out where not known"
+    check_number("edge", edge, text, may_be_zero=True)
     chip = feed_per_tooth * (np.cos(cut.entry_angle) - np.cos(cut.exit_angle))
     per_depth = cut.tangential * chip + edge * (cut.exit_angle - cut.entry_angle)
     return np.asarray(cut.teeth * diameter / (4 * np.pi) * per_depth * np.asarray(depth, dtype=np.float64))

@@ -54,12 +54,8 @@ def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
     """
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", userblock_size=HISTORY_HEAD_SIZE) as file:
-        file.attrs.update(
-            format=HISTORY_FORMAT,
-            version=HISTORY_FORMAT_VERSION,
-            settings_hash=history.settings_hash,
-            software=history.software,
-        )
+        file.attrs.update(format=HISTORY_FORMAT, version=HISTORY_FORMAT_VERSION)
+        file.attrs.update(settings_hash=history.settings_hash, software=history.software)
         speed = file.create_dataset("speed_rpm", data=history.speed_rpm)
         speed.attrs["units"] = "rpm"
         speed.make_scale("speed_rpm")
@@ -101,39 +97,31 @@ def read_history(path: str | os.PathLike[str]) -> SldHistory:
     """
     content = Path(path).read_bytes()
     if content[:HISTORY_HEAD_SIZE] != _file_head(content[HISTORY_HEAD_SIZE:]):
-        raise ValueError(
-            f"{os.fspath(path)}: damaged, or no {HISTORY_FORMAT} file of version {HISTORY_FORMAT_VERSION}; "
-            "a history is derived from the taps: rebuild it"
-        )
+        wanted = f"{HISTORY_FORMAT} file of version {HISTORY_FORMAT_VERSION}"
+        advice = "a history is derived from the taps: rebuild it"
+        raise ValueError(f"{os.fspath(path)}: damaged, or no {wanted}; {advice}")
     with h5py.File(io.BytesIO(content), "r") as file:
-        return _read_file(file)
+        columns, cuts = file["columns"], file["cuts"]
+        return SldHistory(
+            settings_hash=file.attrs["settings_hash"],
+            software=file.attrs["software"],
+            speed_rpm=file["speed_rpm"][...],
+            columns={name: _read_column(dataset) for name, dataset in columns.items()},
+            depth={cuts[i].attrs["name"]: cuts[i]["limiting_depth"][...] for i in sorted(cuts, key=int)},
+            units={name: dataset.attrs["units"] for name, dataset in columns.items() if "units" in dataset.attrs},
+        )
 
 
 def _file_head(body: bytes) -> bytes:
-    return f"{HISTORY_FORMAT} {HISTORY_FORMAT_VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n".encode().ljust(
-        HISTORY_HEAD_SIZE, b"\0"
-    )
+    head = f"{HISTORY_FORMAT} {HISTORY_FORMAT_VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n"
+    return head.encode().ljust(HISTORY_HEAD_SIZE, b"\0")
 
 
 def _write_column(columns: h5py.Group, name: str, values: Column, units: str | None) -> None:
-    if values.dtype.kind == "U":
-        dataset = columns.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
-    else:
-        dataset = columns.create_dataset(name, data=values)
+    data, kind = (values.astype(object), h5py.string_dtype()) if values.dtype.kind == "U" else (values, None)
+    dataset = columns.create_dataset(name, data=data, dtype=kind)
     if units is not None:
         dataset.attrs["units"] = units
-
-
-def _read_file(file: h5py.File) -> SldHistory:
-    columns, cuts = file["columns"], file["cuts"]
-    return SldHistory(
-        settings_hash=file.attrs["settings_hash"],
-        software=file.attrs["software"],
-        speed_rpm=file["speed_rpm"][...],
-        columns={name: _read_column(dataset) for name, dataset in columns.items()},
-        depth={cuts[i].attrs["name"]: cuts[i]["limiting_depth"][...] for i in sorted(cuts, key=int)},
-        units={name: dataset.attrs["units"] for name, dataset in columns.items() if "units" in dataset.attrs},
-    )
 
 
 def _read_column(dataset: h5py.Dataset) -> Column:

@@ -1,16 +1,17 @@
 """Stability limits of a chatter loop given over frequency."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from acquisition import Remark
-from lobes.arrays import Complexes, Floats, Indices, Integers
 from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
 from lobes.tooth_force import mean_regeneration
+from modal.arrays import Complexes, Floats, Indices, Integers
 
 MIN_UNEVEN_RESPONSE = 0.02
 """Least response that is searched, over its largest value."""
@@ -34,8 +35,9 @@ def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tup
     for rows, grid in _frequency_blocks(branch, cut, tooth_frequency):
         loop = branch.receptance(grid) * mean_regeneration(cut, grid / tooth_frequency[rows, np.newaxis])
         row, step = np.nonzero((loop.imag[:, 1:] < 0) != (loop.imag[:, :-1] < 0))
-        frequency = _refine_uneven_crossing(branch, cut, tooth_frequency[rows][row], grid[step], grid[step + 1])
-        real = _loop_response(branch, cut, tooth_frequency[rows][row], frequency).real
+        loop_at = partial(_loop_response, branch, cut, tooth_frequency[rows][row])
+        frequency = _refine_uneven_crossing(loop_at, grid[step], grid[step + 1])
+        real = loop_at(frequency).real
         limit = np.where(real < 0, -1 / np.minimum(real, -1e-300), np.inf)
         order = np.lexsort((limit, row))
         first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
@@ -62,15 +64,12 @@ def _loop_response(branch: TipResponse, cut: Cut, tooth_frequency: Floats, frequ
     return np.asarray(branch.receptance(frequency) * mean_regeneration(cut, frequency / tooth_frequency))
 
 
-def _refine_uneven_crossing(
-    branch: TipResponse, cut: Cut, tooth_frequency: Floats, low: Floats, high: Floats
-) -> Floats:
+def _refine_uneven_crossing(loop_at: Callable[[Floats], Complexes], low: Floats, high: Floats) -> Floats:
     """Return the frequencies between `low` and `high` (Hz) at which the loop is real."""
-    at_low = _loop_response(branch, cut, tooth_frequency, low).imag
-    at_high = _loop_response(branch, cut, tooth_frequency, high).imag
+    at_low, at_high = loop_at(low).imag, loop_at(high).imag
     for _ in range(UNEVEN_REFINEMENT_STEPS):
         middle = high - at_high * (high - low) / (at_high - at_low)
-        value = _loop_response(branch, cut, tooth_frequency, middle).imag
+        value = loop_at(middle).imag
         before = (value < 0) != (at_high < 0)
         low, at_low = np.where(before, middle, low), np.where(before, value, at_low)
         high, at_high = np.where(before, high, middle), np.where(before, at_high, value)
@@ -115,7 +114,10 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
     limited = np.isfinite(depth)
     waves = np.where(limited, np.floor(np.where(limited, chatter, 0) / tooth_frequency), -1).astype(np.int64)
-    loops = [(branch.grid, responses[i], waves[limited & (setting == i)]) for i, branch in enumerate(branches)]
+    parts = [(branch.grid, response) for branch, response in zip(branches, responses, strict=True)]
+    loops = [(*part, np.unique(waves[limited & (setting == i)])) for i, part in enumerate(parts) if not cut.pitch]
+    grid, weakest = min(parts, key=lambda part: float(np.min(part[1].real)))
+    lowest = float(grid[np.argmin(weakest.real)])
     return StabilityLobes(
         speed_rpm=speed_rpm,
         depth=depth,
@@ -123,32 +125,18 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         kind=np.where(limited, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
-        curves=tuple if cut.pitch else partial(_lobes_of_loops, loops, cut, speed_rpm),
-        remarks=_band_remarks(branches, responses)
-        or _mean_force_remarks(method, cut, _weakest_frequency(branches, responses), speed_rpm),
+        curves=lambda: chain.from_iterable(_lobes_of_loop(*loop, cut, speed_rpm) for loop in loops),
+        remarks=_band_remarks(grid, weakest.real) or _mean_force_remarks(method, cut, lowest, speed_rpm),
     )
 
 
-def _weakest_branch(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[TipResponse, Complexes]:
-    return min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
-
-
-def _weakest_frequency(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> float:
-    """Return the chatter frequency of the lowest limit of all speeds (Hz)."""
-    branch, response = _weakest_branch(branches, responses)
-    return float(branch.grid[np.argmin(response.real)])
-
-
-def _band_remarks(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[Remark, ...]:
+def _band_remarks(grid: Floats, real: Floats) -> tuple[Remark, ...]:
     """Return a remark if the measured lines end before the weakest point of the loop."""
-    branch, response = _weakest_branch(branches, responses)
-    weakest = int(np.argmin(response.real))
-    if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
+    weakest = int(np.argmin(real))
+    if grid[0] == 0 or (real[weakest] < 0 and 0 < weakest < grid.size - 1):
         return ()
-    text = (
-        f"the FRF does not reach the chatter band: between {branch.grid[0]:g} and {branch.grid[-1]:g} Hz the real part "
-        "has no lowest point"
-    )
+    reach = f"between {grid[0]:g} and {grid[-1]:g} Hz the real part has no lowest point"
+    text = f"the FRF does not reach the chatter band: {reach}"
     return (Remark("chatter-band-missing", "", text, "use a wider band, or record one"),)
 
 
@@ -195,9 +183,10 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
         if not rows.size:
             break
         block = order[begin : begin + max(1, min(size, MAX_BLOCK_VALUES // rows.size))]
-        real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
-        lower = real < best[rows]
-        best[rows[lower]], step[rows[lower]], whole[rows[lower]] = real[lower], where[lower], number[lower]
+        row, real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
+        lower = real < best[rows[row]]
+        at = rows[row[lower]]
+        best[at], step[at], whole[at] = real[lower], where[lower], number[lower]
         begin, size = begin + block.size, 2 * size
     chatter = np.full(tooth_frequency.shape, np.nan)
     negative = np.flatnonzero(best < 0)
@@ -208,11 +197,11 @@ def _lowest_crossing_frequency(branch: TipResponse, response: Complexes, tooth_f
 
 def _lowest_step(
     grid: Floats, turn: Floats, real: Floats, block: Indices, tooth_frequency: Floats
-) -> tuple[Floats, Indices, Floats]:
-    """Return real part, grid step and whole number of the lowest crossing in a block for each tooth frequency.
+) -> tuple[Indices, Floats, Indices, Floats]:
+    """Return index, real part, grid step and whole number of the lowest crossing in a block for tooth frequencies.
 
-    If several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
-    real part is 0 if there is no crossing.
+    If several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. Tooth
+    frequencies without a crossing are left out.
     """
     lower = block + (real[block + 1] < real[block])
     upper = 2 * block + 1 - lower
@@ -227,11 +216,7 @@ def _lowest_step(
     at_crossing = real[lower[column]] + share * (real[upper[column]] - real[lower[column]])
     order = np.lexsort((at_crossing, row))
     first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-    best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
-    best[row[first]] = at_crossing[first]
-    step[row[first]] = block[column[first]]
-    whole[row[first]] = number[first]
-    return best, step, whole
+    return row[first], at_crossing[first], block[column[first]], number[first]
 
 
 def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_frequency: Floats) -> Floats:
@@ -261,13 +246,7 @@ def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_
     return middle
 
 
-def _lobes_of_loops(loops: Sequence[tuple[Floats, Complexes, Integers]], cut: Cut, speed_rpm: Floats) -> Iterator[Lobe]:
-    """Yield the lobes of loops, each given by frequencies (Hz), response, and waves between teeth at the limits."""
-    for grid, response, waves in loops:
-        yield from _lobes_of_loop(grid, response, cut, np.unique(waves), speed_rpm)
-
-
-def _lobes_of_loop(grid: Floats, response: Complexes, cut: Cut, numbers: Integers, speed_rpm: Floats) -> Iterator[Lobe]:
+def _lobes_of_loop(grid: Floats, response: Complexes, numbers: Integers, cut: Cut, speed_rpm: Floats) -> Iterator[Lobe]:
     index = np.flatnonzero(response.real < 0)
     frequency, response = grid[index], response[index]
     depth = -1 / (2 * response.real)

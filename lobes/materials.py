@@ -16,9 +16,6 @@ import numpy as np
 
 from lobes.coefficients import CuttingCoefficients, SpecificForce
 
-MIN_TESTS_FOR_RANGE = 2
-"""Fewest tests of an alloy that define a range."""
-
 
 @cache
 def read_table(name: str) -> tuple[dict[str, str], ...]:
@@ -48,7 +45,7 @@ def _read_test(row: dict[str, str]) -> CuttingCoefficients:
 
 
 def _with_range(test: CuttingCoefficients, alike: Sequence[CuttingCoefficients]) -> CuttingCoefficients:
-    if len(alike) < MIN_TESTS_FOR_RANGE:
+    if len(alike) == 1:
         return test
     tangential = [other.tangential for other in alike]
     ratio = [other.radial / other.tangential for other in alike]
@@ -69,50 +66,36 @@ def listed_materials() -> tuple[CuttingCoefficients, ...]:
     return tuple(_material_coefficients(row) for row in read_table("materials.csv"))
 
 
-@cache
-def _specific_forces_by_group() -> dict[str, list[SpecificForce]]:
-    by_name: dict[str, list[SpecificForce]] = {}
-    for row in read_table("specific_cutting_forces.csv"):
-        force = SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"])
-        by_name.setdefault(row["of"], []).append(force)
-    return by_name
-
-
-@cache
-def _force_ratios() -> dict[str, dict[str, str]]:
-    return {row["of"]: row for row in read_table("force_ratios.csv")}
+def _specific_forces(name: str) -> list[SpecificForce]:
+    rows = [row for row in read_table("specific_cutting_forces.csv") if row["of"] == name]
+    return [SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"]) for row in rows]
 
 
 def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     vdi, cmc = f"VDI {row['vdi_3323_group']}", f"CMC {row['cmc_code']}"
-    forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces_by_group().get(name, ())]
+    forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces(name)]
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
-    ratio = _force_ratios().get(vdi) or _force_ratios()[row["iso_group"]]
-    tangential = np.mean([f.tangential(REFERENCE_CHIP_THICKNESS) for f in forces] + [t.tangential for t in tests])
+    ratios = {each["of"]: each for each in read_table("force_ratios.csv")}
+    ratio = ratios.get(vdi) or ratios[row["iso_group"]]
+    of_tests = [test.tangential for test in tests]
+    tangential = float(np.mean([force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + of_tests))
     edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
-    edge = np.mean(edges + [test.tangential_edge for test in tests])
+    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + of_tests
+    limits = [(1 + side * MIN_COEFFICIENT_RANGE) * tangential for side in (-1, 1)]
     return CuttingCoefficients(
         material=row["material"],
-        tangential=float(tangential),
-        radial=float(tangential) * float(ratio["middle"]),
-        tangential_edge=float(edge),
+        tangential=tangential,
+        radial=tangential * float(ratio["middle"]),
+        tangential_edge=float(np.mean(edges + [test.tangential_edge for test in tests])),
         source="; ".join(_source_texts(forces, tests, ratio["source"])),
         alloy=row["alloy"],
         iso_group=row["iso_group"],
         vdi_3323_group=row["vdi_3323_group"],
         equivalents=tuple(row["equivalents"].split(";")),
-        tangential_range=_coefficient_range(float(tangential), forces, tests),
+        tangential_range=(min(*published, *limits), max(*published, *limits)),
         ratio_range=(float(ratio["low"]), float(ratio["high"])),
         specific_forces=tuple(forces),
     )
-
-
-def _coefficient_range(
-    middle: float, forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients]
-) -> tuple[float, float]:
-    """Return the range over all publications and chip thicknesses."""
-    published = [f.tangential(c) for f in forces for c in CHIP_THICKNESS_RANGE] + [t.tangential for t in tests]
-    return min(*published, (1 - MIN_COEFFICIENT_RANGE) * middle), max(*published, (1 + MIN_COEFFICIENT_RANGE) * middle)
 
 
 def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Frf
-from lobes.arrays import Complexes, Floats, Integers
-from lobes.tip_response import check_modes
+from lobes.coefficients import check_number
+from lobes.tip_response import TipModes, check_modes
 from modal import Mode
+from modal.arrays import Complexes, Floats, Integers
 
 MAX_UNDERDAMPED_RATIO = 0.99
 """Largest damping ratio of a complex mode; a larger one, as of a sample, is replaced by it."""
@@ -64,9 +65,7 @@ def tip_participation(damping_ratio: Floats, phase: Floats) -> tuple[Floats, Flo
     return np.cos(phase) + velocity * damping_ratio, velocity
 
 
-def build_milling_system(
-    x: Sequence[Mode] | None, y: Sequence[Mode] | None, vectors: ArrayLike | None = None
-) -> MillingSystem:
+def build_milling_system(x: TipModes, y: TipModes, vectors: ArrayLike | None = None) -> MillingSystem:
     """Build the system of the modes in the feed (x) and normal (y) direction.
 
     Parameters
@@ -123,9 +122,8 @@ def check_directions(vectors: ArrayLike, number: int) -> Floats:
     """Return the directions of the modes, shape (n, 2); ValueError if shape or values are wrong."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):
-        raise ValueError(
-            f"vectors has shape {vector.shape}; ({number}, 2) is needed, the parts in x and y of each mode"
-        )
+        needed = f"({number}, 2) is needed, the parts in x and y of each mode"
+        raise ValueError(f"vectors has shape {vector.shape}; {needed}")
     if not np.all(np.isfinite(vector)):
         raise ValueError("vectors holds a value that is not finite; give the parts in x and y of each mode")
     return vector
@@ -219,12 +217,10 @@ def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio:
     (900, 17.0)
     """
     if rule not in get_args(StiffnessRule):
-        raise ValueError(
-            f"rule={rule!r} is none of {', '.join(get_args(StiffnessRule))}; choose what K does when f_n falls"
-        )
+        known = ", ".join(get_args(StiffnessRule))
+        raise ValueError(f"rule={rule!r} is none of {known}; choose what K does when f_n falls")
     for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{name}={value} is not a finite number > 0; give new over old")
+        check_number(name, value, "is not a finite number > 0; give new over old")
     if rule == "measured" and stiffness_ratio is None:
         raise ValueError('rule="measured" needs stiffness_ratio, K of the new tap test over K of the baseline')
     if rule == "paper" and stiffness_ratio is not None:

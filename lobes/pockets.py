@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Floats, Indices
 from lobes.stability_lobes import StabilityLobes
+from modal.arrays import Floats, Indices
 
 
 def find_curve_peaks(values: Floats, prominence: float) -> Indices:
@@ -21,10 +21,9 @@ def find_curve_peaks(values: Floats, prominence: float) -> Indices:
     starts = np.concatenate(([0], np.flatnonzero(np.diff(values)) + 1))
     ends = np.concatenate((starts[1:], [values.size])) - 1
     height = values[starts]
-    tops = map(int, np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])) + 1)
-    kept = [
-        top for top in tops if height[top] - max(_peak_base(height, top, -1), _peak_base(height, top, 1)) >= prominence
-    ]
+    tops = (np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])) + 1).tolist()
+    bases = [max(_peak_base(height, top, -1), _peak_base(height, top, 1)) for top in tops]
+    kept = [top for top, base in zip(tops, bases, strict=True) if height[top] - base >= prominence]
     return np.asarray((starts[kept] + ends[kept]) // 2)
 
 
@@ -121,14 +120,10 @@ def _pocket_ends(speed: Floats, depth: Floats, peak: int) -> tuple[float, float]
     level = POCKET_DEPTH_SHARE * depth[peak]
     low = np.flatnonzero(depth < level)
     before, after = low[low < peak], low[low > peak]
-    slowest, fastest = speed[0], speed[-1]
-    if before.size:
-        sides = [before[-1], before[-1] + 1]
-        slowest = np.interp(level, depth[sides], speed[sides])
-    if after.size:
-        sides = [after[0], after[0] - 1]
-        fastest = np.interp(level, depth[sides], speed[sides])
-    return float(slowest), float(fastest)
+    left = [before[-1], before[-1] + 1] if before.size else [0]
+    right = [after[0], after[0] - 1] if after.size else [-1]
+    slowest, fastest = (float(np.interp(level, depth[sides], speed[sides])) for sides in (left, right))
+    return slowest, fastest
 
 
 def rank_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:

@@ -2,26 +2,34 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition import Remark
-from lobes.arrays import Flags, Floats
 from lobes.cut import Cut
+from modal.arrays import Flags, Floats
+
+
+def check_vector(name: str, values: ArrayLike, item: str, text: str = "", may_be_zero: bool = False) -> Floats:
+    """Return values as a 1-D array; ValueError unless there is one at least.
+
+    With a text all must be finite and > 0, or 0 where that is allowed.
+    """
+    vector = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    if vector.ndim != 1 or vector.size == 0:
+        raise ValueError(f"{name} has shape {vector.shape}; a 1-D array of at least one {item} is needed")
+    bad = np.flatnonzero(~(np.isfinite(vector) & ((vector >= 0) if may_be_zero else (vector > 0))))
+    if text and bad.size:
+        raise ValueError(f"{name}[{bad[0]}]={vector[bad[0]]} {text}")
+    return vector
 
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:
     """Return spindle speeds (rpm) as a 1-D array; ValueError unless there is one and all are finite and > 0."""
-    speed = np.atleast_1d(np.asarray(speed_rpm, dtype=np.float64))
-    if speed.ndim != 1 or speed.size == 0:
-        raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
-    bad = np.flatnonzero(~(np.isfinite(speed) & (speed > 0)))
-    if bad.size:
-        raise ValueError(f"speed_rpm[{bad[0]}]={speed[bad[0]]} is not a finite speed > 0 rpm; leave such speeds out")
-    return speed
+    text = "is not a finite speed > 0 rpm; leave such speeds out"
+    return check_vector("speed_rpm", speed_rpm, "speed (rpm)", text)
 
 
 MethodName = Literal["average angle", "zero order", "semi-discretisation"]
@@ -97,17 +105,15 @@ class StabilityLobes:
         object.__setattr__(self, "speed_rpm", check_speeds(self.speed_rpm))
         n = self.speed_rpm.size
         for name in ("depth", "chatter_frequency", "kind"):
-            if np.shape(getattr(self, name)) != (n,):
-                raise ValueError(
-                    f"{name} has shape {np.shape(getattr(self, name))}, speed_rpm ({n},); give one a speed"
-                )
+            shape = np.shape(getattr(self, name))
+            if shape != (n,):
+                raise ValueError(f"{name} has shape {shape}, speed_rpm ({n},); give one a speed")
         if self.crossings.ndim != 2 or len(self.crossings) != n:
             raise ValueError(f"crossings has shape {self.crossings.shape}; one row for each of {n} speeds is needed")
         bad = np.flatnonzero(~(self.depth > 0))
         if bad.size:
-            raise ValueError(
-                f"depth[{bad[0]}]={self.depth[bad[0]]} m is not > 0; give inf where a cut is stable at any depth"
-            )
+            wrong = f"depth[{bad[0]}]={self.depth[bad[0]]} m"
+            raise ValueError(f"{wrong} is not > 0; give inf where a cut is stable at any depth")
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
@@ -152,9 +158,8 @@ class StabilityLobes:
         low, high = float(np.min(self.speed_rpm)), float(np.max(self.speed_rpm))
         outside = ~((wanted >= low) & (wanted <= high))
         if np.any(outside):
-            raise ValueError(
-                f"{wanted[outside].flat[0]:g} rpm is outside the chart ({low:g}..{high:g} rpm); compute lobes there too"
-            )
+            chart = f"the chart ({low:g}..{high:g} rpm)"
+            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}; compute lobes there too")
         order = np.argsort(self.speed_rpm)
         speed, depth = self.speed_rpm[order], self.depth[order]
         right = np.searchsorted(speed, wanted)
@@ -217,21 +222,21 @@ def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
     """
     first = diagrams[0]
     lowest, speed = np.argmin([diagram.depth for diagram in diagrams], axis=0), np.arange(first.speed_rpm.size)
-    given = [diagram.crossings for diagram in diagrams]
-    width = max(crossing.shape[1] for crossing in given)
-    crossings = [np.pad(own, ((0, 0), (0, width - own.shape[1])), constant_values=np.inf) for own in given]
+    crossings = pad_columns([diagram.crossings for diagram in diagrams])
     columns = ("depth", "chatter_frequency", "kind")
     return replace(
         first,
         **{name: np.stack([getattr(diagram, name) for diagram in diagrams])[lowest, speed] for name in columns},
         crossings=np.stack(crossings)[lowest, speed],
-        curves=partial(_envelope_lobes, diagrams),
+        curves=lambda: [lobe for diagram in diagrams for lobe in diagram.lobes],
         remarks=tuple(dict.fromkeys(remark for diagram in diagrams for remark in diagram.remarks)),
     )
 
 
-def _envelope_lobes(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
-    return [lobe for diagram in diagrams for lobe in diagram.lobes]
+def pad_columns(tables: Sequence[Floats]) -> list[Floats]:
+    """Pad tables with inf to the same number of columns."""
+    width = max(table.shape[1] for table in tables)
+    return [np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=np.inf) for table in tables]
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,14 +287,7 @@ def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: A
     >>> (chart.depth * 1e3).round(2).tolist()  # mm, by radial depth
     [[6.76], [3.29], [1.28]]
     """
-    shares = np.atleast_1d(np.asarray(immersion, dtype=np.float64))
-    if shares.ndim != 1 or shares.size == 0:
-        raise ValueError(f"immersion has shape {shares.shape}; a 1-D array of at least one value in (0, 1] is needed")
+    shares = check_vector("immersion", immersion, "value in (0, 1]")
     charts = [limits(replace(cut, immersion=float(share))) for share in shares]
-    return RadialLobes(
-        speed_rpm=charts[0].speed_rpm,
-        immersion=shares,
-        depth=np.stack([chart.depth for chart in charts]),
-        method=charts[0].method,
-        remarks=charts[int(np.argmin(shares))].remarks,
-    )
+    depth, remarks = np.stack([chart.depth for chart in charts]), charts[int(np.argmin(shares))].remarks
+    return RadialLobes(charts[0].speed_rpm, shares, depth, charts[0].method, remarks)

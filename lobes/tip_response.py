@@ -1,15 +1,17 @@
 """Receptance at the tool tip over frequency, from modes or from a measured FRF."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from acquisition import Frf
-from lobes.arrays import Complexes, Floats
 from modal import Mode
+from modal.arrays import Complexes, Floats
 
+TipModes = Sequence[Mode] | None
+"""Modes of the tool tip in one direction; None if it is rigid or unknown."""
 TipData = Frf | Sequence[Mode]
 """Data of the tool tip in one direction: its measured FRF, or its modes."""
 
@@ -68,10 +70,7 @@ def tip_responses(x: TipData | None, y: TipData | None, tooth_frequency: float) 
         if not isinstance(tip, Frf):
             check_modes(tip, name)
     highest = max(_highest_frequency(tip) for _, _, tip in given) + MAX_TOOTH_FREQUENCY_RATIO * tooth_frequency
-    return [
-        (axis, _from_frf(tip.in_band(tip.usable_band)) if isinstance(tip, Frf) else _from_modes(tip, highest))
-        for axis, _, tip in given
-    ]
+    return [(axis, _tip_response(tip, highest)) for axis, _, tip in given]
 
 
 def cross_response(cross: TipData, highest: float) -> TipResponse:
@@ -81,11 +80,9 @@ def cross_response(cross: TipData, highest: float) -> TipResponse:
     ValueError
     for an empty list.
     """
-    if isinstance(cross, Frf):
-        return _from_frf(cross.in_band(cross.usable_band))
-    if not cross:
+    if not isinstance(cross, Frf) and not cross:
         raise ValueError("cross has no modes; give at least one mode, or None where x and y do not move each other")
-    return _from_modes(cross, highest)
+    return _tip_response(cross, highest)
 
 
 def common_grid(tips: Sequence[TipResponse]) -> Floats:
@@ -93,10 +90,8 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
     low = max(tip.grid[0] for tip in tips)
     high = min(tip.grid[-1] for tip in tips)
     if not low < high:
-        raise ValueError(
-            f"x and y have no band in common: one ends at {high:g} Hz, the other begins at {low:g} Hz; "
-            "give FRFs that overlap"
-        )
+        ends = f"one ends at {high:g} Hz, the other begins at {low:g} Hz"
+        raise ValueError(f"x and y have no band in common: {ends}; give FRFs that overlap")
     if all(np.array_equal(tip.grid, tips[0].grid) for tip in tips[1:]):
         return tips[0].grid
     grid = np.unique(np.concatenate([tip.grid for tip in tips]))
@@ -105,21 +100,12 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
 
 def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
     """Sum weight times receptance, known where all parts are; ValueError for bands without overlap."""
-
-    def receptance(frequency: Floats) -> Complexes:
-        total = np.zeros(np.shape(frequency), dtype=np.complex128)
-        for weight, part in parts:
-            total += weight * part.receptance(frequency)
-        return total
-
-    return TipResponse(common_grid([part for _, part in parts]), receptance)
+    grid = common_grid([part for _, part in parts])
+    return TipResponse(grid, lambda f: _total(f, (weight * part.receptance(f) for weight, part in parts)))
 
 
-def _from_frf(frf: Frf) -> TipResponse:
-    lines = np.arange(frf.frequency.size)
-    steps = np.arange(lines[-1] * GRID_STEPS_PER_LINE + 1) / GRID_STEPS_PER_LINE
-    spline = scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
-    return TipResponse(np.interp(steps, lines, frf.frequency), spline)
+def _total(frequency: Floats, receptances: Iterable[Complexes]) -> Complexes:
+    return np.asarray(sum(receptances, np.zeros(np.shape(frequency), dtype=np.complex128)))
 
 
 def _highest_frequency(tip: TipData) -> float:
@@ -129,16 +115,15 @@ def _highest_frequency(tip: TipData) -> float:
     return MAX_MODE_FREQUENCY_RATIO * max(mode.frequency for mode in tip)
 
 
-def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
-    grid = np.unique(np.concatenate([[0.0, highest], *(_grid_near_mode(mode, highest) for mode in modes)]))
-
-    def receptance(frequency: Floats) -> Complexes:
-        total = np.zeros(np.shape(frequency), dtype=np.complex128)
-        for mode in modes:
-            total += mode.receptance(frequency)
-        return total
-
-    return TipResponse(grid, receptance)
+def _tip_response(tip: TipData, highest: float) -> TipResponse:
+    if isinstance(tip, Frf):
+        frf = tip.in_band(tip.usable_band)
+        lines = np.arange(frf.frequency.size)
+        steps = np.arange(lines[-1] * GRID_STEPS_PER_LINE + 1) / GRID_STEPS_PER_LINE
+        spline = scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
+        return TipResponse(np.interp(steps, lines, frf.frequency), spline)
+    grid = np.unique(np.concatenate([[0.0, highest], *(_grid_near_mode(mode, highest) for mode in tip)]))
+    return TipResponse(grid, lambda f: _total(f, (mode.receptance(f) for mode in tip)))
 
 
 def _grid_near_mode(mode: Mode, highest: float) -> Floats:

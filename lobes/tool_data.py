@@ -24,8 +24,6 @@ MIN_SLOT_IMMERSION = 0.4
 """Least immersion of a slot, as in the tables of Tungaloy."""
 MIN_PUBLISHED_RANGE = 0.25
 """Least relative half-width of a range, the error of a single source."""
-ANY_MATERIAL_GROUP = "any"
-"""Group of rows that hold for every material."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def published_cutting_speed(material: CuttingCoefficients, tool: ToolMaterial, c
     >>> f"{speed.low * 60:.0f} to {speed.high * 60:.0f} m/min"
     '148 to 1250 m/min'
     """
-    rows = _finest_group_rows("cutting_speeds.csv", material, tool, cut)
+    rows = _finest_rows("cutting_speeds.csv", material, tool, cut)
     ranges = [(float(row["low_m_per_min"]) / 60, float(row["high_m_per_min"]) / 60) for row in rows]
     return _join_ranges(ranges, rows)
 
@@ -120,11 +118,10 @@ def published_feed_per_tooth(
     >>> f"{feed.low * 1e3:.3f} to {feed.high * 1e3:.3f} mm"
     '0.075 to 0.150 mm'
     """
-    rows = _finest_group_rows("feeds_per_tooth.csv", material, tool, cut)
+    rows = _finest_rows("feeds_per_tooth.csv", material, tool, cut)
     sources = dict.fromkeys(row["source"] for row in rows)
-    return _join_ranges(
-        [_feed_at_diameter([row for row in rows if row["source"] == name], diameter) for name in sources], rows
-    )
+    by_source = [[row for row in rows if row["source"] == name] for name in sources]
+    return _join_ranges([_feed_at_diameter(own, diameter) for own in by_source], rows)
 
 
 def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> PublishedRange | None:
@@ -149,18 +146,14 @@ def published_speed_of_any_tool(material: CuttingCoefficients, cut: CutKind) -> 
     1250
     """
     known = [speed for tool in TOOL_MATERIALS if (speed := published_cutting_speed(material, tool, cut))]
-    if not known:
-        return None
-    fastest = max(known, key=lambda speed: speed.high)
-    return PublishedRange(0.0, fastest.high, fastest.sources)
+    fastest = max(known, key=lambda speed: speed.high, default=None)
+    return fastest and PublishedRange(0.0, fastest.high, fastest.sources)
 
 
-def _finest_group_rows(
-    name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind
-) -> list[dict[str, str]]:
+def _finest_rows(name: str, material: CuttingCoefficients, tool: ToolMaterial, cut: CutKind) -> list[dict[str, str]]:
     """Return the rows of the finest group that has any."""
     table = [row for row in read_table(name) if tool in row["tool_material"].split(";") and cut == row["cut"]]
-    any_group = [ANY_MATERIAL_GROUP] if material.iso_group else []
+    any_group = ["any"] if material.iso_group else []
     for group in (f"VDI {material.vdi_3323_group}", material.iso_group, *any_group):
         rows = [row for row in table if group in row["of"].split(";")]
         if rows:
@@ -186,6 +179,5 @@ def _join_ranges(ranges: Sequence[tuple[float, float]], rows: Sequence[dict[str,
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     middle = (low + high) / 2
     sources = tuple(dict.fromkeys(row["source"] for row in rows))
-    return PublishedRange(
-        min(low, (1 - MIN_PUBLISHED_RANGE) * middle), max(high, (1 + MIN_PUBLISHED_RANGE) * middle), sources
-    )
+    low, high = min(low, (1 - MIN_PUBLISHED_RANGE) * middle), max(high, (1 + MIN_PUBLISHED_RANGE) * middle)
+    return PublishedRange(low, high, sources)

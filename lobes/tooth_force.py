@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from lobes.arrays import Complexes, Floats
 from lobes.cut import Cut
+from modal.arrays import Complexes, Floats
 
 
 def mean_force(cut: Cut) -> Floats:
@@ -50,8 +50,7 @@ def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
         cuts = inside.astype(np.float64)
         shares = _force_terms(cuts, cuts * np.sin(2 * tooth), cuts * np.cos(2 * tooth))
     else:
-        lag = cut.helix_lag * np.broadcast_to(depth[..., np.newaxis], tooth.shape)
-        lag = np.maximum(lag, 1e-9)
+        lag = np.maximum(cut.helix_lag * np.broadcast_to(depth[..., np.newaxis], tooth.shape), 1e-9)
         shares = (_tooth_integral(cut, tooth) - _tooth_integral(cut, tooth - lag)) / _append_axes(lag)
     return _sum_by_delay(cut, shares)
 
@@ -70,9 +69,8 @@ def feed_rotation(feed_angle: Floats) -> Floats:
 
 def _to_machine_axes(cut: Cut, shares: Floats) -> Floats:
     """Return the matrix of a cut (Pa) from the shares of its two coefficients."""
-    return rotate_to_machine(
-        cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle)
-    )
+    matrix = cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :]
+    return rotate_to_machine(matrix, np.array(cut.feed_angle))
 
 
 def _sum_by_delay(cut: Cut, shares: Floats) -> Floats:

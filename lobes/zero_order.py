@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Remark
-from lobes.arrays import Complexes, Floats
 from lobes.cut import Cut
 from lobes.loop_limits import MEAN_FORCE_REMEDY, loop_limits
 from lobes.stability_lobes import StabilityLobes, check_speeds
 from lobes.tip_response import TipData, TipResponse, common_grid, cross_response, tip_responses, weighted_sum
 from lobes.tooth_force import interval_forces, mean_force
+from modal.arrays import Complexes, Floats
 
 MIN_NET_FORCE_RATIO = 0.7
 """Least mean force of one direction over the mean of its magnitude for which zero order is valid."""

@@ -1,23 +1,14 @@
 """Edit the modes of an extraction by hand: drop one, add one, or fix its frequency and damping ratio."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from modal.arrays import Floats
 from modal.bands.extract_modes import limit_to_one_thread
-from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
+from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand, replace_band
 from modal.bands.find_resonances import Resonance
-from modal.bands.fit_peaks import (
-    MAX_PEAK_FIT_ERROR,
-    are_modes,
-    group_into_bands,
-    iterate_bands,
-    refit_with_real_constants,
-    replace_band,
-)
+from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR, are_modes, group_into_bands, iterate_bands, refit_real_constants
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.fitting.fit_band import fit_band
 from modal.modes.mode_edits import ModeEdits
@@ -78,7 +69,7 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
         for frequency, zeta in edits.fix:
             edited = _fix_mode(edited, frequency, zeta)
         settled = iterate_bands(edited)
-        bands = (b if b in state.bands else refit_with_real_constants(b) for b in settled.bands)
+        bands = (b if b in state.bands else refit_real_constants(b) for b in settled.bands)
         return replace(settled, bands=tuple(bands))
 
 
@@ -94,22 +85,20 @@ class _EditPlan:
     words: tuple[str, ...]
     """Mark of what a person did to each mode."""
 
-    def without(self, i: int) -> _EditPlan:
-        words = tuple(np.delete(np.array(self.words, dtype=object), i))
-        return replace(self, poles=np.delete(self.poles, i, axis=1), words=words)
+    def without(self, i: int) -> "_EditPlan":
+        return replace(self, poles=np.delete(self.poles, i, axis=1), words=(*self.words[:i], *self.words[i + 1 :]))
 
-    def with_mode(self, frequency: float, zeta: float, word: str) -> _EditPlan:
+    def with_mode(self, frequency: float, zeta: float, word: str) -> "_EditPlan":
         return replace(self, poles=np.column_stack([self.poles, [frequency, zeta]]), words=(*self.words, word))
 
     def fitted(self, state: Extraction) -> FittedBand | None:
         """Fit these modes; None if nothing fits."""
         data = state.data(self.lines, without=self.band)
-        terms = MIN_RESIDUAL_TERMS if self.band is None else self.band.terms
+        terms, resonances = (self.band.terms, self.band.resonances) if self.band else (MIN_RESIDUAL_TERMS, ())
         held = np.array([word == FIXED_MODE for word in self.words])
         fit = fit_band(data.frequency, data.target, data.weight, self.poles, terms, held)
         if fit is None:
             return None
-        resonances = () if self.band is None else self.band.resonances
         return FittedBand(data, resonances, np.zeros(held.size), fit, terms, edits=self.words)
 
 
@@ -130,35 +119,28 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    request = f"add {frequency:g} Hz"
+    request, advice = f"add {frequency:g} Hz", "look at the picture, or hold its damping ratio, too, with fix"
     plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
-            raise ValueError(
-                f"{request}: the mode at {known[0]:.1f} Hz is there already; fix holds it, drop leaves it out"
-            )
+            mode = f"the mode at {known[0]:.1f} Hz"
+            raise ValueError(f"{request}: {mode} is there already; fix holds it, drop leaves it out")
     tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
     fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
-        raise ValueError(
-            f"{request}: no mode fits there; look at the picture, or hold its damping ratio, too, with fix"
-        )
+        raise ValueError(f"{request}: no mode fits there; {advice}")
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
-        raise ValueError(
-            f"{request}: no mode fits there: the best is at {best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain "
-            f"by {100 * max(errors):.0f} %; look at the picture, or hold its damping ratio, too, with fix"
-        )
+        mode = f"{best.fit.frequency[-1]:.1f} Hz with zeta or K uncertain by {100 * max(errors):.0f} %"
+        raise ValueError(f"{request}: no mode fits there: the best is at {mode}; {advice}")
     return replace_band(state, plan.band, best)
 
 
 def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
     request = f"fix {frequency:g} Hz at zeta {100 * zeta:g} %"
     place = _find_mode(state, frequency)
-    plan = (
-        _plan_at_frequency(state, frequency, request) if place is None else _plan_for_band(place[0]).without(place[1])
-    )
+    plan = _plan_for_band(place[0]).without(place[1]) if place else _plan_at_frequency(state, frequency, request)
     fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
     if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
         raise ValueError(f"{request}: nothing of it is to be seen there; look at the picture")

@@ -12,14 +12,8 @@ from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting.band_fit import BandFit
-from modal.hit_scatter import (
-    MIN_HITS_FOR_JACKKNIFE,
-    add_linearity_remarks,
-    hammer_covariance,
-    jackknife_covariance,
-    leave_one_out_frfs,
-)
-from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
+from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
+from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 
 
@@ -101,21 +95,16 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     """
     if hits and len(hits) != len(state.frfs):
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
-    without = [leave_one_out_frfs(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
-    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, hits, without)]
+    pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
+    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
     return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
 
 
-def _modes_with_scatter(
-    state: Extraction, band: FittedBand, hits: Sequence[Sequence[Hit]], without: Sequence[Sequence[Frf]]
-) -> list[Mode]:
-    by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
-    n_hits = min(map(len, without), default=0)
-    jackknives = [jackknife_covariance(state, band, *pair) for pair in enumerate(without)] if n_hits else []
-    over_hits = np.sum(jackknives, axis=0) if n_hits else None
-    assessed = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, assessed, hits[0], without[0]) if n_hits else assessed
+def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
+    by_hammer, over_hits, n_hits = hit_covariances(state, band, pairs)
+    modes = modes_from_band(state, band, by_hammer, over_hits, n_hits)
+    return add_linearity_remarks(state, band, modes, *pairs[0]) if n_hits else modes
 
 
 def modes_from_band(
@@ -125,9 +114,11 @@ def modes_from_band(
     fit, beyond = band.fit, systematic_error(band)
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
-    freedom = beyond.degrees_of_freedom
+    freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
+    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
+    method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
     modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
-    return [assess_mode(state, band, i, replace(m, method=_method_text(state, band))) for i, m in enumerate(modes)]
+    return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]
 
 
 def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: Floats | None, n_hits: int) -> Mode:
@@ -152,12 +143,6 @@ def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: F
         phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),
         shape=_mode_shape(fit.constant[:, i]),
     )
-
-
-def _method_text(state: Extraction, band: FittedBand) -> str:
-    f, p, m = state.frf.frequency[band.lines], len(state.frfs), band.height.size
-    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
-    return f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
 
 
 def _mode_shape(constants: Complexes) -> Floats | None:
@@ -332,29 +317,17 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
     """Return the modes of a band with their peak heights, rms over the decays."""
-    enough = len(state.frfs) >= MIN_HITS_FOR_JACKKNIFE
-    scatter, n_hits = (_decay_covariance(band), len(state.frfs)) if enough else (None, 0)
-    modes = modes_from_band(state, band, 0, scatter, n_hits)
+    scatter = decay_covariance(band)
+    modes = modes_from_band(state, band, 0, scatter, 0 if scatter is None else len(state.frfs))
     heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
     return list(zip(modes, heights.tolist(), strict=True))
-
-
-def _decay_covariance(band: FittedBand) -> Floats:
-    """Return the covariance of the values of a band from the scatter of its decays; shape as `BandFit.covariance`."""
-    fit, count = band.fit, len(band.fit.constant)
-    parts = fit.residual.reshape(count, -1)
-    pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
-    outer = np.transpose(pulls) @ np.array(pulls)
-    return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
 
 
 def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
     """Remove the values of a mode that need the force."""
     return replace(
-        mode,
+        change_covariances(mode, _pole_covariance),
         stiffness=np.nan,
-        covariance=_pole_covariance(mode.covariance),
-        jackknife=_pole_covariance(mode.jackknife),
         phase_deg=0.0,
         phase_deg_std=0.0,
         phase_correlation=None,
@@ -364,10 +337,8 @@ def _drop_stiffness(mode: Mode, relative_peak: float) -> Mode:
     )
 
 
-def _pole_covariance(covariance: Floats | None) -> Floats | None:
+def _pole_covariance(covariance: Floats) -> Floats:
     """Return the covariance with NaN for the stiffness."""
-    if covariance is None:
-        return None
     known = np.full((3, 3), np.nan)
     known[:2, :2] = covariance[:2, :2]
     return known

@@ -172,8 +172,7 @@ def find_truncated_peaks(frf: Frf, modes: Sequence[Mode], band: tuple[float, flo
     """
     lines = usable_lines(frf, band)
     f, mobility = lines.frequency, lines.mobility
-    noise = mobility_noise(lines)
-    least = MIN_PEAK_TO_NOISE * noise
+    least = MIN_PEAK_TO_NOISE * mobility_noise(lines)
     edges = [float(f[end]) for end, step in ((0, 1), (-1, -1)) if _falls_like_peak(mobility[::step], least[end])]
     return [e for e in edges if all(abs(m.frequency - e) > m.damping_ratio * m.frequency for m in modes)]
 

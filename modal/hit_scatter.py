@@ -1,17 +1,29 @@
 """Estimate errors of modes from single hits: hammer noise, jackknife, linearity check."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import scipy
 
-from acquisition import Frf, Hit, Remark, remove_sensor_mass
+from acquisition import Frf, Hit, remove_sensor_mass
 from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.arrays import Complexes, Floats
 from modal.bands.extraction import Extraction, FittedBand
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, add_remark
 from modal.quality.trust import Trust, assess_trust
+
+HitsOfFrf = tuple[Sequence[Hit], list[Frf]]
+"""Hits that an FRF was averaged from, and the FRFs without one of them each."""
+
+
+def hit_covariances(
+    state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]
+) -> tuple[Floats | int, Floats | None, int]:
+    """Return the covariances of a band by the noise of the hammer and over the hits, and the number of these hits."""
+    by_hammer = sum(hammer_covariance(state, band, i, hits) for i, (hits, _) in enumerate(pairs))
+    n_hits = min((len(without) for _, without in pairs), default=0)
+    jackknives = [jackknife_covariance(state, band, i, without) for i, (_, without) in enumerate(pairs) if n_hits]
+    return by_hammer, np.sum(jackknives, axis=0) if n_hits else None, n_hits
 
 
 def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> Floats:
@@ -74,6 +86,20 @@ def jackknife_covariance(state: Extraction, band: FittedBand, i: int, without: S
     return np.asarray((n - 1) / n * steps.T @ steps)
 
 
+def decay_covariance(band: FittedBand) -> Floats | None:
+    """Return the covariance of the values of a band from the scatter of its decays; None for fewer than three.
+
+    Shape as `BandFit.covariance`.
+    """
+    fit, count = band.fit, len(band.fit.constant)
+    if count < MIN_HITS_FOR_JACKKNIFE:
+        return None
+    parts = fit.residual.reshape(count, -1)
+    pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
+    outer = np.transpose(pulls) @ np.array(pulls)
+    return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
+
+
 def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:
     """Return the first-order changes of a band if FRF i is replaced by each of `without`.
 
@@ -107,12 +133,9 @@ def add_linearity_remarks(
     if len(hits) < MIN_HITS_FOR_LINEARITY or np.max(peaks) < MIN_LINEARITY_FORCE_RATIO * np.min(peaks):
         return [*modes]
     alone = band_changes(state, band, 0, without, state.frf.receptance[band.lines])[:, : len(modes)]
-    return [_add_linearity_remark(mode, peaks, _change_per_hit(alone[:, i], peaks**2)) for i, mode in enumerate(modes)]
-
-
-def _change_per_hit(change: Floats, power: Floats) -> Floats:
-    """Return the frequency changes (Hz) of single hits against all, from those without each."""
-    return np.asarray(-change * (np.sum(power) - power) / power)
+    power = (peaks**2)[:, np.newaxis]
+    changes = -alone * (np.sum(power) - power) / power
+    return [_add_linearity_remark(mode, peaks, change) for mode, change in zip(modes, changes.T, strict=True)]
 
 
 def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
@@ -125,8 +148,7 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     forces = f"from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
     shift = f"{per * slope:+.2g} ± {per * error:.1g} % for 100 N more, {forces}"
     text = f"{words} with the force of the hit: f_n changes by {shift}"
-    cure = "look at joints and clamping; hit equally hard"
-    return replace(mode, remarks=(*mode.remarks, Remark("force-dependent", f"{mode.frequency:.0f} Hz", text, cure)))
+    return add_remark(mode, "force-dependent", text, "look at joints and clamping; hit equally hard")
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:

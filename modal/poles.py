@@ -129,40 +129,24 @@ class _LscfModel:
     receptance: Complexes
     weight: Floats
 
-    @property
-    def x(self) -> Floats:
-        """Frequency scaled to -1 .. 1."""
-        return (self.frequency - self.middle) / self.half
-
-    @property
-    def middle(self) -> float:
-        return float(self.frequency[0] + self.frequency[-1]) / 2
-
-    @property
-    def half(self) -> float:
-        return float(self.frequency[-1] - self.frequency[0]) / 2
-
 
 def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
     """Yield the poles inside the band (complex frequencies, Hz) and their flexibilities (k, p), order by order."""
     p, n = model.receptance.shape
     if orders < 1:
         return
-    below = orthogonal_basis(np.tile(model.x, p), (model.weight * model.receptance).ravel(), orders)
-    above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
+    lowest, highest = float(model.frequency[0]), float(model.frequency[-1])
+    middle, half = (lowest + highest) / 2, (highest - lowest) / 2
+    x = (model.frequency - middle) / half
+    below = orthogonal_basis(np.tile(x, p), (model.weight * model.receptance).ravel(), orders)
+    above = [orthogonal_basis(x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
     overlap = [b.values.conj().T @ part for b, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)]
     for order in range(1, orders + 1):
         parts = (full[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for full in overlap)
         left = np.eye(order + 1) - sum(part.conj().T @ part for part in parts)
-        poles = below.roots(np.linalg.eigh(left)[1][:, 0]) * model.half + model.middle
-        poles = poles[_is_inside_band(model, poles)]
+        poles = below.roots(np.linalg.eigh(left)[1][:, 0]) * half + middle
+        poles = poles[(poles.imag > 0) & (np.abs(poles) > lowest) & (np.abs(poles) < highest)]
         yield poles, _flexibilities(model, above, poles)
-
-
-def _is_inside_band(model: _LscfModel, poles: Complexes) -> Flags:
-    """Return which poles decay and are in the band."""
-    size = np.abs(poles)
-    return np.asarray((poles.imag > 0) & (size > model.frequency[0]) & (size < model.frequency[-1]))
 
 
 def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Complexes) -> Complexes:
@@ -191,20 +175,15 @@ def _match_lower_order(below: _OrderPoles, here: _OrderPoles) -> Integers:
 
 
 def _build_chart(orders: list[_OrderPoles], p: int) -> StabilisationChart:
+    orders = [(np.empty(0, complex), np.empty((0, p), complex)), *orders]  # order 0 has no poles
     sizes = np.array([poles.size for poles, _ in orders], dtype=np.int64)
-    starts = np.cumsum(sizes) - sizes
-    previous = [np.full(size, -1) for size in sizes[:1]]
-    for (below, here), start in zip(pairwise(orders), starts, strict=False):
+    previous = [np.empty(0, np.int64)]
+    for (below, here), start in zip(pairwise(orders), np.cumsum(sizes) - sizes, strict=False):
         same = _match_lower_order(below, here)
         previous.append(np.where(same < 0, -1, same + start))
-    poles = np.concatenate([poles for poles, _ in orders] or [np.empty(0, complex)])
-    return StabilisationChart(
-        np.repeat(np.arange(1, sizes.size + 1), sizes),
-        np.abs(poles),
-        poles.imag / np.abs(poles),
-        np.concatenate([a for _, a in orders] or [np.empty((0, p), complex)]),
-        np.concatenate([*previous, np.empty(0, np.int64)]),
-    )
+    poles, flexibility = (np.concatenate(parts) for parts in zip(*orders, strict=True))
+    order, size = np.repeat(np.arange(sizes.size), sizes), np.abs(poles)
+    return StabilisationChart(order, size, poles.imag / size, flexibility, np.concatenate(previous))
 
 
 MIN_STABLE_ORDERS = 4
@@ -256,14 +235,12 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     >>> poles.frequency.round(1).tolist(), poles.damping_ratio.round(3).tolist()  # Hz, -
     ([500.0], [0.02])
     """
-    taken = np.zeros(chart.order.size, bool)
-    rows = []
-    lengths = _chain_lengths(chart)
-    for end in np.argsort(-lengths, kind="stable"):
-        if lengths[end] < MIN_STABLE_ORDERS:
-            break
-        chain = _trace_chain(chart, int(end))
-        if not taken[chain].any():
+    taken, rows = np.zeros(chart.order.size, bool), []
+    chains: list[list[int]] = []  # the last pole of each comes first
+    for i, previous in enumerate(chart.previous.tolist()):
+        chains.append([i, *(chains[previous] if previous >= 0 else ())])
+    for chain in sorted(chains, key=len, reverse=True):
+        if len(chain) > MIN_STABLE_ORDERS and not taken[chain].any():
             rows.append(_median_flexibility(chart, chain))
         taken[chain] = True
     rows.sort(key=lambda row: float(row[0].real))
@@ -271,24 +248,8 @@ def select_physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     return PhysicalPoles(table[:, 0].real, table[:, 1].real, table[:, 3:], table[:, 2].real.astype(np.int64))
 
 
-def _chain_lengths(chart: StabilisationChart) -> Integers:
-    """Return the number of stable poles in the chain that ends at each pole."""
-    lengths = np.zeros(chart.order.size, dtype=np.int64)
-    for i in np.flatnonzero(chart.stable):
-        lengths[i] = lengths[chart.previous[i]] + 1
-    return lengths
-
-
-def _trace_chain(chart: StabilisationChart, end: int) -> Integers:
-    """Return the indices of the poles of the chain that ends here, the last one first."""
-    chain = [end]
-    while chart.previous[chain[-1]] >= 0:
-        chain.append(int(chart.previous[chain[-1]]))
-    return np.array(chain)
-
-
-def _median_flexibility(chart: StabilisationChart, chain: Integers) -> Complexes:
-    upper = chain[: (chain.size + 1) // 2]
+def _median_flexibility(chart: StabilisationChart, chain: list[int]) -> Complexes:
+    upper = chain[: (len(chain) + 1) // 2]
     a = chart.flexibility[upper]
-    poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), chain.size - 1]
+    poles = [np.median(chart.frequency[upper]), np.median(chart.damping_ratio[upper]), len(chain) - 1]
     return np.concatenate([poles, np.median(a.real, axis=0) + 1j * np.median(a.imag, axis=0)])

@@ -1,15 +1,14 @@
 """Find all depths where stability changes, with converged pieces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
-from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, count_pieces
 from lobes.floquet.multipliers import growth_rate, largest_multipliers
+from lobes.stability_lobes import pad_columns
+from modal.arrays import Complexes, Flags, Floats, Indices, Integers
 
 SCAN_DEPTHS = 24
 """Depths that are evaluated before anything is refined."""
@@ -38,10 +37,9 @@ def find_crossings(growth: GrowthFunction, n_rows: int, deepest: float) -> Float
     could reach zero and come back: so short excursions and islands inside a step are found. Growth
     is negative at depth 0. k is at least 1.
     """
-    rows = np.arange(n_rows)
     depths = deepest * (np.arange(1, SCAN_DEPTHS + 1) / SCAN_DEPTHS) ** SCAN_EXPONENT
     depth = np.broadcast_to(depths, (n_rows, SCAN_DEPTHS))
-    value = growth(rows, depth, GROWTH_SIGN_ACCURACY)
+    value = growth(np.arange(n_rows), depth, GROWTH_SIGN_ACCURACY)
     brackets = _bracket_crossings(growth, _scan_steps(depth, value))
     return _pad_rows(brackets.row, _refine_crossings(growth, brackets), n_rows)
 
@@ -55,8 +53,7 @@ def _pad_rows(row: Indices, crossing: Floats, n_rows: int) -> Floats:
     return table
 
 
-@dataclass(frozen=True, eq=False)
-class _DepthSteps:
+class _DepthSteps(NamedTuple):
     """Steps between two depths, arrays of one shape (n,)."""
 
     row: Indices
@@ -69,8 +66,8 @@ class _DepthSteps:
     after: Floats
     """Steepness of growth in the step after."""
 
-    def __getitem__(self, which: Flags) -> _DepthSteps:
-        return _DepthSteps(*(getattr(self, field.name)[which] for field in fields(self)))
+    def where(self, which: Flags) -> "_DepthSteps":
+        return _DepthSteps._make(column[which] for column in self)
 
     @property
     def crosses(self) -> Flags:
@@ -82,7 +79,7 @@ class _DepthSteps:
         reach = np.maximum(self.before, self.after) * (self.high - self.low)
         return np.asarray(reach > HIDDEN_CROSSING_SHARE * (np.abs(self.at_low) + np.abs(self.at_high)))
 
-    def halves(self, middle: Floats) -> _DepthSteps:
+    def halves(self, middle: Floats) -> "_DepthSteps":
         """Return both halves, given growth at the middles."""
         half = (self.low + self.high) / 2
         left, right = (np.abs(middle - end) / (half - self.low) for end in (self.at_low, self.at_high))
@@ -93,7 +90,7 @@ class _DepthSteps:
 
 
 def _join_steps(*parts: _DepthSteps) -> _DepthSteps:
-    return _DepthSteps(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(_DepthSteps)))
+    return _DepthSteps(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _scan_steps(depth: Floats, value: Floats) -> _DepthSteps:
@@ -111,13 +108,13 @@ def _bracket_crossings(growth: GrowthFunction, steps: _DepthSteps) -> _DepthStep
     done = []
     for _ in range(MAX_STEP_HALVINGS):
         may_hide = steps.may_hide
-        done.append(steps[~may_hide & steps.crosses])
-        steps = steps[may_hide]
+        done.append(steps.where(~may_hide & steps.crosses))
+        steps = steps.where(may_hide)
         if not steps.row.size:
             break
         middle = (steps.low + steps.high)[:, np.newaxis] / 2
         steps = steps.halves(growth(steps.row, middle, GROWTH_SIGN_ACCURACY)[:, 0])
-    return _join_steps(*done, steps[steps.crosses])
+    return _join_steps(*done, steps.where(steps.crosses))
 
 
 def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps) -> Floats:
@@ -168,8 +165,7 @@ def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, In
             return crossings, number
         number[moved] *= 2
         again = find_crossings(_growth_function(rows[moved], number[moved]), moved.size, max_depth)
-        width = max(crossings.shape[1], again.shape[1])
-        crossings, again = (_pad_columns(table, width) for table in (crossings, again))
+        crossings, again = pad_columns([crossings, again])
         crossings[moved] = again
     limit_holds, _ = _has_converged(rows, crossings[:, 0], number)
     if np.all(limit_holds):
@@ -189,10 +185,6 @@ def _has_converged(rows: MillingRows, depth: Floats, number: Integers) -> tuple[
         limit[limited] = (np.abs(fine[:, 0]) < 1) & (np.abs(fine[:, 1]) > 1)
         kind[limited] = is_flip(fine[:, 1]) == is_flip(coarse[:, 0])
     return limit, kind
-
-
-def _pad_columns(table: Floats, width: int) -> Floats:
-    return np.pad(table, ((0, 0), (0, width - table.shape[1])), constant_values=np.inf)
 
 
 def is_flip(multiplier: Complexes) -> Flags:

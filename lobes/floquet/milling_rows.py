@@ -1,15 +1,13 @@
 """Many milling systems of one kind, and the pieces their tooth period is divided into."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from lobes.arrays import Flags, Floats, Integers
 from lobes.cut import Cut
 from lobes.milling_system import MillingSystem, tip_participation
+from modal.arrays import Flags, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +43,11 @@ class MillingRows:
         """Return the number of rows."""
         return self.speed_rpm.size
 
-    def __getitem__(self, which: Any) -> MillingRows:
+    def __getitem__(self, which: Any) -> Self:
         """Select rows by an index array or a mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in _VARYING_FIELDS})
 
-    def with_feed_angle(self, angle: float) -> MillingRows:
+    def with_feed_angle(self, angle: float) -> Self:
         """Return all rows with one feed angle.
 
         Parameters
@@ -59,7 +57,7 @@ class MillingRows:
         """
         return replace(self, feed_angle=np.full(len(self), angle))
 
-    def with_cut(self, cut: Cut) -> MillingRows:
+    def with_cut(self, cut: Cut) -> Self:
         """Return all rows with the teeth, immersion and feed of a cut; their coefficients stay.
 
         Parameters
@@ -83,11 +81,6 @@ class MillingRows:
     def period(self) -> Floats:
         """Time after which the cut repeats (s), shape (r,): the tooth period of evenly spaced teeth."""
         return self.tooth_period * len(self.cut.pitch_pattern)
-
-    @property
-    def force(self) -> Floats:
-        """Largest possible entry of the force matrix of a tooth, Ks (Pa), shape (r,)."""
-        return np.asarray(np.hypot(self.tangential, self.radial))
 
 
 _VARYING_FIELDS = [field.name for field in fields(MillingRows) if field.name not in ("cut", "direction", "axes")]
@@ -140,15 +133,11 @@ def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> Millin
         cut=cut,
         direction=system.direction,
         axes=system.axes,
-        frequency=ones * system.frequency,
-        damping_ratio=ones * system.damping_ratio,
+        **{name: ones * getattr(system, name) for name in ("frequency", "damping_ratio", "phase")},
         stiffness=ones * (system.frequency / system.shape) ** 2,
-        phase=ones * system.phase,
         vector=np.tile(system.vector, (speed_rpm.size, 1, 1)),
         speed_rpm=speed_rpm,
-        tangential=np.full(speed_rpm.shape, cut.tangential),
-        radial=np.full(speed_rpm.shape, cut.radial),
-        feed_angle=np.full(speed_rpm.shape, cut.feed_angle),
+        **{name: np.full(speed_rpm.shape, getattr(cut, name)) for name in ("tangential", "radial", "feed_angle")},
     )
 
 
@@ -209,7 +198,8 @@ def count_pieces(rows: MillingRows, deepest: float, most: float = MAX_CYCLES_PER
         Numbers of pieces.
     """
     dynamic_stiffness = 2 * rows.stiffness * rows.damping_ratio
-    loop = deepest * rows.force[:, np.newaxis] / dynamic_stiffness * np.hypot(*rows.tip_participation)
+    force = np.hypot(rows.tangential, rows.radial)[:, np.newaxis]  # largest possible entry of the matrix of a tooth
+    loop = deepest * force / dynamic_stiffness * np.hypot(*rows.tip_participation)
     loop = loop * np.sum(rows.vector**2, axis=-1)
     significant = np.where(loop > MIN_LOOP_GAIN, rows.frequency, 0.0)
     fastest = np.maximum(np.max(significant, axis=1), np.min(rows.frequency, axis=1))

@@ -1,18 +1,15 @@
 """Largest Floquet multiplier of milling, its magnitude, and the growth rate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from lobes.arrays import Complexes, Flags, Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, divide_segments, is_out_of_cut, segment_ends
-from lobes.floquet.period_map import PeriodMap, UnevenMap, build_period_map
-from lobes.floquet.piece_response import gauss_nodes
+from lobes.floquet.period_map import AnyMap, build_period_map
+from lobes.floquet.piece_response import Precision, gauss_nodes
+from modal.arrays import Complexes, Flags, Floats, Indices, Integers
 
 ARNOLDI_ATTEMPTS = ((10, 8), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt for cases that have not converged.
@@ -72,11 +69,7 @@ def largest_multipliers(
 
 
 def spectral_radii(
-    rows: MillingRows,
-    depth: Floats,
-    numbers: Integers,
-    tolerance: float = MULTIPLIER_TOLERANCE,
-    kind: type[np.floating[Any]] = np.float64,
+    rows: MillingRows, depth: Floats, numbers: Integers, tol: float = MULTIPLIER_TOLERANCE, kind: Precision = np.float64
 ) -> Floats:
     """Return the magnitude of the largest multipliers, faster: eigenvalues only if powers do not converge.
 
@@ -84,16 +77,16 @@ def spectral_radii(
     """
 
     def radius(matrices: Floats) -> tuple[Complexes, Floats]:
-        value, doubt = _ritz_radius(matrices, math.ceil(-math.log2(tolerance)) + EXTRA_SQUARINGS)
-        left = doubt > tolerance
+        value, doubt = _ritz_radius(matrices, math.ceil(-math.log2(tol)) + EXTRA_SQUARINGS)
+        left = doubt > tol
         value[left], doubt[left] = _ritz_value(matrices[left])
         return value, doubt
 
-    return np.abs(_largest_in_batches(rows, depth, numbers, tolerance, kind, radius))
+    return np.abs(_largest_in_batches(rows, depth, numbers, tol, kind, radius))
 
 
 def _largest_in_batches(
-    rows: MillingRows, depth: Floats, numbers: Integers, tol: float, kind: type[np.floating[Any]], ritz: RitzFunction
+    rows: MillingRows, depth: Floats, numbers: Integers, tol: float, kind: Precision, ritz: RitzFunction
 ) -> Complexes:
     """Compute values of the largest multipliers (r, d) in batches."""
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
@@ -123,7 +116,7 @@ def _equal_division_groups(rows: MillingRows, depth: Floats, numbers: Integers) 
 
 
 def _arnoldi_multipliers(
-    rows: MillingRows, depth: Floats, over_period: PeriodMap | UnevenMap, tolerance: float, ritz: RitzFunction
+    rows: MillingRows, depth: Floats, over_period: AnyMap, tolerance: float, ritz: RitzFunction
 ) -> Complexes:
     """Return the multipliers (r, d) of rows with equal divisions."""
     space = _KrylovSpace.of(over_period, depth.shape, ARNOLDI_ATTEMPTS[0][0]).grown(ARNOLDI_ATTEMPTS[0][1])
@@ -151,7 +144,7 @@ def _arnoldi_multipliers(
 class _KrylovSpace:
     """Krylov spaces of cases (r, d) by Arnoldi."""
 
-    over_period: PeriodMap | UnevenMap
+    over_period: AnyMap
     """Period map of each case."""
     basis: Floats
     """Orthonormal vectors, shape (r, d, k + 1, states)."""
@@ -159,9 +152,10 @@ class _KrylovSpace:
     """Hessenberg matrices, shape (r, d, k + 1, k); zeros from where a space is exhausted."""
 
     @classmethod
-    def of(cls, over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], steps: int) -> _KrylovSpace:
+    def of(cls, over_period: AnyMap, shape: tuple[int, ...], steps: int) -> "_KrylovSpace":
         """Return the first vectors (k = 0): a random one after some power steps."""
-        start = np.random.default_rng(0).normal(size=over_period.states).astype(over_period.kind)
+        zero = over_period.zero_state
+        start = np.random.default_rng(0).normal(size=zero.size).astype(zero.dtype)
         state = np.broadcast_to(start / np.linalg.norm(start), (*shape, start.size))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             for _ in range(steps):
@@ -169,12 +163,12 @@ class _KrylovSpace:
                 state = state / np.linalg.norm(state, axis=-1, keepdims=True)
         return cls(over_period, state[..., np.newaxis, :], np.zeros((*shape, 1, 0), start.dtype))
 
-    def __getitem__(self, which: tuple[Indices, ...]) -> _KrylovSpace:
+    def __getitem__(self, which: tuple[Indices, ...]) -> "_KrylovSpace":
         """Select c of the cases, as (c, 1)."""
         basis, matrix = self.basis[which], self.matrix[which]
         return _KrylovSpace(self.over_period[which[0], which[1]], basis[:, np.newaxis], matrix[:, np.newaxis])
 
-    def grown(self, vectors: int) -> _KrylovSpace:
+    def grown(self, vectors: int) -> "_KrylovSpace":
         """Return the spaces with so many vectors, at most the number of states."""
         more = min(vectors, self.basis.shape[-1]) - self.matrix.shape[-1]
         beside = ((0, 0),) * (self.matrix.ndim - 2)

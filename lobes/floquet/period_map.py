@@ -22,19 +22,16 @@ Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer
 7 instead of 1 for the delayed term; Hairer & Wanner, Solving Ordinary Differential Equations II, ch. IV.5.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from lobes.arrays import Floats, Indices, Integers
 from lobes.floquet.milling_rows import MillingRows, is_out_of_cut, segment_ends
-from lobes.floquet.piece_response import PieceResponse, free_response, gauss_nodes, interpolation_weights
+from lobes.floquet.piece_response import PieceResponse, Precision, free_response, gauss_nodes, interpolation_weights
 from lobes.tooth_force import feed_rotation, force_shares
+from modal.arrays import Floats, Indices, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ class RegeneratedSurface:
             left = (met.reshape(-1, pieces * nodes) @ self.weights[0, 0]).reshape(*cases, -1)
         return np.asarray((self.force * left[:, :, np.newaxis]).sum(axis=3))
 
-    def __getitem__(self, which: tuple[Indices, Indices]) -> RegeneratedSurface:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> "RegeneratedSurface":
         """Select c of the cases as rows of one depth each."""
         weights = self.weights[which[0]] if len(self.weights) > 1 else self.weights
         return RegeneratedSurface(self.first, self.last, weights, self.force[which][:, np.newaxis])
@@ -74,7 +71,7 @@ class UnevenPiece:
     """Map from z and surface forces to z and displacements, shape (r, d, m, m); of z alone without a cut."""
     surfaces: tuple[RegeneratedSurface, ...] = ()
 
-    def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenPiece:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> "UnevenPiece":
         """Select c of the cases as rows of one depth each."""
         row, column = which
         matrix = self.matrix[row, column if self.matrix.shape[1] > 1 else 0][:, np.newaxis]
@@ -92,21 +89,17 @@ class UnevenMap:
     """Number of directions p."""
 
     @property
-    def kind(self) -> np.dtype[Any]:
-        """Precision of the numbers."""
-        return self.pieces[0].matrix.dtype
-
-    @property
     def cutting(self) -> int:
         """Number of pieces in which teeth cut."""
         return sum(bool(piece.surfaces) for piece in self.pieces)
 
     @property
-    def states(self) -> int:
-        """Number of values of a state."""
-        return 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
+    def zero_state(self) -> Floats:
+        """State of zeros, shape (states,), in the precision of the matrices."""
+        size = 2 * self.modes + self.directions * self.cutting * gauss_nodes().node.size
+        return np.zeros(size, self.pieces[0].matrix.dtype)
 
-    def __getitem__(self, which: tuple[Indices, Indices]) -> UnevenMap:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> "UnevenMap":
         """Select c of the cases as rows of one depth each."""
         return UnevenMap(tuple(piece[which] for piece in self.pieces), self.modes, self.directions)
 
@@ -174,16 +167,11 @@ class PeriodMap:
     """Displacements in each piece with a cut, nodes times p."""
 
     @property
-    def kind(self) -> np.dtype[Any]:
-        """Precision of the numbers."""
-        return self.pieces[0][1].dtype
+    def zero_state(self) -> Floats:
+        """State of zeros, shape (states,), in the precision of the matrices."""
+        return np.zeros(2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces), self.pieces[0][1].dtype)
 
-    @property
-    def states(self) -> int:
-        """Number of values of a state."""
-        return 2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces)
-
-    def __getitem__(self, which: tuple[Indices, Indices]) -> PeriodMap:
+    def __getitem__(self, which: tuple[Indices, Indices]) -> "PeriodMap":
         """Select c of the cases as rows of one depth each."""
         row, column = which
         pieces = ((cuts, matrix[row, column if cuts else 0][:, np.newaxis]) for cuts, matrix in self.pieces)
@@ -203,19 +191,19 @@ class PeriodMap:
         return np.concatenate((z, *parts), axis=-1)
 
 
-def build_period_map(
-    rows: MillingRows, depth: Floats, numbers: Integers, kind: type[np.floating[Any]] = np.float64
-) -> PeriodMap | UnevenMap:
+AnyMap = PeriodMap | UnevenMap
+"""Map of a state over a period of evenly or unevenly spaced teeth."""
+
+
+def build_period_map(rows: MillingRows, depth: Floats, numbers: Integers, kind: Precision) -> AnyMap:
     """Build the map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, equal in all rows.
 
     For helical teeth, whose segments depend on the depth, d is 1. kind: precision; uneven teeth use double.
     """
     ends = segment_ends(rows.cut, depth[:, 0])
-    free = is_out_of_cut(rows.cut, ends, depth[:, 0])
-    segments = [
-        _Segment.of(rows, depth, ends[:, k : k + 2], int(numbers[k]), bool(np.all(free[:, k])))
-        for k in np.flatnonzero(numbers)
-    ]
+    free = np.all(is_out_of_cut(rows.cut, ends, depth[:, 0]), axis=0)
+    used = [(ends[:, k : k + 2], int(numbers[k]), bool(free[k])) for k in np.flatnonzero(numbers)]
+    segments = [_Segment.of(rows, depth, *segment) for segment in used]
     return _uneven_map(rows, segments) if rows.cut.pitch else _even_map(rows, segments, kind)
 
 
@@ -233,7 +221,7 @@ class _Segment:
     """Depth times force matrix at the nodes (N/m), shape (delays, p, p, s, k, r, d); None without a cut."""
 
     @classmethod
-    def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> _Segment:
+    def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> "_Segment":
         angle = (ends[:, 1] - ends[:, 0]) / number
         starts = ends[:, :1] + angle[:, np.newaxis] * np.arange(number)
         time = angle / sum(rows.cut.pitch_pattern) * rows.period
@@ -244,7 +232,7 @@ class _Segment:
         return free_response(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
 
 
-def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: type[np.floating[Any]]) -> PeriodMap:
+def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: Precision) -> PeriodMap:
     pieces = list[tuple[bool, Floats]]()
     for segment in segments:
         if segment.forces is None:

@@ -1,21 +1,23 @@
 """Response of the modes over one piece of time, with and without a cut."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
 
-from lobes.arrays import Complexes, Floats
 from lobes.floquet.milling_rows import MillingRows
+from modal.arrays import Complexes, Floats
 
 NODES_PER_PIECE = 8
 """Nodes of one piece: a polynomial of degree 7 for the displacement, of order 16 at the end of the piece."""
+
+
+Precision = type[np.floating[Any]]
+"""Type of the numbers of a map: float32 or float64."""
 
 
 class GaussNodes(NamedTuple):
@@ -110,7 +112,7 @@ class PieceResponse:
     """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
 
     @classmethod
-    def of(cls, rows: MillingRows, time: Floats) -> PieceResponse:
+    def of(cls, rows: MillingRows, time: Floats) -> Self:
         """Compute the response over pieces of a length (r,) in s.
 
         With x = D at the roots of A (`lobes.floquet.period_map`, `GaussNodes.root`) and t = theta root, all of it is
@@ -143,12 +145,13 @@ class PieceResponse:
         flexible = forced / rows.stiffness[..., np.newaxis]
         flexible = np.einsum("rnk,rnp,rnq->rpqk", flexible, rows.vector, rows.vector)
         per_force = np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1)
-        return cls(end_state, _tip_displacements(rows, place), _weighted_sums(flexible, nodes.share), per_force)
+        shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
+        at_nodes = shown.reshape(*shown.shape[:3], -1)
+        return cls(end_state, at_nodes, _weighted_sums(flexible, nodes.share), per_force)
 
-    def as_precision(self, kind: type[np.floating[Any]]) -> PieceResponse:
+    def as_precision(self, kind: Precision) -> Self:
         """Return the response with numbers of another precision."""
-        parts = (self.end_state, self.node_displacement, self.node_flexibility, self.end_state_per_force)
-        return PieceResponse(*(values.astype(kind) for values in parts))
+        return replace(self, **{name: values.astype(kind) for name, values in vars(self).items()})
 
     def cutting(self, force: Floats) -> Floats:
         """Return the maps (k, r, d, m, m) of k pieces with forces -force (d - w) at their nodes.
@@ -167,7 +170,8 @@ class PieceResponse:
         """
         inverse, push = self._closed(force)
         states, size = push.shape[-2:]
-        maps = self._maps(inverse, push, inverse @ self._given()[:, np.newaxis])
+        given = np.moveaxis(self.node_flexibility, 2, 3).reshape(-1, 1, size, size)
+        maps = self._maps(inverse, push, inverse @ given)
         maps[..., :states, states:] += self.end_state_per_force.reshape(-1, 1, states, size)
         return maps
 
@@ -200,11 +204,6 @@ class PieceResponse:
         push = push.reshape(states, size, *forces.shape[3:])
         return _cases_first(invert_matrices(loop), cases), _cases_first(push, cases)
 
-    def _given(self) -> Floats:
-        """Return the displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
-        r, p, _, s, _ = self.node_flexibility.shape
-        return np.moveaxis(self.node_flexibility, 2, 3).reshape(r, p * s, p * s)
-
 
 def _cases_first(matrices: Floats, cases: Sequence[int]) -> Floats:
     """Reorder matrices (m, n, ...) of some cases to (cases, m, n)."""
@@ -218,9 +217,3 @@ def _weighted_sums(values: Complexes, shares: Complexes) -> Floats:
     weights = 2 * np.concatenate((shares.real, -shares.imag))
     flat = parts.reshape(-1, parts.shape[-1]) @ weights.reshape(len(weights), -1)
     return np.asarray(flat.reshape(*values.shape[:-1], *shares.shape[1:]))
-
-
-def _tip_displacements(rows: MillingRows, place: Floats) -> Floats:
-    """Return displacements from z: places (r, n, s, 2) of the modes along their vectors, shape (r, p, s, 2n)."""
-    shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
-    return np.asarray(shown.reshape(*shown.shape[:3], -1))

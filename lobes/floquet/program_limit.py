@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lobes.arrays import Flags, Integers
-from lobes.cut import CHECKED_DEPTH_SHARES, Cut, DirectionModes, Program
+from lobes.cut import CHECKED_DEPTH_SHARES, Cut, Program
 from lobes.floquet.crossings import converged_crossings
 from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
 from lobes.floquet.multipliers import growth_rate
 from lobes.floquet.stability_boundary import chatter_at_limits
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
+from lobes.tip_response import TipModes
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
 """Largest searched limit over the depth of the program."""
@@ -42,18 +42,9 @@ class ProgramLimit:
     limits: tuple[float, ...]
     """Limits of all cuts (m)."""
 
-    @property
-    def feed_angle(self) -> float:
-        """Angle from x to the worst feed direction (rad)."""
-        return self.cut.feed_angle
-
 
 def program_limit(
-    program: Program,
-    x: DirectionModes,
-    y: DirectionModes,
-    cuts: Sequence[Cut] | None = None,
-    vectors: ArrayLike | None = None,
+    program: Program, x: TipModes, y: TipModes, cuts: Sequence[Cut] | None = None, vectors: ArrayLike | None = None
 ) -> ProgramLimit:
     """Compute stability and limit of a program by semi-discretization, for the worst of its cuts.
 
@@ -87,20 +78,17 @@ def program_limit(
     'True, up to 1.25 mm, then hopf at 498 Hz'
     """
     cuts, system = cuts or (program.cut,), build_milling_system(x, y, vectors)
-    limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)
-    crossing = np.empty(len(cuts))
+    (limit, crossing), number = np.empty((2, len(cuts))), np.empty(len(cuts), dtype=np.int64)
     for places in group_by_engagement(cuts):
         rows = _program_rows(system, program, [cuts[place] for place in places])
         crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth)
         crossing[places] = crossings[:, 0]
-        unstable = _is_unstable(rows, program, number[places])
+        depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
+        unstable = np.any(growth_rate(rows, depths, number[places]) >= 0, axis=1)
         limit[places] = np.where(unstable, np.minimum(crossing[places], program.depth), crossing[places])
     worst = int(np.argmin(limit))
-    chatter, kind = np.array([np.nan]), np.array([""])
-    if np.isfinite(crossing[worst]):
-        here = slice(worst, worst + 1)
-        row = _program_rows(system, program, [cuts[worst]])
-        chatter, kind = chatter_at_limits(system, row, crossing[here], number[here])
+    row, here = _program_rows(system, program, [cuts[worst]]), slice(worst, worst + 1)
+    chatter, kind = chatter_at_limits(system, row, crossing[here], number[here])
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),
@@ -126,9 +114,3 @@ def _program_rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) 
     """Return a system at the speed of the program, with cuts that differ in their feed angle only."""
     rows = rows_at_speeds(system, cuts[0], np.full(len(cuts), program.speed_rpm))
     return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
-
-
-def _is_unstable(rows: MillingRows, program: Program, number: Integers) -> Flags:
-    """Return whether the program is unstable at its depth or a share of it, shape (r,)."""
-    depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
-    return np.asarray(np.any(growth_rate(rows, depths, number) >= 0, axis=1))

@@ -1,19 +1,18 @@
 """Stability boundary over speed by semi-discretisation, and its chatter frequencies."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.arrays import Complexes, Floats, Integers
+from lobes.coefficients import check_number
 from lobes.cut import Cut
 from lobes.floquet.crossings import converged_crossings, is_flip
 from lobes.floquet.milling_rows import MillingRows, count_pieces, rows_at_speeds
 from lobes.floquet.multipliers import largest_multipliers, spectral_radii
 from lobes.milling_system import MillingSystem, build_milling_system
-from lobes.stability_lobes import StabilityLobes, check_speeds
+from lobes.stability_lobes import StabilityLobes, check_speeds, check_vector
+from lobes.tip_response import TipModes
 from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
-from modal import Mode
+from modal.arrays import Complexes, Floats, Integers
 
 MAX_CHATTER_FREQUENCY_RATIO = 2.0
 """Highest searched frequency over the highest natural frequency, to which three tooth frequencies are added."""
@@ -71,24 +70,8 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
     return np.asarray(harmonics[:, order[:, np.newaxis] - order])
 
 
-def check_depths(depth: ArrayLike) -> Floats:
-    """Return axial depths (m) as a 1-D array; ValueError unless there is one and all are finite and >= 0."""
-    depths = np.atleast_1d(np.asarray(depth, dtype=np.float64))
-    if depths.ndim != 1 or depths.size == 0:
-        raise ValueError(f"depth has shape {depths.shape}; a 1-D array of at least one depth (m) is needed")
-    bad = np.flatnonzero(~(np.isfinite(depths) & (depths >= 0)))
-    if bad.size:
-        raise ValueError(f"depth[{bad[0]}]={depths[bad[0]]} is not a finite depth >= 0 m; 1 mm is 1e-3")
-    return depths
-
-
 def spectral_radius(
-    x: Sequence[Mode] | None,
-    y: Sequence[Mode] | None,
-    cut: Cut,
-    speed_rpm: ArrayLike,
-    depth: ArrayLike,
-    vectors: ArrayLike | None = None,
+    x: TipModes, y: TipModes, cut: Cut, speed_rpm: ArrayLike, depth: ArrayLike, vectors: ArrayLike | None = None
 ) -> Floats:
     """Return the largest magnitude of the Floquet multipliers over a tooth period; < 1 is stable.
 
@@ -134,19 +117,16 @@ def spectral_radius(
     >>> round(float(np.exp(-0.02 * 2 * np.pi * 500.0 * 60 / (2 * 12000.0))), 3)
     0.855
     """
-    system, speed, deep = build_milling_system(x, y, vectors), check_speeds(speed_rpm), check_depths(depth)
+    system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
+    text = "is not a finite depth >= 0 m; 1 mm is 1e-3"
+    deep = check_vector("depth", depth, "depth (m)", text, may_be_zero=True)
     rows = rows_at_speeds(system, cut, speed)
     grid = np.broadcast_to(deep, (speed.size, deep.size))
     return spectral_radii(rows, grid, count_pieces(rows, float(np.max(deep))))
 
 
 def stability_boundary(
-    x: Sequence[Mode] | None,
-    y: Sequence[Mode] | None,
-    cut: Cut,
-    speed_rpm: ArrayLike,
-    max_depth: float,
-    vectors: ArrayLike | None = None,
+    x: TipModes, y: TipModes, cut: Cut, speed_rpm: ArrayLike, max_depth: float, vectors: ArrayLike | None = None
 ) -> StabilityLobes:
     """Compute the stability boundary over speed by semi-discretization.
 
@@ -196,31 +176,25 @@ def stability_boundary(
     ['1.11 mm, hopf', '1.53 mm, hopf', '2.12 mm, hopf', '0.96 mm, flip', '5.30 mm, flip']
     """
     system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
-    if not (np.isfinite(max_depth) and max_depth > 0):
-        raise ValueError(f"max_depth={max_depth} m is not a finite depth > 0; give the deepest cut of interest")
+    check_number("max_depth", max_depth, "m is not a finite depth > 0; give the deepest cut of interest")
     rows = rows_at_speeds(system, cut, speed)
     crossings, number = converged_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
-    chatter, kind = np.full(speed.shape, np.nan), np.full(speed.shape, "", dtype="<U4")
-    limited = np.flatnonzero(np.isfinite(depth))
-    if limited.size:
-        chatter[limited], kind[limited] = chatter_at_limits(system, rows[limited], depth[limited], number[limited])
+    chatter, kind = chatter_at_limits(system, rows, depth, number)
     low, high = int(np.min(number)), int(np.max(number))
-    return StabilityLobes(
-        speed_rpm=speed,
-        depth=depth,
-        chatter_frequency=chatter,
-        kind=kind,
-        crossings=crossings,
-        method="semi-discretisation",
-        detail=f"{low if low == high else f'{low} to {high}'} pieces of order 16 a tooth period",
-    )
+    detail = f"{low if low == high else f'{low} to {high}'} pieces of order 16 a tooth period"
+    return StabilityLobes(speed, depth, chatter, kind, crossings, "semi-discretisation", detail=detail)
 
 
 def chatter_at_limits(
     system: MillingSystem, rows: MillingRows, depth: Floats, number: Integers
 ) -> tuple[Floats, NDArray[np.str_]]:
-    """Return chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
-    multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]
-    chatter = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
-    return chatter, np.where(is_flip(multiplier), "flip", "hopf")
+    """Return chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,); nan and "" without a limit."""
+    chatter, kind = np.full(depth.shape, np.nan), np.full(depth.shape, "", dtype="<U4")
+    limited = np.flatnonzero(np.isfinite(depth))
+    if limited.size:
+        rows, depth = rows[limited], depth[limited]
+        multiplier = largest_multipliers(rows, depth[:, np.newaxis], number[limited])[:, 0]
+        chatter[limited] = loudest_chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
+        kind[limited] = np.where(is_flip(multiplier), "flip", "hopf")
+    return chatter, kind

@@ -198,7 +198,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         decisive_cause=cause,
         chatter_frequency=median.chatter_frequency,
         kind=median.kind,
-        feed_angle=median.feed_angle,
+        feed_angle=median.cut.feed_angle,
         method=median.method,
         detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
         drive_limit=float(drive_limit[0]),

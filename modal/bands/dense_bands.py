@@ -8,14 +8,7 @@ import numpy as np
 from modal.arrays import Floats
 from modal.bands.extraction import FittedBand
 from modal.bands.fit_peaks import MIN_MODE_PEAK_SHARE, are_modes
-from modal.bands.residual_analysis import (
-    has_lower_aic,
-    has_rounding_residual,
-    has_white_residual,
-    passes_f_test,
-    residual_noise,
-    systematic_error,
-)
+from modal.bands.residual_analysis import has_rounding_residual, has_white_residual, residual_noise, systematic_error
 from modal.fitting.band_fit import MAX_RESIDUAL_TERMS
 from modal.fitting.fit_band import fit_band, mode_pair_gain, residual_term_gain
 from modal.poles import select_physical_poles
@@ -39,11 +32,10 @@ def refine_dense_band(band: FittedBand) -> FittedBand:
     for starts in _trial_modes(band, split=bent.terms > band.terms):
         height = np.full(starts.shape[1], np.max(band.height))
         fit = fit_band(band.data.frequency, band.data.target, band.data.weight, starts, band.terms)
-        if fit is None or not passes_f_test(fit, band.fit, RESIDUAL_TERM_F_RATIO) or not has_lower_aic(fit, bent.fit):
+        if fit is None or not fit.passes_f_test(band.fit, RESIDUAL_TERM_F_RATIO) or not fit.has_lower_aic(bent.fit):
             continue
-        if passes_f_test(fit, band.fit, HIDDEN_MODE_F_RATIO) and np.all(
-            are_modes(fit, band.data.frequency, height, MAX_HIDDEN_MODE_ERROR)
-        ):
+        is_hidden = fit.passes_f_test(band.fit, HIDDEN_MODE_F_RATIO)
+        if is_hidden and np.all(are_modes(fit, band.data.frequency, height, MAX_HIDDEN_MODE_ERROR)):
             refitted = _add_residual_terms(replace(band, fit=fit, height=height))
             if _is_well_determined(refitted):
                 return refitted
@@ -63,8 +55,7 @@ def _is_well_determined(band: FittedBand) -> bool:
 
 def _trial_modes(band: FittedBand, split: bool) -> Iterator[Floats]:
     """Yield start values (2, m) for more modes, from all high LSCF poles down; then for a split of the highest mode."""
-    fit, poles = band.fit, select_physical_poles(band.data.chart)
-    fitted = fit.poles
+    fit, fitted, poles = band.fit, band.fit.poles, select_physical_poles(band.data.chart)
     size = np.pi * poles.frequency * poles.largest / poles.damping_ratio
     high = size > MIN_MODE_PEAK_SHARE * np.max(band.height)
     starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
@@ -84,11 +75,9 @@ def _add_residual_terms(band: FittedBand) -> FittedBand:
         if residual_term_gain(band.fit, data.frequency, data.weight, terms - 1) < least:
             break
         fit = fit_band(data.frequency, data.target, data.weight, band.fit.poles, terms)
-        if (
-            fit is None
-            or not passes_f_test(fit, band.fit, RESIDUAL_TERM_F_RATIO)
-            or not np.all(are_modes(fit, data.frequency, band.height))
-        ):
+        if fit is None or not fit.passes_f_test(band.fit, RESIDUAL_TERM_F_RATIO):
+            break
+        if not np.all(are_modes(fit, data.frequency, band.height)):
             break
         band = replace(band, fit=fit, terms=terms)
     return band
@@ -112,13 +101,11 @@ def mark_close_modes(band: FittedBand) -> FittedBand:
     Conditions: a single mode does not explain the peak, two leave white noise, and neither is as large as the one.
     """
     fit, data = band.fit, band.data
-    if band.close_frequencies or has_rounding_residual(band):
-        return band
-    i = _least_likely_single_mode(band)
+    i = None if band.close_frequencies or has_rounding_residual(band) else _least_likely_single_mode(band)
     if i is None:
         return band
     pair = fit_band(data.frequency, data.target, data.weight, split_pole(fit.poles, i), band.terms)
-    if pair is None or not (has_white_residual(pair) and has_lower_aic(pair, fit)):
+    if pair is None or not (has_white_residual(pair) and pair.has_lower_aic(fit)):
         return band
     height = np.full(pair.frequency.size, np.max(band.height))
     larger = np.max(np.abs(pair.constant[0, -2:])) / abs(fit.constant[0, i])

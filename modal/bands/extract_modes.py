@@ -1,7 +1,7 @@
 """Extract all modes of one or several FRFs, band by band."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
 from itertools import chain
@@ -15,16 +15,15 @@ from modal.arrays import Complexes, Flags, Floats
 from modal.bands.dense_bands import mark_close_modes, refine_dense_band
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.find_resonances import Resonance, add_residual_resonances, find_resonances
-from modal.bands.fit_peaks import LocalBand, fit_peaks, group_into_bands, iterate_bands, refit_with_real_constants
+from modal.bands.fit_peaks import fit_peaks, group_into_bands, iterate_bands, refit_real_constants
 from modal.bands.frf_lines import line_weights, usable_lines
 from modal.bands.residual_analysis import has_rounding_residual
 
 
-@contextmanager
-def limit_to_one_thread() -> Iterator[None]:
+def limit_to_one_thread() -> AbstractContextManager[object]:
     """Limit the numerical libraries to one thread: with two, small matrices take three times as long."""
-    with _thread_controller().limit(limits=1):
-        yield
+    limited: AbstractContextManager[object] = _thread_controller().limit(limits=1)
+    return limited
 
 
 @cache
@@ -139,7 +138,9 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     empty = Extraction(lines, np.array([line_weights(frf) for frf in lines]), ())
     peaks = _merge_resonances([find_resonances(frf) for frf in lines])
     state = iterate_bands(_fit_bands(empty, peaks))
-    extended = _with_residual_resonances(state, peaks)
+    extended = peaks
+    for frf, fitted in zip(state.frfs, state.receptance, strict=True):
+        extended = add_residual_resonances(extended, replace(frf, receptance=frf.receptance - fitted))
     state = state if len(extended) == len(peaks) else iterate_bands(_fit_bands(state, extended))
     refined = tuple(refine_dense_band(band) for band in state.bands)
     if any(new is not old for new, old in zip(refined, state.bands, strict=True)):
@@ -148,7 +149,7 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     if np.any(stray):
         state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))
     state = _reweight(state)
-    return replace(state, bands=tuple(refit_with_real_constants(mark_close_modes(band)) for band in state.bands))
+    return replace(state, bands=tuple(refit_real_constants(mark_close_modes(band)) for band in state.bands))
 
 
 def _reweight(state: Extraction) -> Extraction:
@@ -181,7 +182,7 @@ def _merge_resonances(found: Sequence[list[Resonance]]) -> list[Resonance]:
     """Merge the resonances of all FRFs by rising frequency; of two within a half-width the higher stays."""
     common: list[Resonance] = []
     for new in sorted(chain.from_iterable(found), key=lambda r: -r.height):
-        if all(abs(new.frequency - old.frequency) >= max(new.half_width, old.half_width) for old in common):
+        if not any(new.overlaps(old) for old in common):
             common.append(new)
     return sorted(common, key=lambda r: r.frequency)
 
@@ -191,26 +192,14 @@ def _fit_bands(before: Extraction, resonances: list[Resonance]) -> Extraction:
 
     An earlier band with the same resonances and lines keeps its fit.
     """
-    wanted = sorted(group_into_bands(resonances, before.frf.frequency), key=lambda local: -local.height)
-    kept = [band for band in before.bands if any(_is_band_of(band, local) for local in wanted)]
-    state = replace(before, bands=tuple(kept))
-    for local in wanted:
-        if not any(_is_band_of(band, local) for band in kept):
+    local_bands = group_into_bands(resonances, before.frf.frequency)
+    state = replace(before, bands=tuple(b for b in before.bands if (b.resonances, b.lines) in local_bands))
+    kept = [(band.resonances, band.lines) for band in state.bands]
+    for local in sorted(local_bands, key=lambda local: -max(r.height for r in local.resonances)):
+        if local not in kept:
             band = fit_peaks(state.data(local.lines), local.resonances)
             state = state if band is None else replace(state, bands=(*state.bands, band))
     return replace(state, bands=tuple(sorted(state.bands, key=lambda band: band.lines.start)))
-
-
-def _is_band_of(band: FittedBand, local: LocalBand) -> bool:
-    """Return whether a band was laid around these peaks on these lines."""
-    return (band.resonances, band.lines) == (local.resonances, local.lines)
-
-
-def _with_residual_resonances(state: Extraction, known: list[Resonance]) -> list[Resonance]:
-    """Add the resonances that exceed the residual of any FRF."""
-    for frf, fitted in zip(state.frfs, state.receptance, strict=True):
-        known = add_residual_resonances(known, replace(frf, receptance=frf.receptance - fitted))
-    return known
 
 
 def _stray_lines(state: Extraction) -> Flags:

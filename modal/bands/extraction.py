@@ -1,7 +1,7 @@
 """Result of a modal extraction, and stabilisation charts of all its lines."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -141,6 +141,14 @@ class Extraction:
         return np.asarray(band.fit.complex_residual / np.where(weight > 0, weight, np.inf))
 
 
+def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:
+    """Replace a band, add a new one if `old` is None, or remove one if `new` is None."""
+    if new is old:
+        return state
+    bands = [*(band for band in state.bands if band is not old), *([] if new is None else [new])]
+    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))
+
+
 MAX_GAP_CHART_LINES = 200
 """Most lines of one chart between the bands, few enough for its order."""
 FITTED_MODE_DISTANCE = 0.005
@@ -164,8 +172,8 @@ def stabilisation_charts(state: Extraction) -> list[StabilisationChart]:
     list of StabilisationChart
         Charts of the bands by rising frequency, then those of the gaps.
     """
-    between = [state.data(lines).chart for lines in _gaps_between_bands(state)]
-    return [*(band.data.chart for band in state.bands), *between]
+    gaps = [state.data(lines) for lines in _gaps_between_bands(state)]
+    return [data.chart for data in (*(band.data for band in state.bands), *gaps)]
 
 
 def candidate_frequencies(state: Extraction) -> Floats:
@@ -185,7 +193,8 @@ def candidate_frequencies(state: Extraction) -> Floats:
         Natural frequencies (Hz), rising.
     """
     modes = np.array([frequency for band in state.bands for frequency in band.fit.frequency])
-    return np.sort([frequency for frequency, zeta in _visible_poles(state) if _is_unfitted(frequency, zeta, modes)])
+    reach = ((f, max(zeta, FITTED_MODE_DISTANCE) * f) for f, zeta in _visible_poles(state))
+    return np.sort([f for f, near in reach if np.min(np.abs(modes - f), initial=np.inf) > near])
 
 
 def _visible_poles(state: Extraction) -> Iterator[tuple[float, float]]:
@@ -196,10 +205,6 @@ def _visible_poles(state: Extraction) -> Iterator[tuple[float, float]]:
             there = measured[np.argmin(np.abs(state.frf.frequency - frequency))]
             if np.pi * frequency * largest / zeta > MIN_CANDIDATE_SHARE * there:
                 yield float(frequency), float(zeta)
-
-
-def _is_unfitted(frequency: float, zeta: float, modes: Floats) -> bool:
-    return bool(np.min(np.abs(modes - frequency), initial=np.inf) > max(zeta, FITTED_MODE_DISTANCE) * frequency)
 
 
 def _gaps_between_bands(state: Extraction) -> Iterator[slice]:

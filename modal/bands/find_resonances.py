@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from modal.arrays import Complexes, Flags, Floats, Indices
-from modal.bands.frf_lines import incoherent_noise, measured_over_receptance, remove_drift
+from modal.bands.frf_lines import incoherent_noise, mean_coherence, measured_over_receptance, remove_drift
 
 MIN_FRF_LINES = 8
 """Fewest lines of an FRF: one mode and its residual terms have seven unknowns."""
@@ -54,14 +54,16 @@ class Resonance:
     """Distance from the peak to the nearer half-power point (Hz), roughly zeta f_n."""
     height: float
     """Height of the mobility (m/s/N)."""
+    noise: float = 0.0
+    """Noise rms of the highest line (m/s/N)."""
+    turn: float = 0.0
+    """Angle between the chords of the mobility from the lower side to the peak and on to the upper side (rad)."""
+    coherence: float | None = None
+    """Mean coherence over the peak; None if unknown."""
 
-
-@dataclass(frozen=True)
-class _Peak:
-    resonance: Resonance
-    noise: float
-    turn: float
-    coherence: float
+    def overlaps(self, other: Self) -> bool:
+        """Return whether one resonance is within the half-width of the other."""
+        return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 
 
 def find_resonances(frf: Frf) -> list[Resonance]:
@@ -74,16 +76,20 @@ def find_resonances(frf: Frf) -> list[Resonance]:
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
-    _check_frf(frf)
+    n = frf.frequency.size
+    if n < MIN_FRF_LINES:
+        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
+    if not np.any(frf.receptance):
+        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
     frf = remove_drift(frf)
-    peaks = [peak for peak in _find_peaks_at_all_scales(frf) if peak.coherence >= MIN_RESONANCE_COHERENCE]
+    peaks = _find_peaks_at_all_scales(frf)
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
             "the FRF is real on every line: its phase is missing, and without it damping and stiffness cannot be told "
             "from neighbouring modes; export real and imaginary part, or magnitude and phase"
         )
     _check_phase(frf, peaks)
-    turning = [peak.resonance for peak in peaks if peak.turn < -MIN_PHASE_TURN or peak.turn > MAX_PHASE_TURN]
+    turning = (peak for peak in peaks if peak.turn < -MIN_PHASE_TURN or peak.turn > MAX_PHASE_TURN)
     return sorted(turning, key=lambda r: r.frequency)
 
 
@@ -96,8 +102,8 @@ def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[R
     if not known:
         return []
     least = MIN_RESIDUAL_PEAK_SHARE * min(r.height for r in known)
-    peaks = [peak for peak in _find_peaks_at_all_scales(residual, least) if peak.coherence >= MIN_RESONANCE_COHERENCE]
-    turning = [peak.resonance for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
+    peaks = _find_peaks_at_all_scales(residual, least)
+    turning = [peak for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
     return sorted([*known, *(new for new in turning if _is_separate_resonance(known, new))], key=lambda r: r.frequency)
 
 
@@ -111,21 +117,13 @@ def _is_separate_resonance(known: Sequence[Resonance], new: Resonance) -> bool:
     return new.height > MIN_RESIDUAL_PEAK_SHARE * known[int(np.argmax(tail))].height
 
 
-def _check_frf(frf: Frf) -> None:
-    n = frf.frequency.size
-    if n < MIN_FRF_LINES:
-        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
-    if not np.any(frf.receptance):
-        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
-
-
-def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
+def _check_phase(frf: Frf, peaks: list[Resonance]) -> None:
     """Reject a conjugated FRF: the peaks of its accelerance turn the wrong way, and so do all lines together.
 
     The mobility would not do: the drift near 0 Hz would decide.
     """
-    falling = sum(p.resonance.frequency * p.resonance.height for p in peaks if p.turn < -MIN_PHASE_TURN)
-    rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if MIN_PHASE_TURN < p.turn < MAX_PHASE_TURN)
+    falling = sum(p.frequency * p.height for p in peaks if p.turn < -MIN_PHASE_TURN)
+    rising = sum(p.frequency * p.height for p in peaks if MIN_PHASE_TURN < p.turn < MAX_PHASE_TURN)
     phase_step = np.imag(frf.accelerance[1:] * frf.accelerance[:-1].conj())
     if rising > falling and np.sum(phase_step) > 0:
         raise ConjugateError(
@@ -134,44 +132,34 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
         )
 
 
-def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
+def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[Resonance]:
     """Find the peaks of all running means, each from the longest mean that costs no more height than noise explains.
 
     least: height of the mobility below which peaks are ignored (m/s/N).
     """
     noise, mobility = mobility_noise(frf), frf.mobility
-    peaks: list[_Peak] = []
+    peaks: list[Resonance] = []
     longest = max(1, frf.frequency.size // 16)
     for length in SMOOTHING_LENGTHS[longest >= SMOOTHING_LENGTHS]:
         mean = _running_mean(mobility, length)
         gain = (2 * length**2 + 1) / (3 * length**3)
         rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
         for new in _find_peaks(frf, mean, rms, least):
-            same = [i for i, old in enumerate(peaks) if _is_same_peak(new, old)]
+            same = [old for old in peaks if new.overlaps(old)]
             if not same:
                 peaks.append(new)
-            elif len(same) == 1 and _is_not_lower(new, peaks[same[0]]):
-                peaks[same[0]] = new
-    return peaks
+            elif len(same) == 1 and same[0].height - new.height < MAX_SMOOTHING_LOSS * same[0].noise:
+                peaks[peaks.index(same[0])] = new
+    return [p for p in peaks if p.coherence is None or p.coherence >= MIN_RESONANCE_COHERENCE]
 
 
 def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
     """Apply a box mean over this many lines twice."""
-    if length == 1:
-        return values
-    return np.asarray(scipy.ndimage.uniform_filter1d(scipy.ndimage.uniform_filter1d(values, length), length))
+    mean = scipy.ndimage.uniform_filter1d
+    return values if length == 1 else np.asarray(mean(mean(values, length), length))
 
 
-def _is_same_peak(a: _Peak, b: _Peak) -> bool:
-    distance = abs(a.resonance.frequency - b.resonance.frequency)
-    return distance < max(a.resonance.half_width, b.resonance.half_width)
-
-
-def _is_not_lower(new: _Peak, old: _Peak) -> bool:
-    return old.resonance.height - new.resonance.height < MAX_SMOOTHING_LOSS * old.noise
-
-
-def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> list[_Peak]:
+def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> list[Resonance]:
     size = np.abs(mobility)
     faintest = 1e-12 * size.max()
     floor = np.maximum(MIN_PEAK_TO_NOISE * noise, max(least, faintest))
@@ -208,25 +196,15 @@ def _lowest_before_higher_value(side: Floats, lowest: float) -> float:
     return float(side[:higher].min()) if higher else lowest
 
 
-def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> _Peak:
+def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> Resonance:
     f = frf.frequency
     below, above = _lines_to_half_power(size[top::-1]), _lines_to_half_power(size[top:])
     low, high = top - math.ceil(below), top + math.ceil(above)
     lower, upper = np.interp([top - below, top + above], np.arange(low, high + 1), f[low : high + 1])
+    half_width = float(min(f[top] - lower, upper - f[top]))
     turn = np.angle((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
-    return _Peak(
-        resonance=Resonance(float(f[top]), float(min(f[top] - lower, upper - f[top])), float(size[top])),
-        noise=noise,
-        turn=float(turn),
-        coherence=_peak_coherence(frf, slice(low, high + 1)),
-    )
-
-
-def _peak_coherence(frf: Frf, lines: slice) -> float:
-    """Return the mean coherence over a peak, 1 if the coherence is unknown."""
-    if frf.coherence is None or not frf.has_random_error:
-        return 1.0
-    return float(np.mean(frf.coherence[lines]))
+    coherence = mean_coherence(frf, slice(low, high + 1))
+    return Resonance(float(f[top]), half_width, float(size[top]), noise, float(turn), coherence)
 
 
 def _lines_to_half_power(size: Floats) -> float:

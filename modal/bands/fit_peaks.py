@@ -1,16 +1,17 @@
 """Group resonances into bands, fit the peaks of each band, and iterate until all bands agree."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from modal.arrays import Flags, Floats
-from modal.bands.extraction import BandData, Extraction, FittedBand
+from modal.bands.extraction import BandData, Extraction, FittedBand, replace_band
 from modal.bands.find_resonances import Resonance
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit
-from modal.fitting.fit_band import fit_band, fit_real_constants, remove_residual_terms
+from modal.fitting.fit_band import fit_band, fit_real_constants, project_band
 from modal.poles import select_physical_poles
 
 JOINT_FIT_DISTANCE = 4.0
@@ -23,8 +24,7 @@ MIN_BAND_MARGIN_LINES = 6
 """Fewest lines of a band on either side of its resonances."""
 
 
-@dataclass(frozen=True)
-class LocalBand:
+class LocalBand(NamedTuple):
     """Resonances to be fitted together."""
 
     resonances: tuple[Resonance, ...]
@@ -32,32 +32,19 @@ class LocalBand:
     lines: slice
     """Place on the frequency axis."""
 
-    @property
-    def height(self) -> float:
-        """Height of the highest resonance (m/s/N)."""
-        return max(resonance.height for resonance in self.resonances)
-
 
 def group_into_bands(resonances: Sequence[Resonance], frequency: Floats) -> list[LocalBand]:
     """Group close resonances into bands that meet between them in proportion to the half-widths.
 
     resonances come by rising frequency; frequency (Hz) has shape (n,).
     """
-    groups = [part for group in _close_groups(resonances) for part in _split_group(group)]
+    gaps = [(b.frequency - a.frequency, a.half_width + b.half_width) for a, b in pairwise(resonances)]
+    breaks = [i for i, (gap, widths) in enumerate(gaps, 1) if gap >= JOINT_FIT_DISTANCE * widths]
+    close = [tuple(resonances[i:j]) for i, j in pairwise([0, *breaks, len(resonances)]) if i < j]
+    groups = [part for group in close for part in _split_group(group)]
     meetings = [_band_boundary(a[-1], b[0]) for a, b in pairwise(groups)]
     borders = zip(groups, [-np.inf, *meetings], [*meetings, np.inf], strict=False)
     return [LocalBand(group, _band_lines(group, below, above, frequency)) for group, below, above in borders]
-
-
-def _close_groups(resonances: Sequence[Resonance]) -> Iterator[tuple[Resonance, ...]]:
-    group: tuple[Resonance, ...] = ()
-    for resonance in resonances:
-        if group and not _are_close(group[-1], resonance):
-            yield group
-            group = ()
-        group = (*group, resonance)
-    if group:
-        yield group
 
 
 def _split_group(group: tuple[Resonance, ...]) -> Iterator[tuple[Resonance, ...]]:
@@ -69,10 +56,6 @@ def _split_group(group: tuple[Resonance, ...]) -> Iterator[tuple[Resonance, ...]
     widest = int(np.argmax(gaps)) + 1
     yield from _split_group(group[:widest])
     yield from _split_group(group[widest:])
-
-
-def _are_close(a: Resonance, b: Resonance) -> bool:
-    return b.frequency - a.frequency < JOINT_FIT_DISTANCE * (a.half_width + b.half_width)
 
 
 def _band_boundary(a: Resonance, b: Resonance) -> float:
@@ -102,26 +85,23 @@ def fit_peaks(data: BandData, resonances: Sequence[Resonance]) -> FittedBand | N
     """Fit the resonances of a band, started from their widths or from the nearest LSCF poles; None if none fits."""
     starts = np.array([(r.frequency, r.half_width / r.frequency) for r in resonances]).T
     height = np.array([r.height for r in resonances])
-    fitted = _fit_valid_modes(data, starts, height, MIN_RESIDUAL_TERMS)
-    if fitted is None or fitted[1].size < height.size or _residual_share(fitted[0], data) > MAX_DIRECT_FIT_RESIDUAL:
-        from_poles = _fit_valid_modes(data, _nearest_poles(data, resonances, starts), height, MIN_RESIDUAL_TERMS)
-        fitted = _better_fit(fitted, from_poles)
-    if fitted is None:
-        return None
-    return FittedBand(data, tuple(resonances), fitted[1], fitted[0], MIN_RESIDUAL_TERMS)
+    fits = [_fit_valid_modes(data, starts, height, MIN_RESIDUAL_TERMS)]
+    if fits[0] is None or fits[0][1].size < height.size or _residual_share(fits[0][0], data) > MAX_DIRECT_FIT_RESIDUAL:
+        fits.append(_fit_valid_modes(data, _nearest_poles(data, resonances, starts), height, MIN_RESIDUAL_TERMS))
+    bands = [FittedBand(data, tuple(resonances), fit[1], fit[0], MIN_RESIDUAL_TERMS) for fit in fits if fit is not None]
+    return max(bands, key=lambda band: (band.height.size, -band.fit.sum_of_squares), default=None)
 
 
 def refit_band(band: FittedBand, data: BandData) -> FittedBand | None:
     """Fit the modes of a band to other data; edited modes all stay, and None means that no mode is left."""
     if band.edits:
-        poles, held = band.fit.poles, band.fit.held
-        fit = fit_band(data.frequency, data.target, data.weight, poles, band.terms, held)
+        fit = fit_band(data.frequency, data.target, data.weight, band.fit.poles, band.terms, band.fit.held)
         return band if fit is None else replace(band, data=data, fit=fit)
     fitted = _fit_valid_modes(data, band.fit.poles, band.height, band.terms)
     return None if fitted is None else replace(band, data=data, fit=fitted[0], height=fitted[1])
 
 
-def refit_with_real_constants(band: FittedBand) -> FittedBand:
+def refit_real_constants(band: FittedBand) -> FittedBand:
     """Fit real modal constants if they describe the band as well."""
     data = band.data
     fit = fit_real_constants(band.fit, data.frequency, data.target, data.weight, band.terms)
@@ -156,12 +136,6 @@ def _residual_share(fit: BandFit, data: BandData) -> float:
     return float(np.sqrt(fit.sum_of_squares) / np.linalg.norm(data.target * data.weight))
 
 
-def _better_fit(a: tuple[BandFit, Floats] | None, b: tuple[BandFit, Floats] | None) -> tuple[BandFit, Floats] | None:
-    """Return the fit with more modes, or with the smaller residual."""
-    fits = [fit for fit in (a, b) if fit is not None]
-    return max(fits, key=lambda fit: (fit[1].size, -fit[0].sum_of_squares), default=None)
-
-
 def _fit_valid_modes(data: BandData, starts: Floats, height: Floats, terms: int) -> tuple[BandFit, Floats] | None:
     """Fit modes, removing the weakest invalid one until all are valid."""
     while height.size:
@@ -185,17 +159,12 @@ def iterate_bands(state: Extraction) -> Extraction:
     for _ in range(MAX_BAND_SWEEPS):
         before = state.bands
         for band in before:
-            state = replace_band(state, band, _refit_changed_band(state, band))
+            data = state.data(band.lines, without=band)
+            if not (np.array_equal(data.weight, band.data.weight) and _has_converged(band, data)):
+                state = replace_band(state, band, refit_band(band, data))
         if all(new is old for new, old in zip(state.bands, before, strict=False)):
             break
     return state
-
-
-def _refit_changed_band(state: Extraction, band: FittedBand) -> FittedBand | None:
-    """Fit a band to the data without the modes of all others; return it as it is if that has not changed."""
-    data = state.data(band.lines, without=band)
-    has_same_weight = np.array_equal(data.weight, band.data.weight)
-    return band if has_same_weight and _has_converged(band, data) else refit_band(band, data)
 
 
 def _has_converged(band: FittedBand, data: BandData) -> bool:
@@ -203,12 +172,5 @@ def _has_converged(band: FittedBand, data: BandData) -> bool:
     off, most = data.target - band.data.target, TAIL_CHANGE_TOLERANCE * np.sqrt(band.fit.sum_of_squares)
     if np.linalg.norm(off * data.weight) < most:
         return True
-    return bool(np.linalg.norm(remove_residual_terms(data.frequency, off, data.weight, band.terms)) < most)
-
-
-def replace_band(state: Extraction, old: FittedBand | None, new: FittedBand | None) -> Extraction:
-    """Replace a band, add a new one if `old` is None, or remove one if `new` is None."""
-    if new is old:
-        return state
-    bands = [*(band for band in state.bands if band is not old), *([] if new is None else [new])]
-    return replace(state, bands=tuple(sorted(bands, key=lambda band: band.lines.start)))
+    projected = project_band(data.frequency, off, data.weight, band.terms, band.fit.held)
+    return bool(np.linalg.norm(projected.data) < most)

@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from acquisition import Frf
-from modal.arrays import Floats
+from modal.arrays import Flags, Floats
 
 
 def usable_lines(frf: Frf, band: tuple[float, float] | None) -> Frf:
@@ -55,6 +55,13 @@ def incoherent_noise(frf: Frf) -> Floats:
     g2 = np.clip(frf.coherence, 1e-12, 1.0)
     size = np.abs(frf.receptance) * measured_over_receptance(frf)
     return np.asarray(size * np.sqrt((1 - g2) / (2 * averages * g2)))
+
+
+def mean_coherence(frf: Frf, lines: slice | Flags) -> float | None:
+    """Return the mean coherence over some lines; None if the coherence is unknown."""
+    if frf.coherence is None or not frf.has_random_error:
+        return None
+    return float(np.mean(frf.coherence[lines]))
 
 
 def _smooth_variance(variance: Floats) -> Floats:

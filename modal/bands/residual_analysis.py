@@ -1,7 +1,7 @@
 """Test the residual of a band fit: whiteness, model comparison, systematic errors."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,19 +24,6 @@ def has_white_residual(fit: BandFit) -> bool:
     size = np.sum(np.abs(blocks.mean(axis=2)) ** 2) * length
     expected = fit.sum_of_squares / residual.size * blocks[..., 0].size
     return bool(size < expected * (1 + MAX_WHITENESS_EXCESS / np.sqrt(blocks[..., 0].size)))
-
-
-def passes_f_test(more: BandFit, fewer: BandFit, least: float) -> bool:
-    """Return whether further unknowns lower the sum of squares by more than `least` times what chance would."""
-    gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.degrees_of_freedom - more.degrees_of_freedom, 1)
-    return gain > least * more.sum_of_squares / more.degrees_of_freedom
-
-
-def has_lower_aic(fit: BandFit, other: BandFit) -> bool:
-    """Return whether a fit has the lower Akaike information criterion."""
-    variance = min(candidate.sum_of_squares / candidate.degrees_of_freedom for candidate in (fit, other))
-    own, others = (each.sum_of_squares - 2 * variance * each.degrees_of_freedom for each in (fit, other))
-    return own < others
 
 
 NEAR_MODE_HALF_WIDTHS, MIN_NEAR_MODE_LINES = 3.0, 16
@@ -81,8 +68,7 @@ TRIAL_PEAK_HALF_WIDTHS = 2.0
 """Half-widths around a mode that a trial range must hold completely; else the peak is cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class SystematicError:
+class SystematicError(NamedTuple):
     """Errors to be added to those of a band because its residual is not white noise."""
 
     factor: float
@@ -104,18 +90,13 @@ def systematic_error(band: FittedBand) -> SystematicError:
     of its peak, may hide an error of four times that share of its half-width, its damping ratio and its size, whatever
     its correlation: several sensors of the same hits differ by that.
     """
-    fit = band.fit
-    hidden = _hidden_error(band)
-    independent = _count_independent_values(fit)
-    share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(fit.residual.size / 2)
-    is_white = independent > fit.degrees_of_freedom * share
-    if is_white or has_rounding_residual(band):
-        return SystematicError(1.0, fit.degrees_of_freedom, np.diag(hidden**2))
+    hidden, independent, freedom = _hidden_error(band), _count_independent_values(band.fit), band.fit.degrees_of_freedom
+    share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(band.fit.residual.size / 2)
+    if independent > freedom * share or has_rounding_residual(band):
+        return SystematicError(1.0, freedom, np.diag(hidden**2))
     moved = np.array(list(_trial_changes(band))).reshape(-1, hidden.size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
-    freedom = fit.degrees_of_freedom
-    covariance = np.diag(most**2 + hidden**2)
-    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), covariance)
+    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), np.diag(most**2 + hidden**2))
 
 
 def _hidden_error(band: FittedBand) -> Floats:
@@ -145,13 +126,10 @@ def _count_independent_values(fit: BandFit) -> float:
 def _trial_changes(band: FittedBand) -> Iterator[Floats]:
     """Yield the changes of the modes in trial fits, in the order of `BandFit`; 0 for modes whose peak a trial cuts."""
     fit, data, n = band.fit, band.data, band.data.frequency.size
-    everything = slice(0, n)
     counts = range(band.terms - REDUCED_RESIDUAL_TERMS, MAX_RESIDUAL_TERMS + 1)
-    trials = [(everything, terms) for terms in counts if terms != band.terms]
-    for part, terms in [
-        *trials,
-        *((slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES),
-    ]:
+    trials = [(slice(0, n), terms) for terms in counts if terms != band.terms]
+    trials += [(slice(round(low * n), round(high * n)), band.terms) for low, high in TRIAL_LINE_RANGES]
+    for part, terms in trials:
         values = refit_nearby(fit, data.frequency[part], data.target[:, part], data.weight[:, part], terms)
         if values is not None:
             moved = _change_of_values(fit, *values).reshape(-1, fit.frequency.size)

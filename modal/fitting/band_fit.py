@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -149,14 +150,10 @@ class FixedPoleFit:
     def _pole_errors(self) -> Floats:
         """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
         by_poles = -(self._rotated_constants @ self._constant_slopes.mT[:, np.newaxis]).swapaxes(0, 1)
-        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * self._residue_slopes
-        return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
-
-    @property
-    def _residue_slopes(self) -> Floats:
-        """Relative change of each residue with its own pole at a fixed constant, (m, k)."""
         zeta = self.poles[1]
-        return np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
+        residue_slopes = np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
+        by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * residue_slopes
+        return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
 
     @cached_property
     def covariance(self) -> Floats:
@@ -230,11 +227,6 @@ class BandFit:
         return self.complex_fit.covariance * (self.sum_of_squares / self.degrees_of_freedom)
 
     @property
-    def influence(self) -> Floats:
-        """Influence of the weighted FRFs on the errors, one Gauss-Newton step, shape (2 m + 2 p m, 2 n p)."""
-        return self.complex_fit.influence
-
-    @property
     def standard_error(self) -> Floats:
         """Standard errors, shape (2 + 2 p, m)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)).reshape(-1, self.frequency.size))
@@ -265,9 +257,20 @@ class BandFit:
         """Sum of the squared weighted residuals."""
         return float(self.residual @ self.residual)
 
+    def passes_f_test(self, fewer: Self, least: float) -> bool:
+        """Return whether these unknowns lower the sum of squares of a fit with fewer by over `least` times chance."""
+        gain = (fewer.sum_of_squares - self.sum_of_squares) / max(fewer.degrees_of_freedom - self.degrees_of_freedom, 1)
+        return gain > least * self.sum_of_squares / self.degrees_of_freedom
+
+    def has_lower_aic(self, other: Self) -> bool:
+        """Return whether this fit has the lower Akaike information criterion."""
+        variance = min(fit.sum_of_squares / fit.degrees_of_freedom for fit in (self, other))
+        own, others = (fit.sum_of_squares - 2 * variance * fit.degrees_of_freedom for fit in (self, other))
+        return own < others
+
     def influence_of(self, i: int) -> Floats:
         """Return the influence of FRF i, shape (2 m + 2 p m, 2 n)."""
-        return np.hsplit(self.influence, len(self.constant))[i]
+        return np.hsplit(self.complex_fit.influence, len(self.constant))[i]
 
     def of_mode(self, i: int, frequency: Floats) -> Complexes:
         """Return the receptance of mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""

@@ -5,12 +5,11 @@ Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BI
 
 import contextlib
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from modal.arrays import Complexes, Flags, Floats
-from modal.fitting.band_fit import MIN_RESIDUAL_TERMS, BandFit, FixedPoleFit, residual_powers, split_complex
+from modal.fitting.band_fit import BandFit, FixedPoleFit, residual_powers, split_complex
 
 MIN_CURVE_SEPARATION = 1e-2
 """Least independent part of each curve for which normal equations lose no more than four digits."""
@@ -20,42 +19,28 @@ MIN_CURVE_SEPARATION = 1e-2
 class ProjectedBand:
     """Weighted FRFs of a band without residual terms."""
 
-    frequency: Floats
+    root: Complexes
+    """Values i f, (n,)."""
     weight: Floats
-    """Weights, (p, n)."""
+    """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
     bases: Floats
     """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (p, n, terms)."""
     data: Floats
     """Weighted FRFs without residual terms, (p, 1, 2 n)."""
-    held: Flags
-    """Modes with fixed poles, (m,)."""
-
-    @cached_property
-    def _free(self) -> Flags:
-        """True for each frequency and damping ratio that is free, (2 m,)."""
-        return np.tile(~self.held, 2)
-
-    @cached_property
-    def _root(self) -> Complexes:
-        """Values i f, (n,)."""
-        return np.asarray(1j * self.frequency)
-
-    @cached_property
-    def _both(self) -> Floats:
-        """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
-        return np.tile(self.weight, 2)[:, np.newaxis]
+    free: Flags
+    """True for each frequency and damping ratio that is free, (2 m,)."""
 
     def at(self, poles: Floats, is_complex: bool) -> FixedPoleFit:
         """Fit the modal constants at these poles, (2, m)."""
         m = poles.shape[1]
-        rows = _project_out(self.bases, self._both * _model_rows(self._root, poles))
+        rows = _project_out(self.bases, self.weight * _model_rows(self.root, poles))
         q, inverse = _orthonormal(rows[:, : 2 * m if is_complex else m])
         part = self.data @ q
         left = self.data - part @ q.mT
         linear = part @ inverse.mT
         unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
         squares = rows[:, 2 * m :].reshape(len(rows), 2, m, -1)
-        return FixedPoleFit(poles, self._free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
+        return FixedPoleFit(poles, self.free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
 
 
 def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: Flags) -> ProjectedBand:
@@ -65,12 +50,8 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
     """
     bases = _term_bases(frequency, weight, terms)
     values = _project_out(bases, split_complex(weight * receptance)[:, np.newaxis])
-    return ProjectedBand(frequency, weight, bases, values, held)
-
-
-def remove_residual_terms(frequency: Floats, receptance: Complexes, weight: Floats, terms: int) -> Floats:
-    """Return weighted receptances without residual terms, (p, 2 n); arguments as `project_band`."""
-    return _project_out(_term_bases(frequency, weight, terms), split_complex(weight * receptance)[:, np.newaxis])[:, 0]
+    root = np.asarray(1j * frequency)
+    return ProjectedBand(root, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
 
 
 def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
@@ -161,12 +142,7 @@ MIN_WORTHWHILE_GAIN = 1e-3
 
 
 def fit_band(
-    frequency: Floats,
-    receptance: Complexes,
-    weight: Floats,
-    starts: Floats,
-    terms: int = MIN_RESIDUAL_TERMS,
-    held: Flags | None = None,
+    frequency: Floats, receptance: Complexes, weight: Floats, starts: Floats, terms: int, held: Flags | None = None
 ) -> BandFit | None:
     """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None if nothing fits.
 
@@ -185,8 +161,10 @@ def fit_band(
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         fixed = np.zeros(m, bool) if held is None else held
-        state = _solve(project_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
-        return None if state is None or not np.all(np.isfinite(state.covariance)) else _band_fit(state, state)
+        band = project_band(frequency, receptance, weight, terms, fixed)
+        state, has_converged = _descend(band, starts, is_complex=True, trials=MAX_FIT_EVALUATIONS)
+        if has_converged and np.all(np.isfinite(state.covariance)):
+            return _band_fit(state, state)
     return None
 
 
@@ -202,8 +180,9 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
     allowed = AKAIKE_PENALTY * fit.constant.size * fit.sum_of_squares / fit.degrees_of_freedom
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         band = project_band(frequency, receptance, weight, terms, fit.held)
-        state = _solve(band, _poles_for_real_constants(fit), is_complex=False)
-        if state is not None and state.cost - fit.sum_of_squares <= allowed:
+        starts = _poles_for_real_constants(fit)
+        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS)
+        if has_converged and state.cost - fit.sum_of_squares <= allowed:
             across = fit.constant / state.constant
             return replace(_band_fit(state, fit.complex_fit), phase_if_complex=np.angle(across * np.sign(across.real)))
     return fit
@@ -238,16 +217,9 @@ def _poles_for_real_constants(fit: BandFit) -> Floats:
 
 
 def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
-    freedom, size_error = state.degrees_of_freedom, np.zeros(state.constant.shape)
-    held = np.array(~state.free[: state.poles.shape[1]])
-    f, zeta = state.poles
-    return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, size_error, held)
-
-
-def _solve(band: ProjectedBand, starts: Floats, is_complex: bool) -> FixedPoleFit | None:
-    """Run Levenberg-Marquardt; None if it does not converge."""
-    state, has_converged = _descend(band, starts, is_complex, MAX_FIT_EVALUATIONS)
-    return state if has_converged else None
+    real, held = np.zeros(state.constant.shape), np.array(~state.free[: state.poles.shape[1]])
+    (f, zeta), freedom = state.poles, state.degrees_of_freedom
+    return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, real, held)
 
 
 def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Remark
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, mode_remark
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> float:
@@ -105,14 +105,14 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     if not near or not _is_same_mode(last, near[0]):
         nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
         text = f"no mode to follow, none is like this one{nearest}"
-        return ModeMatch(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
-    first, about = _match_distance(last, near[0]), f"{near[0].frequency:.0f} Hz"
+        return ModeMatch(None, (mode_remark(last, "no-mode-to-follow", text),))
+    first = _match_distance(last, near[0])
     if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
         text = f"followed mode in doubt: {near[1].frequency:.1f} Hz is nearly as like {_values_text(last)}"
-        return ModeMatch(near[0], (Remark("rival-mode", about, text),))
+        return ModeMatch(near[0], (mode_remark(near[0], "rival-mode", text),))
     if first > DOUBTFUL_MATCH_DISTANCE:
         text = f"followed mode in doubt: it was {_values_text(last)}, now {_values_text(near[0])}"
-        return ModeMatch(near[0], (Remark("large-change", about, text),))
+        return ModeMatch(near[0], (mode_remark(near[0], "large-change", text),))
     return ModeMatch(near[0], ())
 
 

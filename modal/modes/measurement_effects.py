@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition import Frf
 from modal.arrays import Floats
-from modal.modes.mode import Mode, ratio_or_zero
+from modal.modes.mode import Mode, change_covariances, ratio_or_zero
 
 
 def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
@@ -70,14 +70,11 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     w = float(np.hypot(decay, size * np.sqrt(1 - mode.damping_ratio**2)))
     left = float(np.exp(-delay / time_constant))
     slope = np.diag([1, 1, left]) @ _window_jacobian(mode, time_constant, size, decay, w)
-    covariances = [c if c is None else slope @ c @ slope.T for c in (mode.covariance, mode.jackknife)]
     return replace(
-        mode,
+        change_covariances(mode, lambda covariance: np.asarray(slope @ covariance @ slope.T)),
         frequency=w / (2 * np.pi),
         damping_ratio=decay / w,
         stiffness=mode.stiffness * (w / size) ** 2 * left,
-        covariance=covariances[0],
-        jackknife=covariances[1],
         phase_correlation=_phase_correlation(mode, slope),
         remarks=tuple(remark for remark in mode.remarks if remark.code != "smoothed-lines"),
         method=f"{mode.method}, without the window of {time_constant:g} s",
@@ -118,15 +115,11 @@ def widen_for_window(mode: Mode, time_constant: float, record: float) -> Mode:
     """
     if mode.covariance is None:
         return mode
-    factor = _window_widening(record / time_constant)
+    a = record / time_constant
+    factor = float(a * np.expm1(-4 * a) / -(np.expm1(-2 * a) ** 2))
     of_phase = mode.phase_deg_std * (np.sqrt(factor) if mode.jackknife is None else 1.0)
     covariance, freedom = mode.covariance * factor, mode.degrees_of_freedom / factor
     return replace(mode, covariance=covariance, degrees_of_freedom=freedom, phase_deg_std=float(of_phase))
-
-
-def _window_widening(a: float) -> float:
-    """Return T (integral of w^4) / (integral of w^2)^2 of w = exp(-a t/T) from 0 to T."""
-    return float(a * np.expm1(-4 * a) / -(np.expm1(-2 * a) ** 2))
 
 
 def _phase_correlation(mode: Mode, slope: Floats) -> Floats | None:
@@ -144,13 +137,9 @@ def _window_jacobian(mode: Mode, tau: float, size: float, decay: float, w: float
     """
     by_size, by_zeta = (size - mode.damping_ratio / tau) / w, -size / tau / w
     k = 2 * mode.stiffness * w / size**2
-    slope = np.array(
-        [
-            [by_size, by_zeta, 0],
-            [mode.damping_ratio / w - decay / w**2 * by_size, size / w - decay / w**2 * by_zeta, 0],
-            [k * (by_size - w / size), k * by_zeta, (w / size) ** 2],
-        ]
-    )
+    of_zeta = [mode.damping_ratio / w - decay / w**2 * by_size, size / w - decay / w**2 * by_zeta, 0]
+    of_stiffness = [k * (by_size - w / size), k * by_zeta, (w / size) ** 2]
+    slope = np.array([[by_size, by_zeta, 0], of_zeta, of_stiffness])
     hertz = np.diag([2 * np.pi, 1, 1])
     return np.asarray(np.linalg.inv(hertz) @ slope @ hertz)
 
@@ -343,9 +332,4 @@ def with_mass_uncertainty(mode: Mode, frf: Frf, mass_std: float) -> Mode:
     """
     loading = mass_loading(mode, frf, mass_std)
     off = loading.frequency * mode.frequency, loading.frequency * mode.damping_ratio, loading.stiffness * mode.stiffness
-    more = np.outer(off, off)
-
-    def widened(covariance: Floats | None) -> Floats | None:
-        return None if covariance is None else covariance + more
-
-    return replace(mode, covariance=widened(mode.covariance), jackknife=widened(mode.jackknife))
+    return change_covariances(mode, lambda covariance: covariance + np.outer(off, off))

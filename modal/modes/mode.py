@@ -1,8 +1,6 @@
 """A vibration mode as seen in one FRF, and the FRF of several modes."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -139,9 +137,8 @@ class Mode:
     @property
     def peak(self) -> float:
         """Receptance at resonance, 1 / (2 |K| zeta) (m/N); for free decays `relative_peak`."""
-        if self.relative_peak is not None:
-            return self.relative_peak
-        return float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
+        absolute = float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
+        return absolute if self.relative_peak is None else self.relative_peak
 
     @property
     def constant(self) -> complex:
@@ -226,7 +223,7 @@ class Mode:
         value = np.array([self.frequency, self.damping_ratio, self.stiffness])
         return np.stack([value - reach, value + reach], axis=1)
 
-    def scaled(self, frequency: float, stiffness: float, method: str) -> Mode:
+    def scaled(self, frequency: float, stiffness: float, method: str) -> "Mode":
         """Return the mode with scaled frequency and stiffness, covariances included.
 
         Parameters
@@ -244,15 +241,9 @@ class Mode:
             Scaled mode.
         """
         scale = np.outer(*2 * [np.array([frequency, 1.0, stiffness])])
-        covariance, jackknife = (None if c is None else c * scale for c in (self.covariance, self.jackknife))
-        return replace(
-            self,
-            frequency=self.frequency * frequency,
-            stiffness=self.stiffness * stiffness,
-            covariance=covariance,
-            jackknife=jackknife,
-            method=f"{self.method}, {method}".removeprefix(", "),
-        )
+        scaled = change_covariances(self, lambda covariance: covariance * scale)
+        words = f"{self.method}, {method}".removeprefix(", ")
+        return replace(scaled, frequency=self.frequency * frequency, stiffness=self.stiffness * stiffness, method=words)
 
     def receptance(self, frequency: Floats) -> Complexes:
         """Return the receptance of this mode alone.
@@ -275,6 +266,22 @@ class Mode:
 def ratio_or_zero(value: Floats, error: Floats) -> Floats:
     """Return values over errors; 0 for a value without error."""
     return np.divide(value, error, out=np.zeros(value.shape), where=error != 0)
+
+
+def change_covariances(mode: Mode, change: Callable[[Floats], Floats]) -> Mode:
+    """Return the mode with both covariances changed, as far as they are known."""
+    covariance, jackknife = (None if own is None else change(own) for own in (mode.covariance, mode.jackknife))
+    return replace(mode, covariance=covariance, jackknife=jackknife)
+
+
+def mode_remark(mode: Mode, code: str, text: str, cure: str = "") -> Remark:
+    """Return a remark at the frequency of a mode."""
+    return Remark(code, f"{mode.frequency:.0f} Hz", text, cure)
+
+
+def add_remark(mode: Mode, code: str, text: str, cure: str) -> Mode:
+    """Return the mode with one remark more."""
+    return replace(mode, remarks=(*mode.remarks, mode_remark(mode, code, text, cure)))
 
 
 def _root_of_diagonal(covariance: Floats | None) -> Floats:

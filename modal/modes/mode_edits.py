@@ -1,7 +1,5 @@
 """Edits of the modes of an FRF by a person."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
@@ -37,23 +35,23 @@ class ModeEdits:
 
     def __post_init__(self) -> None:
         """Check frequencies and damping ratios."""
-        for name, frequency in self._frequencies():
+        for name, (frequency, *_) in self._edits():
             if not (isfinite(frequency) and frequency > 0):
                 raise ValueError(f"{name} {frequency:g}: is no frequency > 0; give it in Hz")
         for frequency, zeta in self.fix:
             if not 0 < zeta < 1:
                 raise ValueError(f"fix {frequency:g}:{zeta:g}: the damping ratio is not between 0 and 1; 3 % is 0.03")
         named: dict[float, str] = {}
-        for name, frequency in self._frequencies():
+        for name, (frequency, *_) in self._edits():
             if frequency in named:
                 both = f"{name} twice" if named[frequency] == name else f"{named[frequency]} and {name}"
                 raise ValueError(f"{frequency:g} Hz: {both}; say one thing of one mode")
             named[frequency] = name
 
-    def _frequencies(self) -> Iterator[tuple[str, float]]:
-        yield from (("add", frequency) for frequency in self.add)
-        yield from (("drop", frequency) for frequency in self.drop)
-        yield from (("fix", frequency) for frequency, _ in self.fix)
+    def _edits(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        yield from (("add", (frequency,)) for frequency in self.add)
+        yield from (("drop", (frequency,)) for frequency in self.drop)
+        yield from (("fix", held) for held in self.fix)
 
     def __bool__(self) -> bool:
         """Return whether there is any edit."""
@@ -61,11 +59,10 @@ class ModeEdits:
 
     def __str__(self) -> str:
         """Return the edits as text: "add 298, drop 412, fix 1500:0.03"."""
-        words = [f"{name} {frequency:.10g}" for name, frequency in self._frequencies()]
-        dampings = ["" for _ in (*self.add, *self.drop)] + [f":{zeta:.10g}" for _, zeta in self.fix]
-        return ", ".join(map("".join, zip(words, dampings, strict=True)))
+        edits = ((name, ":".join(f"{value:.10g}" for value in values)) for name, values in self._edits())
+        return ", ".join(map(" ".join, edits))
 
-    def with_window(self, time_constant: float) -> ModeEdits:
+    def with_window(self, time_constant: float) -> "ModeEdits":
         """Return the edits for a response under an exponential window, which adds to the fixed damping.
 
         Parameters

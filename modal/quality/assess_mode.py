@@ -2,18 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
 from acquisition import Frf, Remark, is_smoothed
-from modal.arrays import Floats
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
+from modal.bands.frf_lines import mean_coherence
 from modal.bands.residual_analysis import residual_near_mode
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.modes.measurement_effects import common_delay
-from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, ratio_or_zero
+from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, add_remark, change_covariances, mode_remark, ratio_or_zero
 from modal.quality.trust import MAX_MISFIT_RATIO, MAX_REMAINING_DECAY, MIN_MISFIT_SHARE, relative_error, trust_rules
 
 
@@ -25,6 +24,7 @@ def with_truncation_error(mode: Mode) -> Mode:
     by up to that share, by 1/sqrt(2) of it in the mean square. f and zeta are affected only if the hit came late in
     the record or zeros were appended, and by less; they get the same share of zeta f and of zeta. Beyond 5 %
     the errors stay: the mode is doubtful then, and lines that were computed without a record have no truncation.
+    A fixed value keeps its error of 0.
 
     Source: integral of exp((lambda - iw) t) from 0 to T.
 
@@ -36,18 +36,12 @@ def with_truncation_error(mode: Mode) -> Mode:
         return mode
     share = mode.remaining_decay / np.sqrt(2)
     off = share * np.array([mode.damping_ratio * mode.frequency, mode.damping_ratio, mode.stiffness])
-    covariance, jackknife = (_widen_covariance(own, off) for own in (mode.covariance, mode.jackknife))
-    widened = replace(mode, covariance=covariance, jackknife=jackknife)
+    widened = change_covariances(mode, lambda own: own + np.diag(np.where(np.diag(own) > 0, off, 0.0) ** 2))
     of_phase = min(float(np.hypot(mode.phase_deg_std, np.degrees(share))), UNKNOWN_PHASE_STD_DEG)
     if mode.phase_correlation is None or mode.best_covariance is None:
         return replace(widened, phase_deg_std=of_phase)
     kept = ratio_or_zero(mode.standard_error * mode.phase_deg_std, widened.standard_error * of_phase)
     return replace(widened, phase_deg_std=of_phase, phase_correlation=mode.phase_correlation * kept)
-
-
-def _widen_covariance(covariance: Floats | None, off: Floats) -> Floats | None:
-    """Add independent errors to those values that have one; a fixed value has none."""
-    return None if covariance is None else covariance + np.diag(np.where(np.diag(covariance) > 0, off, 0.0) ** 2)
 
 
 MIN_GOOD_COHERENCE = 0.9
@@ -71,40 +65,23 @@ MAX_HALF_POWER_DIFFERENCE, MIN_HALF_POWER_LINES = 0.25, 4
 def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     """Add the quality figures of mode i of a band, and the remarks that follow from them."""
     share, misfit = residual_near_mode(band, i)
+    f, half_width, record = state.frf.frequency, mode.damping_ratio * mode.frequency, state.record_length
+    distance = np.abs(f - mode.frequency)
     figures = replace(
         mode,
-        coherence=_mode_coherence(state, mode),
+        coherence=mean_coherence(state.frf, distance <= max(half_width, distance.min())),
         misfit=misfit,
         misfit_share=share,
-        edge_distance=_edge_distance(state, mode),
-        remaining_decay=_remaining_decay(state.record_length, mode.damping_ratio * mode.frequency),
+        edge_distance=float(min(mode.frequency - f[0], f[-1] - mode.frequency) / half_width),
+        remaining_decay=None if record is None else float(np.exp(-2 * np.pi * half_width * record)),
         half_power_damping=_half_power_damping(band, mode),
     )
-    assessed = with_truncation_error(figures)
-    of_value = _value_remarks(band, i, assessed, share), _error_remarks(assessed)
-    remarks = chain(_edit_remarks(band, i, assessed), _position_remarks(state, band, i, assessed), *of_value)
-    return replace(assessed, remarks=tuple(remarks))
-
-
-def _edit_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
+    mode = with_truncation_error(figures)
     word = band.edits[i] if band.edits else ""
-    if word:
-        text = "f_n and zeta held by hand, known without error" if word == FIXED_MODE else f"{word} by hand"
-        yield Remark("by-hand", _frequency_text(mode), text)
-
-
-def _mode_coherence(state: Extraction, mode: Mode) -> float | None:
-    frf = state.frf
-    if frf.coherence is None or not frf.has_random_error:
-        return None
-    distance = np.abs(frf.frequency - mode.frequency)
-    near = distance <= max(mode.damping_ratio * mode.frequency, distance.min())
-    return float(np.mean(frf.coherence[near]))
-
-
-def _edge_distance(state: Extraction, mode: Mode) -> float:
-    f = state.frf.frequency
-    return float(min(mode.frequency - f[0], f[-1] - mode.frequency) / (mode.damping_ratio * mode.frequency))
+    text = "f_n and zeta held by hand, known without error" if word == FIXED_MODE else f"{word} by hand"
+    by_hand = (mode_remark(mode, "by-hand", text),) if word else ()
+    of_value = *_value_remarks(band, i, mode), *_error_remarks(mode)
+    return replace(mode, remarks=(*by_hand, *_position_remarks(state, band, i, mode), *of_value))
 
 
 def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
@@ -115,30 +92,25 @@ def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
 
 
 def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
-    f, half_width, at = state.frf.frequency, mode.damping_ratio * mode.frequency, _frequency_text(mode)
+    f, half_width = state.frf.frequency, mode.damping_ratio * mode.frequency
     if mode.edge_distance is not None and mode.edge_distance < 1:
         text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
-        yield Remark("cut-by-edge", at, text, "widen the band")
-    if mode.remaining_decay is not None and mode.remaining_decay > np.clip(
-        _stiffness_error(mode), MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY
-    ):
+        yield mode_remark(mode, "cut-by-edge", text, "widen the band")
+    error = 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
+    reported = np.clip(error, MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY)
+    if mode.remaining_decay is not None and mode.remaining_decay > reported:
         text = f"{100 * mode.remaining_decay:.0f} % of it still rings when the record ends"
-        yield Remark("still-ringing", at, text, "record longer")
+        yield mode_remark(mode, "still-ringing", text, "record longer")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
-            yield Remark("overlaps", at, f"overlaps with the mode at {other:.1f} Hz")
+            yield mode_remark(mode, "overlaps", f"overlaps with the mode at {other:.1f} Hz")
     if _has_unfitted_neighbour(state, band, i):
         text = "a far stronger mode beside it bends the fit: zeta and K may be off by more than their errors"
-        yield Remark("bent-by-neighbour", at, text)
+        yield mode_remark(mode, "bent-by-neighbour", text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.close_frequencies):
         where = " and ".join(f"{suspect:.0f}" for suspect in band.close_frequencies)
         text = f"may be several modes, near {where} Hz, too noisy to tell: its K is about that of all of them together"
-        yield Remark("several-modes", at, text, "average more hits")
-
-
-def _stiffness_error(mode: Mode) -> float:
-    """Return the relative standard error of K (-), 0 if not estimated."""
-    return 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
+        yield mode_remark(mode, "several-modes", text, "average more hits")
 
 
 def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool:
@@ -147,56 +119,45 @@ def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool
     if at_edge and band.terms > MIN_RESIDUAL_TERMS:
         return True
     own, frequency = band.fit.mobility_peak[i], band.fit.frequency[i]
-    fits = [other.fit for other in state.bands]
-    peak = np.concatenate([fit.mobility_peak for fit in fits])
-    distance = np.abs(np.concatenate([fit.frequency for fit in fits]) - frequency)
-    reach = np.concatenate([np.prod(fit.poles, axis=0) for fit in fits])
-    return bool(np.any((peak > DOMINANT_NEIGHBOUR_RATIO * own) & (peak * reach > own * distance)))
+    peak = np.concatenate([other.fit.mobility_peak for other in state.bands])
+    poles = np.hstack([other.fit.poles for other in state.bands])
+    is_near = peak * np.prod(poles, axis=0) > own * np.abs(poles[0] - frequency)
+    return bool(np.any((peak > DOMINANT_NEIGHBOUR_RATIO * own) & is_near))
 
 
-def _frequency_text(mode: Mode) -> str:
-    return f"{mode.frequency:.0f} Hz"
-
-
-def _remaining_decay(record: float | None, half_width: float) -> float | None:
-    """Return the share of the decay after the record (s); None if its length is unknown."""
-    return None if record is None else float(np.exp(-2 * np.pi * half_width * record))
-
-
-def _value_remarks(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:
-    at, width = _frequency_text(mode), mode.half_power_damping
+def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
+    width, share = mode.half_power_damping, mode.misfit_share or 0.0
     if not mode.is_driving_point:
         cure = "put the sensor where the hammer hits; if it is there, swap the sign of one of them"
-        yield Remark("not-driving-point", at, "K is negative: sensor and hammer move against each other", cure)
+        yield mode_remark(mode, "not-driving-point", "K is negative: sensor and hammer move against each other", cure)
     error = band.fit.size_error[0, i]
     if error > MAX_PEAK_FIT_ERROR:
         text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
-        yield Remark("near-node", at, text, "take a driving point where it moves")
+        yield mode_remark(mode, "near-node", text, "take a driving point where it moves")
     elif relative_error(mode) > REPORTED_MODE_ERROR or "uncertain" in dict(trust_rules(mode)):
         text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
-        yield Remark("uncertain", at, text, "average more hits")
+        yield mode_remark(mode, "uncertain", text, "average more hits")
     if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
-        yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
+        text = f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
+        yield mode_remark(mode, "misfit", text)
     is_near = np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
     is_wide = np.sum(is_near) >= MIN_HALF_POWER_LINES
     differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
     if width is not None and differs and is_wide and band.height.size == 1:
-        yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")
+        yield mode_remark(mode, "half-power-width", f"zeta from its half-power width is {100 * width:.2g} %")
 
 
 def _error_remarks(mode: Mode) -> Iterator[Remark]:
-    at = _frequency_text(mode)
-    rules = dict(trust_rules(mode))
-    if "heavy-damping" in rules:
+    if "heavy-damping" in dict(trust_rules(mode)):
         text = f"zeta of {100 * mode.damping_ratio:.0f} % without a clear peak: rather the sum of several modes"
-        yield Remark("heavy-damping", at, text)
+        yield mode_remark(mode, "heavy-damping", text)
     if mode.coherence is not None and mode.coherence < MIN_GOOD_COHERENCE:
         text = f"coherence {mode.coherence:.2f} at its peak, below {MIN_GOOD_COHERENCE:g}: the hits disagree"
-        yield Remark("low-coherence", at, text, "hit one point in one direction")
+        yield mode_remark(mode, "low-coherence", text, "hit one point in one direction")
     scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
     if scatter > MAX_HIT_SCATTER_RATIO:
         text = f"scatters {scatter:.1f} times more from hit to hit than in the fit"
-        yield Remark("scatter", at, text, "hit one point in one direction, equally hard")
+        yield mode_remark(mode, "scatter", text, "hit one point in one direction, equally hard")
 
 
 def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
@@ -210,7 +171,7 @@ def _add_phase_remark(mode: Mode, expected: float) -> Mode:
         return mode
     text = f"modal constant {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}° off real"
     cure = "look for loose clamping, for another mode close to it, and for a delay between the channels"
-    return replace(mode, remarks=(*mode.remarks, Remark("complex-mode", _frequency_text(mode), text, cure)))
+    return add_remark(mode, "complex-mode", text, cure)
 
 
 def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
@@ -219,11 +180,8 @@ def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
     narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
     if not any(narrow) or not is_smoothed(frf):
         return [*modes]
-    text = (
-        f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: "
-        "zeta too large, K too small by percents"
-    )
+    effect = "zeta too large, K too small by percents"
+    text = f"its half-width is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines, and lines were smoothed: {effect}"
     cure = "export the lines without smoothing or window"
-    remarks = [(Remark("smoothed-lines", _frequency_text(mode), text, cure),) for mode in modes]
-    added = zip(modes, narrow, remarks, strict=True)
-    return [replace(mode, remarks=(*mode.remarks, *own)) if is_narrow else mode for mode, is_narrow, own in added]
+    pairs = zip(modes, narrow, strict=True)
+    return [add_remark(mode, "smoothed-lines", text, cure) if is_narrow else mode for mode, is_narrow in pairs]

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lobes import Cut, Program, program_limit, spectral_radius, stability_boundary, zero_order_lobes
-from lobes.cut import DirectionModes
+from lobes.tip_response import TipModes
 from modal import Mode
 
 SPINDLE = [Mode(1713.0636, 0.029120, 3.53170e7)]
@@ -22,7 +22,7 @@ LOOKS = 200
 
 class Case(NamedTuple):
     x: list[Mode]
-    y: DirectionModes
+    y: TipModes
     cut: Cut
     speed_rpm: NDArray[np.float64]
     deepest: float

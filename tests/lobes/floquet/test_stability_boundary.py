@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from acquisition import Frf
 from lobes import Cut, radial_lobes, spectral_radius, stability_boundary, zero_order_lobes
-from lobes.cut import DirectionModes
+from lobes.tip_response import TipModes
 from lobes.tooth_force import mean_force
 from modal import Mode
 
@@ -203,7 +203,7 @@ ROBOT, TOOL = Mode(18.0, 0.015, 8e5), Mode(2500.0, 0.035, 4e7)
 WALL = Mode(240.0, 0.008, 6e5)
 
 
-def limit_of_a_constant_force(x: DirectionModes, y: DirectionModes, cut: Cut, speed: float) -> float:
+def limit_of_a_constant_force(x: TipModes, y: TipModes, cut: Cut, speed: float) -> float:
     """Lowest b with det(I + b (1 - exp(-i w tau)) H G(w)) = 0 by a dense scan over w, H constant."""
     f = np.linspace(1.0, 6000.0, 3_000_001)
     loop = np.zeros((f.size, 2, 2), dtype=complex)
@@ -227,7 +227,7 @@ def limit_of_a_constant_force(x: DirectionModes, y: DirectionModes, cut: Cut, sp
     ("x", "y"), [([TOOL], [ROBOT]), ([ROBOT, TOOL], None), ([TOOL, WALL], [ROBOT, TOOL]), ([WALL], [TOOL])]
 )
 def test_a_soft_slow_mode_does_not_hide_the_fast_one_that_chatters(
-    x: list[Mode], y: DirectionModes, coefficients: tuple[float, float]
+    x: list[Mode], y: TipModes, coefficients: tuple[float, float]
 ) -> None:
     """Robots and thin walls: 18 and 240 Hz next to 2500 Hz. The force of four teeth in a slot is constant."""
     cut = Cut(4, 1.0, "down", *coefficients)

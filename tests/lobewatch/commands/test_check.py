@@ -109,7 +109,7 @@ def test_the_numbers_are_those_of_the_limit_in_the_worst_feed(shop: Shop, check:
         found = program_limit(program, newest.x, newest.y, cutting_conditions_of(table, machine, newest))
         assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
         assert entry["stable"] == found.stable
-        assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.feed_angle))
+        assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.cut.feed_angle))
         assert entry["depth_margin"] == pytest.approx(entry["limit_mm"] / entry["depth_mm"] - 1)
         assert 0.6 * entry["limit_mm"] < entry["limit_low_mm"] < entry["limit_mm"] < entry["limit_high_mm"]
         assert 0 <= entry["chance_turning"] <= 1

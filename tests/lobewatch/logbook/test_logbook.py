@@ -24,7 +24,7 @@ from typer.testing import CliRunner, Result
 import lobes
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, Program, ProgramLimit, program_limit, zero_order_lobes
-from lobes.cut import DirectionModes
+from lobes.tip_response import TipModes
 from lobewatch import Logbook
 from lobewatch.cli import app
 from lobewatch.fleet.fleet import Fleet
@@ -268,7 +268,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
     asked: list[Program] = []
 
     def counting(
-        program: Program, x: DirectionModes, y: DirectionModes, cuts: Sequence[Cut], vectors: ArrayLike | None = None
+        program: Program, x: TipModes, y: TipModes, cuts: Sequence[Cut], vectors: ArrayLike | None = None
     ) -> ProgramLimit:
         asked.append(program)
         return program_limit(program, x, y, cuts, vectors)

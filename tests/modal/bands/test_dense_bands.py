@@ -95,7 +95,7 @@ def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_reported() -> 
 def test_the_gain_of_a_pair_is_what_a_mode_leaves_of_two_near_each_other(turn: complex) -> None:
     line, weight = np.arange(1300.0, 2200.0, 5.0), np.ones((1, 180))
     own = turn * synthesize_frf([Mode(1740.0, 0.03, 4e7), Mode(1756.0, 0.033, 3e7)], line).receptance[np.newaxis] * 1e9
-    fit = fit_band(line, own, weight, np.array([[1745.0], [0.03]]))
+    fit = fit_band(line, own, weight, np.array([[1745.0], [0.03]]), MIN_RESIDUAL_TERMS)
     assert fit is not None
     assert 0.95 < mode_pair_gain(fit, line, weight, MIN_RESIDUAL_TERMS, 0) / fit.sum_of_squares <= 1
 

@@ -9,7 +9,7 @@ from rich.table import Table
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.show.terminal.output import Texts, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
 TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
@@ -28,17 +28,22 @@ NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
 
-mode_json = json_fields(
-    """
-    frequency_hz=frequency frequency_hz_std=standard_error.0 frequency_hz_std_of_fit=fit_error.0
-    damping_ratio damping_ratio_std=standard_error.1 damping_ratio_std_of_fit=fit_error.1
-    stiffness_n_per_m=stiffness stiffness_n_per_m_std=standard_error.2 stiffness_n_per_m_std_of_fit=fit_error.2
-    interval_95=self correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
-    misfit_share trust=self found_again=match_count half_power_damping_ratio=half_power_damping remarks method
-    """,
-    {"interval_95": Mode.interval, "trust": assess_trust},
-)
-"""Function that returns one mode with its standard errors over the hits and of the fit."""
+def mode_json(mode: Mode) -> JsonObject:
+    """Return one mode with its standard errors over the hits and of the fit."""
+    values = {"frequency_hz": mode.frequency, "damping_ratio": mode.damping_ratio, "stiffness_n_per_m": mode.stiffness}
+    errors = zip(mode.standard_error.tolist(), mode.fit_error.tolist(), strict=True)
+    return (
+        {
+            key: number
+            for (name, value), (std, of_fit) in zip(values.items(), errors, strict=True)
+            for key, number in ((name, value), (f"{name}_std", std), (f"{name}_std_of_fit", of_fit))
+        }
+        | {"interval_95": mode.interval(), "correlation": mode.correlation, "hits": mode.n_hits}
+        | {"driving_point": mode.is_driving_point}
+        | pick(mode, "phase_deg", "phase_deg_std", "coherence", "misfit", "misfit_share")
+        | {"trust": assess_trust(mode), "found_again": mode.match_count}
+        | {"half_power_damping_ratio": mode.half_power_damping, "remarks": mode.remarks, "method": mode.method}
+    )
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
@@ -141,14 +146,15 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
     return table
 
 
-file_modes_json = json_fields(
-    """
-    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
-    remarks
-    """,
-    {"file": str, "modes": mode_json, "peak_picking": mode_json},
-)
-"""Function that returns the modes of one file, fitted and by peak picking."""
+def file_modes_json(file_modes: FileModes) -> JsonObject:
+    """Return the modes of one file, fitted and by peak picking."""
+    frf = file_modes.frf
+    return (
+        {"file": str(file_modes.path), "n_averages": frf and frf.n_averages, "usable_band_hz": frf and frf.usable_band}
+        | {"facts": file_modes.facts, "by_hand": file_modes.by_hand}
+        | {"modes": list(map(mode_json, file_modes.fitted)), "peak_picking": list(map(mode_json, file_modes.picked))}
+        | {"remarks": file_modes.remarks}
+    )
 
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Texts:

@@ -2,9 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from datetime import datetime
 from itertools import chain
-from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -22,7 +20,7 @@ from lobewatch.measurement.recording_questions import find_open_questions, quest
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
-from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, new_table, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
@@ -75,24 +73,21 @@ def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, a
         raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
 
 
-STATUS_FIELDS = json_fields("file known=stored_tap_id refused=rejection", {"file": str})
-QUESTION_FIELDS = json_fields("code text")
-PREVIEW_FIELDS = json_fields(
-    """
-    format=recording.title facts=recording.facts time=measurement.time tool=measurement.tool
-    direction=measurement.direction hits=tap.flags lines=tap.frf.frequency.size averages=tap.frf.n_averages
-    modes=measurement.modes followed=measurement.followed questions=measurement.remarks
-    """,
-    {"time": datetime.isoformat, "hits": attrgetter("words"), "modes": mode_json, "followed": mode_json},
-)
-
-
 def preview_json(preview: ReplayPreview) -> JsonObject:
     """Return what would become of one file."""
-    if preview.measurement is None or preview.tap is None or preview.recording is None:
-        return STATUS_FIELDS(preview)
-    asked = find_open_questions(preview.measurement.remarks)
-    return STATUS_FIELDS(preview) | PREVIEW_FIELDS(preview) | {"questions": list(map(QUESTION_FIELDS, asked))}
+    recording, tap, measurement = preview.recording, preview.tap, preview.measurement
+    status = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
+    if measurement is None or tap is None or recording is None:
+        return status
+    followed, asked = measurement.followed, find_open_questions(measurement.remarks)
+    return (
+        status
+        | {"format": recording.title, "facts": recording.facts, "time": measurement.time.isoformat()}
+        | {"tool": measurement.tool, "direction": measurement.direction, "hits": [flags.words for flags in tap.flags]}
+        | {"lines": tap.frf and tap.frf.frequency.size, "averages": tap.frf and tap.frf.n_averages}
+        | {"modes": list(map(mode_json, measurement.modes)), "followed": followed and mode_json(followed)}
+        | {"questions": [{"code": question.code, "text": question.text} for question in asked]}
+    )
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
@@ -264,8 +259,9 @@ class MachineRebuild(NamedTuple):
     """Remarks on the machine after the rebuild."""
 
 
-rebuild_json = json_fields("done=repairs tap_tests=n_taps remarks")
-"""Function that returns the outcome of rebuilding one machine."""
+def rebuild_json(rebuild: MachineRebuild) -> JsonObject:
+    """Return the outcome of rebuilding one machine."""
+    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": rebuild.remarks}
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:

@@ -15,7 +15,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
@@ -29,29 +29,30 @@ CHART_WIDTH, CHART_HEIGHT = 60, 12
 CHART_POINT, CHART_LINE = "o", "."
 
 
-ALARM_FIELDS = json_fields(
-    "kind=open_drop.change.kind since=drop_since size_percent=open_drop.change.size", {"since": datetime.isoformat}
-)
-RATE_FIELDS = json_fields("value low high")
-SERIES_FIELDS = json_fields(
-    """
-    tool direction points=self score=trend.detection.scores.-1 alarm=trend alarms=self light=self
-    fall_percent=drop.value fall_std_percent=drop.std preload_left=self rate_percent_per_month=trend.rate
-    """,
-    {"alarm": lambda trend: trend.open_drop and ALARM_FIELDS(trend), "rate_percent_per_month": RATE_FIELDS},
-)
-
-
 def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> JsonObject:
     """Return points, score, alarm, status and forecast; percents are 100 ln of the frequency over that of the first."""
-    status, points = outlook.status, series.trend.points if series.trend else ()
-    return SERIES_FIELDS(series) | {
+    status, trend = outlook.status, series.trend
+    points, rate = trend.points if trend else (), trend and trend.rate
+    return {
+        "tool": series.tool,
+        "direction": series.direction,
         "points": [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points],
+        "score": trend and trend.detection.scores[-1],
+        "alarm": trend and _drop_json(trend),
         "alarms": [alarm.to_row(status.time) for alarm in status.alarms],
         "light": status.status,
+        "fall_percent": series.drop.value,
+        "fall_std_percent": series.drop.std,
         "preload_left": preload,
+        "rate_percent_per_month": rate and rate._asdict(),
         "forecast": build_forecast_rows(outlook.programs, outlook.limits),
     }
+
+
+def _drop_json(trend: Trend) -> JsonObject | None:
+    drop, since = trend.open_drop, trend.drop_since
+    start = since and since.isoformat()
+    return drop and {"kind": drop.change.kind, "since": start, "size_percent": drop.change.size}
 
 
 def trend_csv(series: SeriesStatus) -> str:

@@ -3,7 +3,6 @@
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,9 @@ from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
-from lobewatch.show.programs.materials import power_text
+from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.programs.verdicts import factor_text
-from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
 FAULT_TEXTS: Mapping[str, str] = {
@@ -158,24 +157,25 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
     return texts
 
 
-recorded_cut_json = json_fields(
-    """
-    word=detected.verdict reason=detected.reason chatter_frequency_hz=detected.chatter.frequency
-    chatter_frequency_hz_std=detected.chatter.error elsewhere_rpm=detected.distant_rpm
-    unexplained_tone_hz=detected.tone sensor speed_rpm=detected.speed_rpm
-    speed_rpm_std=detected.spindle_speed.error*60 commanded_rpm=setting.speed_rpm measured_rpm=detected.measured_rpm
-    depth_mm=setting.depth*1e3 tooth_frequency_hz=tooth_passing_frequency energy_ratio=detected.energy_ratio
-    lobe=lobe_number side_bands_hz=detected power_kw=power.watts/1e3
-    tangential_by_power_n_per_mm2=power.tangential/1e6 predicted=predicted.stable
-    predicted_frequency_hz=predicted.frequency predicted_apart_hz=frequency_difference begin_s=detected.parts.begin
-    end_s=detected.parts.end steady_begin_s=detected.parts.steady_begin steady_end_s=detected.parts.steady_end
-    """,
-    {
-        "side_bands_hz": lambda heard: sorted(heard.chatter.peaks.frequency.tolist()) if heard.chatter else [],
-        "predicted": lambda is_stable: "stable" if is_stable else "chatter",
-    },
-)
-"""Function that returns a recorded cut with all that was detected in it."""
+def recorded_cut_json(comparison: CutComparison) -> JsonObject:
+    """Return a recorded cut with all that was detected in it."""
+    heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
+    parts = ("begin", "end", "steady_begin", "steady_end")
+    return (
+        {"word": heard.verdict, "reason": heard.reason, "chatter_frequency_hz": chatter and chatter.frequency}
+        | {"chatter_frequency_hz_std": chatter and chatter.error, "elsewhere_rpm": heard.distant_rpm}
+        | {"unexplained_tone_hz": heard.tone, "sensor": comparison.sensor, "speed_rpm": heard.speed_rpm}
+        | {"speed_rpm_std": heard.spindle_speed and heard.spindle_speed.error * 60}
+        | {"commanded_rpm": comparison.setting.speed_rpm, "measured_rpm": heard.measured_rpm}
+        | {"depth_mm": comparison.setting.depth * 1e3, "tooth_frequency_hz": comparison.tooth_passing_frequency}
+        | {"energy_ratio": heard.energy_ratio, "lobe": comparison.lobe_number}
+        | {"side_bands_hz": sorted(chatter.peaks.frequency.tolist()) if chatter else []}
+        | power_json(comparison.power)
+        | {"predicted": expected and ("stable" if expected.stable else "chatter")}
+        | {"predicted_frequency_hz": expected and expected.frequency}
+        | {"predicted_apart_hz": comparison.frequency_difference}
+        | {f"{part}_s": getattr(heard.parts, part) for part in parts}
+    )
 
 
 def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:
@@ -194,28 +194,9 @@ def _known_mm(depth: float) -> float | None:
     return _round_to_mm(depth) if depth and math.isfinite(depth) else None
 
 
-speed_pocket_json = json_fields(
-    "speed_rpm window_rpm depth_mm=self over_lowest_limit=gain", {"depth_mm": lambda _: None}
-)
-"""Function that returns one pocket of unknown depth."""
-TRIED_FIELDS = json_fields(
-    "cut_at_rpm=speed_rpm cuts heard_stable_mm=stable_depth heard_chatter_mm=chatter_depth",
-    {"cuts": attrgetter("id"), "heard_stable_mm": _known_mm, "heard_chatter_mm": _known_mm},
-)
-SUGGESTED_CUT_FIELDS = json_fields(
-    """
-    speed_rpm depth_mm=depth chance_of_chatter=chatter_probability expected_gain=gain settles=most_informative repeats
-    """,
-    {"depth_mm": lambda depth: round(1e3 * depth, 6), "repeats": lambda name: name or None},
-)
-INTERVAL_FIELDS = json_fields("mean low high std")
-LEARNED_FIELDS = json_fields(
-    """
-    cuts=accepted_cuts chatter_frequencies=posterior.n_frequencies frequency_learnt=posterior.n_frequencies
-    effective_sample_size=posterior.effective_size
-    """,
-    {"cuts": attrgetter("id"), "frequency_learnt": bool},
-)
+def speed_pocket_json(pocket: SpeedPocket) -> JsonObject:
+    """Return one pocket of unknown depth."""
+    return {**pick(pocket, "speed_rpm", "window_rpm"), "depth_mm": None, "over_lowest_limit": pocket.gain}
 
 
 def speed_pocket_table(pockets: Sequence[SpeedPocket]) -> Table:
@@ -245,7 +226,12 @@ def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], firs
     return {
         "program": program.name,
         "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
-        "pockets": [speed_pocket_json(tried.pocket) | TRIED_FIELDS(tried) for tried in depths],
+        "pockets": [
+            speed_pocket_json(tried.pocket)
+            | {"cut_at_rpm": tried.speed_rpm, "cuts": [cut.id for cut in tried.cuts]}
+            | {"heard_stable_mm": _known_mm(tried.stable_depth), "heard_chatter_mm": _known_mm(tried.chatter_depth)}
+            for tried in depths
+        ],
     }
 
 
@@ -281,10 +267,15 @@ def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, flo
 
 def suggestion_json(next_cut: NextCut) -> JsonObject:
     """Return the next test cut, and what it rests on."""
-    learning, best = next_cut.learning, _best_stable_cut(next_cut.learning)
+    learning, best, cut = next_cut.learning, _best_stable_cut(next_cut.learning), next_cut.suggestion
+    suggested = cut and (
+        {"speed_rpm": cut.speed_rpm, "depth_mm": round(1e3 * cut.depth, 6)}
+        | {"chance_of_chatter": cut.chatter_probability, "expected_gain": cut.gain, "settles": cut.most_informative}
+        | {"repeats": cut.repeats or None}
+    )
     return {
         "program": learning.program.name,
-        "suggested": next_cut.suggestion and SUGGESTED_CUT_FIELDS(next_cut.suggestion),
+        "suggested": suggested,
         "cuts_made": len(learning.own_cuts),
         "cuts_left": next_cut.cuts_left,
         "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
@@ -337,9 +328,16 @@ def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
 
 def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
-    before, after = learning.prior.intervals, learning.posterior.intervals
-    factors = {name: INTERVAL_FIELDS(after[name]) | {"before": INTERVAL_FIELDS(before[name])} for name in after}
-    return LEARNED_FIELDS(learning) | {"factors": factors}
+    before, posterior = learning.prior.intervals, learning.posterior
+    return {
+        "cuts": [cut.id for cut in learning.accepted_cuts],
+        "chatter_frequencies": posterior.n_frequencies,
+        "frequency_learnt": bool(posterior.n_frequencies),
+        "effective_sample_size": posterior.effective_size,
+        "factors": {
+            name: {**after._asdict(), "before": before[name]._asdict()} for name, after in posterior.intervals.items()
+        },
+    }
 
 
 def learned_texts(learning: LearningResult) -> Texts:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lobewatch.paper import Comparison, PaperStudy
-from lobewatch.show.terminal.output import JsonObject, json_fields
+from lobewatch.show.terminal.output import JsonObject, pick
 
 PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
@@ -15,16 +15,16 @@ PAPER_DIGITS = 7
 """Largest number of digits of a number of the paper."""
 
 
-NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference reason")
-CLAIM_FIELDS = json_fields("claim=text verdict evidence")
-
-
 def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
     """Return every number and every claim of the paper, and the page that was written."""
-    rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {
-        "numbers": [{"section": title, **NUMBER_FIELDS(row)} for title, row in rows],
-        "claims": list(map(CLAIM_FIELDS, study.claims)),
+        "numbers": [
+            {"section": section.title, **pick(row, "quantity", "where", "unit"), "paper": row.printed}
+            | pick(row, "ours", "difference", "reason")
+            for section in study.sections
+            for row in section.comparisons
+        ],
+        "claims": [{"claim": claim.text, **pick(claim, "verdict", "evidence")} for claim in study.claims],
         "page": page and str(page),
     }
 

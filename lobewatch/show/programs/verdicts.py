@@ -12,7 +12,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
-from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 from lobewatch.verdicts import SpindleAtSpeed, Stability, Verdict
@@ -169,22 +169,22 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
 }
 """Style of each verdict, the same everywhere."""
 VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
-verdict_json = json_fields(
-    """
-    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=self
-    stable=is_stable verdict=stability measured=is_measured limit_mm=limit*1e3 limit_low_mm=limit_low*1e3
-    limit_high_mm=limit_high*1e3 depth_margin chance_turning=chatter_risk decided_by=decisive_cause cuts=n_cuts
-    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3
-    doubt=samples.uncertainty method method_detail=detail
-    """,
-    {
-        "tap_id": lambda verdict: verdict.assembly.tap_id if verdict.assembly else "",
-        "decided_by": lambda cause: cause or None,
-        "worst_feed_deg": math.degrees,
-        "doubt": uncertainty_json,
-    },
-)
-"""Function that returns one verdict as a JSON object; unknown numbers are NaN or None."""
+
+
+def verdict_json(verdict: Verdict) -> JsonObject:
+    """Return one verdict as a JSON object; unknown numbers are NaN or None."""
+    program, samples, assembly = verdict.program, verdict.samples, verdict.assembly
+    return (
+        {"name": program.name, "speed_rpm": program.speed_rpm, "depth_mm": program.depth_mm, "feed": program.feed}
+        | {"tap_id": assembly.tap_id if assembly else "", "stable": verdict.is_stable, "verdict": verdict.stability}
+        | {"measured": verdict.is_measured, "limit_mm": verdict.limit * 1e3, "limit_low_mm": verdict.limit_low * 1e3}
+        | {"limit_high_mm": verdict.limit_high * 1e3, "depth_margin": verdict.depth_margin}
+        | {"chance_turning": verdict.chatter_risk, "decided_by": verdict.decisive_cause or None}
+        | {"cuts": verdict.n_cuts, "chatter_frequency_hz": verdict.chatter_frequency, "kind": verdict.kind}
+        | {"worst_feed_deg": math.degrees(verdict.feed_angle), "drive_limit_mm": verdict.drive_limit * 1e3}
+        | {"doubt": None if samples is None else uncertainty_json(samples.uncertainty)}
+        | {"method": verdict.method, "method_detail": verdict.detail}
+    )
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:

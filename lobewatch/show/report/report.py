@@ -25,7 +25,7 @@ from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import FREQUENCY_VALUE, ReportData, collect_report_data, make_value_trend
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMaker
-from lobewatch.show.terminal.output import JsonObject, json_fields
+from lobewatch.show.terminal.output import JsonObject
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.show.trend import change_text, no_dates_text, rate_text, reach_text, trend_text
 from lobewatch.verdicts import Stability
@@ -177,19 +177,20 @@ def render_report(
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
 
 
-REPORT_FIELDS = json_fields("""
-    name=machine.machine.name tool=last.tool direction=last.direction last=last.time label=machine.spindle.label
-    tap_id=newest.id software=analysis.history.software
-""")
-
-
 def _report_content(
     analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
 ) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
     groups, tap = [make(data) for make in sections], data.newest
-    return REPORT_FIELDS(data) | {
+    return {
+        "name": data.machine.machine.name,
+        "tool": data.last.tool,
+        "direction": data.last.direction,
+        "last": data.last.time,
+        "label": data.machine.spindle and data.machine.spindle.label,
+        "tap_id": tap.id,
+        "software": analysis.history.software,
         "groups": groups,
         "has_plots": any(section.has_plot for group in groups for section in group),
         "numbering": count(1),

@@ -27,7 +27,7 @@ from lobewatch.show.report.section import (
     tabulate_response,
 )
 from lobewatch.show.report.tables import make_events, make_provenance, make_series, make_tap_tests, make_test_cuts
-from lobewatch.show.terminal.output import count_noun, json_fields
+from lobewatch.show.terminal.output import count_noun, pick
 from lobewatch.show.trend import FORECAST_ASSUMPTIONS, forecast_date_rows, no_dates_text, trend_sentence
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
@@ -146,13 +146,10 @@ def make_programs(data: ReportData) -> list[Section]:
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
 
 
-PROGRAM_FIELDS = json_fields("name speed_rpm depth_mm")
-
-
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
-    return PROGRAM_FIELDS(verdict.program) | {
+    return pick(verdict.program, "name", "speed_rpm", "depth_mm") | {
         "limit": verdicts.limit_text(verdict),
         "band": verdicts.band_text(verdict).replace("..", " to "),
         "margin": verdicts.margin_text(verdict),

@@ -22,35 +22,11 @@ OPTION_NAMES: Mapping[str, str] = {
     "calibrate_joints.tools": "--tool",
     "choose_cut.cut": "--cut",
     "choose_cut.program": "--program",
-    "Circumstances.direction": "--direction",
-    "Circumstances.tool": "--tool",
     "compare_lobes.cut": "--cut",
     "compute_lobe_chart.method": "--method",
-    "Conditions.hours": "--hours",
-    "Conditions.reclamped": "--reclamped",
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
     "CutEntry.has_chatter": "--chatter",
-    "Description.averages": "--averages",
-    "Description.columns": "--columns",
-    "Description.date": "--date",
-    "Description.date_pattern": "--date-pattern",
-    "Description.decimal": "--decimal",
-    "Description.direction": "--direction",
-    "Description.force": "--force",
-    "Description.force_unit": "--force-unit",
-    "Description.full_scale": "--full-scale",
-    "Description.pulses": "--pulses",
-    "Description.quantity": "--quantity",
-    "Description.rate": "--rate",
-    "Description.response": "--response",
-    "Description.sensitivity": "--sensitivity",
-    "Description.sensor": "--sensor",
-    "Description.skip": "--skip",
-    "Description.spacing": "--spacing",
-    "Description.start": "--start",
-    "Description.tacho": "--tacho",
-    "Description.unit": "--unit",
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
     "EmulationSetup.tcp": "--tcp",
@@ -79,9 +55,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "make_machine_folder": "lobewatch init",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "modal.synthesize_frf": "lobewatch modes --figure",
-    "ModeEdits.add": "--add",
-    "ModeEdits.drop": "--drop",
-    "ModeEdits.fix": "--fix",
     "MountingVariation.bad_share": "--bad-clampings",
     "MountingVariation.scatter": "--scatter",
     "MountingVariation.temperature_swing": "--temperature",
@@ -93,14 +66,10 @@ OPTION_NAMES: Mapping[str, str] = {
     "pocket_depth.find_pocket_depths": "lobewatch suggest",
     "program_learning.find_next_cut": "lobewatch suggest",
     "ProgramTable.depth_mm": "--depth",
-    "ProgramTable.direction": "--direction",
     "ProgramTable.feed_per_tooth_mm": "--feed-per-tooth",
-    "ProgramTable.material": "--material",
     "ProgramTable.name": "--save",
     "ProgramTable.radial_depth_mm": "--radial",
     "ProgramTable.speed_rpm": "--speed",
-    "ProgramTable.teeth": "--teeth",
-    "ProgramTable.tool": "--tool",
     "ProgramTable.tool_diameter_mm": "--diameter",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
     "record_cut.time_limit": "--seconds",
@@ -109,25 +78,24 @@ OPTION_NAMES: Mapping[str, str] = {
     "screen.ScreenServer": "--screen",
     "ScreenServer.listen": "--listen",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
-    "SeriesStatus.direction": "--direction",
-    "SeriesStatus.tool": "--tool",
     "session.TapSession": "lobewatch tap",
     "store_recordings.keep_going": "--keep-going",
     "TapSession.run": "lobewatch tap",
     "Window.hit_at": "--hit-at",
     "Window.start": "--window-start",
     "Window.time_constant": "--window",
-    "Workers.jobs": "--jobs",
-    "Workers.scheduler": "--scheduler",
 }
 """Option or command for each field or function that a message names."""
+OPTION_OWNERS = ("Circumstances", "Conditions", "Description", "ModeEdits", "ProgramTable", "SeriesStatus", "Workers")
+"""Owners of fields that have the name of their option, such as date_pattern, unless OPTION_NAMES has another."""
 
-_NAMES = re.compile(rf"\b(?:{'|'.join(map(re.escape, sorted(OPTION_NAMES, key=len, reverse=True)))})\b")
+_LISTED = "|".join(map(re.escape, sorted(OPTION_NAMES, key=len, reverse=True)))
+_NAMES = re.compile(rf"\b(?:{_LISTED}|(?:{'|'.join(OPTION_OWNERS)})\.(\w+))\b")
 
 
 def with_option_names(text: str) -> str:
     """Replace the library fields and functions that a message names by their options and commands."""
-    return _NAMES.sub(lambda match: OPTION_NAMES[match[0]], text)
+    return _NAMES.sub(lambda match: OPTION_NAMES.get(match[0]) or f"--{match[1].replace('_', '-')}", text)
 
 
 def with_option_names_inside(value: Any) -> Any:

@@ -30,7 +30,6 @@ from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.show.trend import change_text, no_dates_text, rate_text, reach_text, trend_text
 from lobewatch.verdicts import Stability
 
-UNKNOWN_FATE = ProgramForecast(NO_FORECAST, NO_FORECAST)
 MAX_SUMMARY_REASONS = 3
 """Largest number of reasons and of series in the summary."""
 TABLE_REASON_CODES = (
@@ -93,7 +92,7 @@ def _series_content(series: SeriesStatus) -> dict[str, str]:
 
 def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]:
     name, word, outlook = program.verdict.program.name, program.verdict.stability, data.outlook
-    fate, now = outlook.programs.get(name, UNKNOWN_FATE), outlook.status.time
+    fate, now = outlook.programs.get(name, ProgramForecast(NO_FORECAST, NO_FORECAST)), outlook.status.time
     until = {
         Stability.STABLE: f"doubtful {reach_text(fate.doubtful, now)}",
         Stability.DOUBTFUL: f"not stable {reach_text(fate.not_stable, now)}",
@@ -144,8 +143,7 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "Receptance at the tool tip", render_svg(figure)
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""
-        caption = f"Depth (mm), {diagram.cut}: chatter above the line{then}"
-        yield caption, render_svg(diagram.figure(is_small=True))
+        yield f"Depth (mm), {diagram.cut}: chatter above the line{then}", render_svg(diagram.figure(is_small=True))
 
 
 def write_report(
@@ -182,25 +180,14 @@ def _report_content(
 ) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
-    groups, tap = [make(data) for make in sections], data.newest
+    groups = [make(data) for make in sections]
     return {
-        "name": data.machine.machine.name,
-        "tool": data.last.tool,
-        "direction": data.last.direction,
-        "last": data.last.time,
-        "label": data.machine.spindle and data.machine.spindle.label,
-        "tap_id": tap.id,
-        "software": analysis.history.software,
+        "data": data,
         "groups": groups,
         "has_plots": any(section.has_plot for group in groups for section in group),
         "numbering": count(1),
-        "first": data.rows[0].time,
-        "n_taps": len(data.rows),
-        "as_of": data.outlook.status.time.astimezone(),
         "first_screen": make_summary(data),
-        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(data.last.conditions)],
-        "good": len(tap.accepted),
-        "hits": len(tap.hits),
+        "conditions": [*filter(None, [data.newest.circumstances.operator]), *condition_texts(data.last.conditions)],
     }
 
 
@@ -219,8 +206,7 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
     """Return the HTML of a fleet, a line for each machine, in the order of the rows."""
     lights = [row["light"] for row in rows]
     counts = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
-    cells = [[row[column] for column in FLEET_COLUMNS] for row in rows]
-    numbers = NumberTable(FLEET_COLUMNS, cells)
+    numbers = NumberTable(FLEET_COLUMNS, [[row[column] for column in FLEET_COLUMNS] for row in rows])
     machines = [_machine_content(row) for row in rows]
     return render_page("fleet.html", name=name, now=now, counts=counts, machines=machines, numbers=numbers)
 

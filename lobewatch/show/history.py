@@ -95,8 +95,6 @@ HISTORY_HEADINGS = (
     ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
 )
-NUMBER_COLUMNS = 4, 5, 6
-"""Columns that are aligned to the right."""
 MIN_SHORT_NAME = 6
 """Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
 CONDITION_NAMES = tuple(field.name for field in fields(Conditions))
@@ -153,7 +151,7 @@ def history_lines(logbook: Logbook) -> list[str]:
     names: dict[str, str] = {entry["id"]: entry.get("name", "") for entry in entries}
     names |= zip(taps, shorten_ids(taps), strict=True)
     cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
-    lines = align_columns([*HISTORY_HEADINGS, *cells], NUMBER_COLUMNS)
+    lines = align_columns([*HISTORY_HEADINGS, *cells], numbers=(4, 5, 6))
     texts = ["", "", *map(_note_text, entries)]
     return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
 
@@ -163,16 +161,14 @@ def shorten_ids(ids: Sequence[str]) -> list[str]:
 
     Commands accept it instead of the identity.
     """
-    names, size = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
-    left = [name for name in names if len(name) > size]
+    names, n = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
+    left = [name for name in names if len(name) > n]
     while left:
-        ends = {name[-size:] for name in left}
-        parts = Counter(
-            part for name in ids for i in range(len(name) - size + 1) if (part := name[i : i + size]) in ends
-        )
-        names |= {name: name[-size:] for name in left if parts[name[-size:]] == 1}
-        size += 1
-        left = [name for name in left if names[name] == name and len(name) > size]
+        ends = {name[-n:] for name in left}
+        parts = Counter(part for name in ids for i in range(len(name) - n + 1) if (part := name[i : i + n]) in ends)
+        names |= {name: name[-n:] for name in left if parts[name[-n:]] == 1}
+        n += 1
+        left = [name for name in left if names[name] == name and len(name) > n]
     return [names[name] for name in ids]
 
 
@@ -192,12 +188,11 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
         kind = "new baseline" if event["new_baseline"] else "event"
         entries.append({**event, "kind": kind, "name": event["id"]})
     for cut in history["cuts"]:
-        shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
-        kind = "excluded" if cut["excluded"] else "cut"
-        entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
+        shown = {"kind": "excluded" if cut["excluded"] else "cut", "reason": cut["excluded"], "conditions": {}}
+        entries.append(shown | {"name": cut["id"], **{name: cut[name] for name in ("id", "time", "tool", "text")}})
     for ack in logbook.files.contents.acknowledgements:
-        text, time = f"{ack.alarm_id}: {ack}", _utc_text(ack.time)
-        entries.append({"kind": "ack", "id": ack.alarm_id, "time": time, "text": text})
+        told = {"kind": "ack", "id": ack.alarm_id, "time": _utc_text(ack.time)}
+        entries.append(told | {"text": f"{ack.alarm_id}: {ack}"})
     return sorted(entries, key=lambda entry: entry["time"])
 
 

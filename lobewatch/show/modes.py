@@ -12,8 +12,6 @@ from lobewatch.measurement import FileModes
 from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
-TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
-"""Order in which modes are shown."""
 TRUST_SYMBOLS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
 """Mark after a mode."""
 MIN_SHOWN_PHASE = 1.0
@@ -52,7 +50,7 @@ def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
     def is_kept(mode: Mode) -> bool:
         return rejected or assess_trust(mode) is not Trust.REJECTED or any(r.code == "by-hand" for r in mode.remarks)
 
-    return sorted(filter(is_kept, modes), key=lambda mode: (TRUST_ORDER.index(assess_trust(mode)), mode.frequency))
+    return sorted(filter(is_kept, modes), key=lambda mode: ([*Trust].index(assess_trust(mode)), mode.frequency))
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
@@ -114,7 +112,7 @@ def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> li
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
     """Return how many modes are trusted, doubtful and rejected."""
     count = Counter(assess_trust(mode) for mode in modes)
-    counts = ", ".join(f"{count[trust]} {trust}" for trust in TRUST_ORDER)
+    counts = ", ".join(f"{count[trust]} {trust}" for trust in Trust)
     looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
     hints = [] if looked else ["--beside looks for them in other measurements"]
     hints = hints if everything or not modes else ["--all shows each, with every remark", *hints]
@@ -125,7 +123,7 @@ def trust_reasons(modes: Sequence[Mode]) -> list[str]:
     """Return which modes are no driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
-    for trust in TRUST_ORDER[1:]:
+    for trust in (Trust.DOUBTFUL, Trust.REJECTED):
         alike = (mode for mode in modes if assess_trust(mode) is trust)
         texts = [f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})" for mode in alike]
         lines += [f"{TRUST_SYMBOLS[trust]} {trust}: {', '.join(texts)}"] if texts else []

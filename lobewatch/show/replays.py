@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from acquisition import DataError, Fact, Remark
@@ -29,26 +29,19 @@ REBUILD_PROGRESS_STEP = 10
 """Number of tap tests between two progress lines of a rebuild."""
 
 
-class ReplayProgress:
+class ReplayProgress(Progress):
     """Progress bar of each step of a replay, shown on a terminal only."""
 
     def __init__(self) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bars = Progress(*columns, console=notes, transient=True, disable=not notes.is_terminal)
-        self._tasks: dict[str, int] = {}
-
-    def __enter__(self) -> Self:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bars.stop()
+        super().__init__(*columns, console=notes, transient=True, disable=not notes.is_terminal)
+        self._step_ids: dict[str, TaskID] = {}
 
     def __call__(self, step: str, done: int, of: int) -> None:
         """Update the bar of a step: so many files are done, of so many."""
-        if step not in self._tasks:
-            self._tasks[step] = self._bars.add_task(REPLAY_STEP_NAMES[step], total=of)
-        self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
+        if step not in self._step_ids:
+            self._step_ids[step] = self.add_task(REPLAY_STEP_NAMES[step], total=of)
+        self.update(self._step_ids[step], completed=done, total=of)
 
 
 def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
@@ -177,15 +170,9 @@ MAX_KNOWN_LISTED = 3
 
 
 def emit_replay(
-    outcome: ReplayOutcome,
-    logbook: Logbook,
-    n_files: int,
-    passed: Sequence[Path],
-    accepted: Sequence[str],
-    *,
-    as_json: bool,
+    outcome: ReplayOutcome, logbook: Logbook, n_files: int, passed: Sequence[Path], codes: Sequence[str], as_json: bool
 ) -> None:
-    """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
+    """Print what has become of files; passed: other files of the folders; codes: of questions answered."""
     known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
     if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
         known = [f"{len(known)} of {n_files} files are stored already"]
@@ -193,9 +180,9 @@ def emit_replay(
     for line in known:
         notes.print(line, markup=False)
     if as_json:
-        emit(replay_json(outcome, logbook) | {"accepted": accepted, "questions": logbook.questions}, as_json)
+        emit(replay_json(outcome, logbook) | {"accepted": codes, "questions": logbook.questions}, as_json)
         return
-    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in codes)]
     emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 

@@ -46,11 +46,8 @@ def _port_json(scanned: ScannedPort) -> JsonObject:
         **pick(answer.identity, "model", "serial", "firmware"),
         "tried_on_hardware": answer.is_hardware_tested,
     }
-    return {"device": port.device, "usb": _usb_id(port), "serial_number": port.serial_number} | {
-        "description": port.description,
-        "answer": identified,
-        "problem": scanned.problem or None,
-    }
+    named = {"device": port.device, "usb": _usb_id(port), "serial_number": port.serial_number}
+    return named | {"description": port.description, "answer": identified, "problem": scanned.problem or None}
 
 
 def _answer_text(scanned: ScannedPort) -> str:

@@ -22,11 +22,8 @@ FORECAST_ASSUMPTIONS = (
     " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
 """Note below every table of forecast dates."""
-UNKNOWN_NOW_TEXT = "unknown now, see check"
-"""Text instead of the dates of a program without a verdict."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
-CHART_POINT, CHART_LINE = "o", "."
 
 
 def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> JsonObject:
@@ -83,7 +80,7 @@ def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     now, rows = outlook.status.time, list[tuple[str, str, str]]()
     for name, fate in outlook.programs.items():
         dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
-        rows.append((name, *((UNKNOWN_NOW_TEXT,) * 2 if name in outlook.unknown_programs else dates)))
+        rows.append((name, *(("unknown now, see check",) * 2 if name in outlook.unknown_programs else dates)))
     return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
 
 
@@ -201,9 +198,9 @@ def chart_lines(trend: Trend) -> list[str]:
     canvas = np.full((rows, CHART_WIDTH), " ")
     if trend.forecast is not None:
         line = np.interp(np.linspace(dates[0], dates[-1], CHART_WIDTH), dates, trend.forecast.fitted - trend.start)
-        canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = CHART_LINE
+        canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = "."
     columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
-    canvas[_canvas_indices(percent, high, low, rows), columns] = CHART_POINT
+    canvas[_canvas_indices(percent, high, low, rows), columns] = "o"
     ticks = [f"{value:+8.2f} %" for value in np.linspace(high, low, rows).tolist()]
     labels = [tick if row % 4 == 0 or row == rows - 1 else " " * 10 for row, tick in enumerate(ticks)]
     drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]

@@ -49,8 +49,6 @@ MICROPHONE_NOTE = (
     "from one of the cut, and it does not tell how far the tool moves"
 )
 """Limits of a recording by microphone."""
-MIN_RATE_FACTOR = 2 * MIN_TOOTH_HARMONICS
-"""Sample rate over tooth-passing frequency that holds enough harmonics of tooth passing."""
 
 
 NEXT_STEP_TEXTS: Mapping[str, str] = {
@@ -83,7 +81,7 @@ def _fault_text(comparison: CutComparison) -> str:
         case "tacho-contradicts":
             return f"{text}: {_speed_conflict_text(comparison)}"
         case "slow-sampling":
-            return f"{text}: {MIN_RATE_FACTOR * comparison.tooth_passing_frequency:.0f} Hz or more"
+            return f"{text}: {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
             distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
@@ -160,7 +158,7 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
 def recorded_cut_json(comparison: CutComparison) -> JsonObject:
     """Return a recorded cut with all that was detected in it."""
     heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
-    parts = ("begin", "end", "steady_begin", "steady_end")
+    times = pick(heard.parts, "begin", "end", "steady_begin", "steady_end")
     return (
         {"word": heard.verdict, "reason": heard.reason, "chatter_frequency_hz": chatter and chatter.frequency}
         | {"chatter_frequency_hz_std": chatter and chatter.error, "elsewhere_rpm": heard.distant_rpm}
@@ -174,7 +172,7 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
         | {"predicted": expected and ("stable" if expected.stable else "chatter")}
         | {"predicted_frequency_hz": expected and expected.frequency}
         | {"predicted_apart_hz": comparison.frequency_difference}
-        | {f"{part}_s": getattr(heard.parts, part) for part in parts}
+        | {f"{name}_s": time for name, time in times.items()}
     )
 
 
@@ -220,11 +218,11 @@ def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Seque
     return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
 
 
-def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
+def tried_depths_json(table: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
     """Return the next test cut, and the depths that were tried in each pocket; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     return {
-        "program": program.name,
+        "program": table.name,
         "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
         "pockets": [
             speed_pocket_json(tried.pocket)
@@ -235,16 +233,14 @@ def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], firs
     }
 
 
-def tried_depths_lines(
-    program: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path
-) -> Iterator[str]:
+def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path) -> Iterator[str]:
     """Return the next test cut, and the depths that were stable; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     if following is not None:
         speed, depth = following
         number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the pocket nearest to it"
-        yield f"{program.name}: {number}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm"
-        yield _observe_text(folder, program.name, speed, f"{_round_to_mm(depth):g}")
+        yield f"{table.name}: {number}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm"
+        yield _observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
     stable = [tried for tried in depths if tried.stable_depth]
     for tried in stable:
         chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
@@ -315,8 +311,9 @@ def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
 def _no_suggestion_text(next_cut: NextCut) -> str:
     if not next_cut.cuts_left:
         return f"{len(next_cut.learning.own_cuts)} test cuts are made; a larger --cuts asks for more"
-    reason = f"no test cut: {next_cut.cut_range.text}; choose another tool"
-    return reason if next_cut.cut_range.is_empty else "no test cut is worth making: nothing more is to be gained"
+    if next_cut.cut_range.is_empty:
+        return f"no test cut: {next_cut.cut_range.text}; choose another tool"
+    return "no test cut is worth making: nothing more is to be gained"
 
 
 def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:

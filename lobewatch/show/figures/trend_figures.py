@@ -58,9 +58,7 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
     return TrendCurve(np.append(past, forecast.dates[near]), line, forecast.dates[near], low, high)
 
 
-def plot_frf(
-    earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
-) -> Figure:
+def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None) -> Figure:
     """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test.
 
     size: of a smaller figure (inches) that shows the receptance only.
@@ -68,7 +66,7 @@ def plot_frf(
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
     tests = [(now, "now", Paint.NEWEST, "-")]
-    tests += [] if earliest is None else [(earliest, "first", Paint.FIRST, "--")]
+    tests += [] if first is None else [(first, "first", Paint.FIRST, "--")]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -81,7 +79,7 @@ def plot_frf(
     if rows == 3:
         axes[2].set(ylabel="coherence", ylim=(min(0.9, axes[2].get_ylim()[0]), 1.005))
     axes[-1].set(xlabel="frequency (Hz)", xlim=band)
-    if earliest is not None:
+    if first is not None:
         axes[0].legend(loc="upper right", ncols=2)
     return figure
 

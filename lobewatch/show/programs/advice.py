@@ -49,11 +49,6 @@ class ProgramAdvice:
         """Remarks that the advice lines do not contain."""
         return tuple(remark for remark in self.remarks if remark.code not in LINE_REMARK_CODES)
 
-    @property
-    def is_no_longer_stable(self) -> bool:
-        """True if the program chatters now and did not at first."""
-        return self.verdict.is_stable is False and self.first_verdict is not None and bool(self.first_verdict.is_stable)
-
 
 def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvice:
     """Return one program with its verdict and advice."""
@@ -146,7 +141,7 @@ def _chatter_text(program: ProgramAdvice) -> str:
     verdict = program.verdict
     word = "period-two chatter" if verdict.kind == "flip" else "chatter"
     where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    was = "stable at first, no longer: " if program.is_no_longer_stable else ""
+    was = "stable at first, no longer: " if program.first_verdict and program.first_verdict.is_stable else ""
     return f"{was}{word}{where}{worst_feed_text(verdict)}"
 
 

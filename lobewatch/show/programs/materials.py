@@ -19,8 +19,7 @@ def material_json(material: CuttingCoefficients) -> JsonObject:
     """Return one material; a range is [lowest, highest], or None where no spread is published."""
     spread = material.tangential_range
     forces = [
-        {"kc1_1_n_per_mm2": force.at_1_mm / 1e6, "mc": force.exponent, "source": force.source}
-        for force in material.specific_forces
+        {"kc1_1_n_per_mm2": kc.at_1_mm / 1e6, "mc": kc.exponent, "source": kc.source} for kc in material.specific_forces
     ]
     return (
         {"name": material.material, **pick(material, "iso_group", "equivalents")}

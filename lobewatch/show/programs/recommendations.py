@@ -118,10 +118,6 @@ def _other_remarks(answer: Recommendation) -> list[Remark]:
     return [remark for remark in answer.remarks if remark.code not in LINE_REMARK_CODES]
 
 
-HIDDEN_PITCH_CODES = ("doubt-decides",)
-"""Codes of remarks on the verdict, which this output does not show."""
-
-
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
     """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
     proposed, verdict = proposal.proposed, proposal.verdict
@@ -159,7 +155,7 @@ def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: 
 
 
 def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[Remark]:
-    return [*remarks, *(remark for remark in proposal.verdict.remarks if remark.code not in HIDDEN_PITCH_CODES)]
+    return [*remarks, *(remark for remark in proposal.verdict.remarks if remark.code != "doubt-decides")]
 
 
 def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:

@@ -24,7 +24,7 @@ from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import FREQUENCY_VALUE, ReportData, collect_report_data, make_value_trend
 from lobewatch.show.report.section import NumberTable
-from lobewatch.show.report.sections import SECTIONS, SectionMaker
+from lobewatch.show.report.sections import SECTIONS, SectionMakers
 from lobewatch.show.terminal.output import JsonObject
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.show.trend import change_text, no_dates_text, rate_text, reach_text, trend_text
@@ -147,11 +147,7 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
 
 
 def write_report(
-    logbook: Logbook,
-    path: Path | None = None,
-    tool: str = "",
-    direction: str = "",
-    sections: Sequence[SectionMaker] = SECTIONS,
+    logbook: Logbook, path: Path | None = None, tool: str = "", direction: str = "", sections: SectionMakers = SECTIONS
 ) -> Path:
     """Write the report of one series, that of the newest test where none is named; DataError without a tap test.
 
@@ -165,18 +161,14 @@ def write_report(
 
 
 def render_report(
-    logbook: Logbook,
-    tool: str,
-    direction: str,
-    now: datetime | None = None,
-    sections: Sequence[SectionMaker] = SECTIONS,
+    logbook: Logbook, tool: str, direction: str, now: datetime | None = None, sections: SectionMakers = SECTIONS
 ) -> str:
     """Return the HTML of one series; raise ValueError where it has no tap test. now: None for the current time."""
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
 
 
 def _report_content(
-    analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
+    analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: SectionMakers
 ) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
@@ -247,6 +239,5 @@ def spark_points(points: Sequence[tuple[float, float]]) -> str:
     (first, *_, last), percents = zip(*points, strict=True)
     top, span, reach = max(percents), last - first or 1.0, max(max(percents) - min(percents), 1.0)
     return " ".join(
-        f"{SPARK_WIDTH * (day - first) / span:.1f},{SPARK_HEIGHT * (top - percent) / reach:.1f}"
-        for day, percent in points
+        f"{SPARK_WIDTH * (day - first) / span:.1f},{SPARK_HEIGHT * (top - drop) / reach:.1f}" for day, drop in points
     )

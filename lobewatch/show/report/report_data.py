@@ -72,25 +72,6 @@ class LobeDiagram(NamedTuple):
         return edges
 
 
-def make_lobe_diagram(analysis: Analysis, assembly: Assembly, programs: Sequence[ProgramAdvice]) -> LobeDiagram | None:
-    """Return the lobe diagram of a tool as tapped; None where it has no lobes."""
-    machine = analysis.machine
-    lobes = compute_lobes(assembly, machine)
-    if not lobes:
-        return None
-    cut, now = next(iter(lobes.items()))
-    first = analysis.first_assembly(assembly)
-    depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
-    cuts = machine.cuts(assembly.tool)
-    same = [program for program in programs if cuts.get(program.verdict.program.name) == cuts[cut]]
-    settings = (setting for program in same for setting in (program.advice.best, program.advice.deepest_here))
-    verdicts, depths = [program.verdict for program in same], depths | {assembly.label: now.depth}
-    band = compute_limit_band(now, cut, assembly, machine)
-    heard = select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0])
-    learned = compute_lobes_at_speed(verdicts, machine)
-    return LobeDiagram(cut, now, depths, verdicts, list(dict.fromkeys(filter(None, settings))), band, heard, learned)
-
-
 MAX_LOBE_DIAGRAMS = 24
 """Largest number of tap tests shown."""
 MAX_LOBE_SPEEDS = 600
@@ -114,7 +95,7 @@ class LobeHistory(NamedTuple):
     """Limiting depths after each tap test (m), shape (m, n)."""
     ahead: Mapping[str, Floats]
     """Forecast limiting depths (m), shape (n,), by the label of each diagram."""
-    heard: Sequence[CutEntry] = ()
+    heard: Sequence[CutEntry]
     """Test cuts of the same cut."""
 
     @property
@@ -142,64 +123,6 @@ class LobeHistory(NamedTuple):
         ]
         heads = ["from diagram", "heard", "date", "speed (rpm)", "depth (mm)", "chatter (Hz)"]
         return NumberTable(heads, lines) if lines else None
-
-
-def compute_lobe_history(
-    cut: str,
-    rows: Sequence[HistoryRow],
-    assembly: Assembly,
-    series: Sequence[SeriesStatus],
-    machine: Machine,
-    cuts: Sequence[CutEntry] = (),
-) -> LobeHistory | None:
-    """Return the lobe diagrams of a series that show the cut; None where fewer than two do.
-
-    assembly: the newest; series: of the same tool, for the forecast; cuts: all test cuts. The forecast lets all
-    modes drop by the same share, with K from the model.
-    """
-    shown = pick_evenly([row for row in rows if row.x or row.y], MAX_LOBE_DIAGRAMS)
-    diagrams = [(row.time, compute_row_lobes(row, machine, [cut]).get(cut)) for row in shown]
-    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
-    if len(limits) < 2:
-        return None
-    trends = {side.direction: side.trend for side in series if side.tool == assembly.tool and side.trend is not None}
-    times, depths = zip(*limits, strict=True)
-    ahead = _forecast_depths(cut, assembly, trends, machine)
-    heard = select_test_cuts(cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
-    return LobeHistory(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
-
-
-def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
-    depths: dict[str, Floats] = {}
-    for months in FORECAST_MONTHS:
-        shares = {name: _forecast_drop(trend, months) for name, trend in trends.items()}
-        falls = {name: fall for name, fall in shares.items() if fall is not None}
-        if not falls:
-            break
-        worst = max(falls.values())
-        x, y = (_degraded_modes(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
-        lobes = compute_tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
-        if lobes is not None:
-            at = assembly.time + timedelta(days=months * DAYS_PER_MONTH)
-            depths[f"{at:%Y-%m} (forecast)"] = lobes.depth
-    return depths
-
-
-def _forecast_drop(trend: Trend, months: int) -> float | None:
-    """Return the relative drop of the forecast line after some months; None where it is too long or too large."""
-    forecast, last = trend.forecast, days_since_epoch(trend.points[-1].time)
-    at = last + months * DAYS_PER_MONTH
-    if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
-        return None
-    change = float(np.interp(at, forecast.dates, forecast.mean_line)) - float(forecast.fitted[-1])
-    share = -math.expm1(min(change, 0.0) / 100)
-    return share if share < MAX_FORECAST_DROP else None
-
-
-def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
-    stiffness = model_softening(assembly)[0](fall)
-    modes = (assembly.x if direction == "x" else assembly.y) or ()
-    return [mode.scaled(1 - fall, stiffness, "foretold") for mode in modes]
 
 
 BAND_LOW_FACTOR, BAND_HIGH_FACTOR = 0.6, 1.4
@@ -253,7 +176,7 @@ class ReportData:
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:
         """Lobes of the first cut of the tool, with its programs; None where it has none."""
-        return make_lobe_diagram(self.analysis, self.assembly, self.programs)
+        return make_lobe_diagram(self)
 
     def response_band(self, frf: Frf) -> tuple[float, float]:
         """Return the frequency range (Hz) in which a response is shown."""
@@ -266,10 +189,7 @@ class ReportData:
     def lobe_history(self) -> LobeHistory | None:
         """Lobes of the first cut of the tool over time; None below two tap tests."""
         cut = next(iter(self.machine.cuts(self.assembly.tool)), None)
-        if cut is None:
-            return None
-        series = self.outlook.status.series
-        return compute_lobe_history(cut, self.rows, self.assembly, series, self.machine, self.analysis.cuts)
+        return None if cut is None else compute_lobe_history(self, cut)
 
 
 def collect_report_data(analysis: Analysis, tool: str, direction: str, now: datetime | None) -> ReportData:
@@ -355,3 +275,74 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None
     return ValueTrend(value, estimates, aside, marks, limits, course)
+
+
+def make_lobe_diagram(data: ReportData) -> LobeDiagram | None:
+    """Return the lobe diagram of a tool as tapped; None where it has no lobes."""
+    analysis, assembly, machine = data.analysis, data.assembly, data.machine
+    lobes = compute_lobes(assembly, machine)
+    if not lobes:
+        return None
+    cut, now = next(iter(lobes.items()))
+    first = analysis.first_assembly(assembly)
+    depths = {} if first is None else {first.label: compute_lobes(first, machine)[cut].depth}
+    cuts = machine.cuts(assembly.tool)
+    same = [program for program in data.programs if cuts.get(program.verdict.program.name) == cuts[cut]]
+    settings = (setting for program in same for setting in (program.advice.best, program.advice.deepest_here))
+    verdicts, depths = [program.verdict for program in same], depths | {assembly.label: now.depth}
+    band = compute_limit_band(now, cut, assembly, machine)
+    heard = select_test_cuts(analysis.cuts, cut, assembly.tool, cuts[cut][0])
+    learned = compute_lobes_at_speed(verdicts, machine)
+    return LobeDiagram(cut, now, depths, verdicts, list(dict.fromkeys(filter(None, settings))), band, heard, learned)
+
+
+def compute_lobe_history(data: ReportData, cut: str) -> LobeHistory | None:
+    """Return the lobe diagrams of the series that show the cut; None where fewer than two do.
+
+    The forecast lets all modes drop by the same share, with K from the model.
+    """
+    machine, assembly = data.machine, data.assembly
+    shown = pick_evenly([row for row in data.rows if row.x or row.y], MAX_LOBE_DIAGRAMS)
+    diagrams = [(row.time, compute_row_lobes(row, machine, [cut]).get(cut)) for row in shown]
+    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
+    if len(limits) < 2:
+        return None
+    sides = (side for side in data.outlook.status.series if side.tool == assembly.tool)
+    trends = {side.direction: side.trend for side in sides if side.trend is not None}
+    times, depths = zip(*limits, strict=True)
+    ahead = _forecast_depths(cut, assembly, trends, machine)
+    heard = select_test_cuts(data.analysis.cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
+    return LobeHistory(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
+
+
+def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
+    depths: dict[str, Floats] = {}
+    for months in FORECAST_MONTHS:
+        shares = {name: _forecast_drop(trend, months) for name, trend in trends.items()}
+        falls = {name: fall for name, fall in shares.items() if fall is not None}
+        if not falls:
+            break
+        worst = max(falls.values())
+        x, y = (_degraded_modes(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
+        lobes = compute_tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
+        if lobes is not None:
+            at = assembly.time + timedelta(days=months * DAYS_PER_MONTH)
+            depths[f"{at:%Y-%m} (forecast)"] = lobes.depth
+    return depths
+
+
+def _forecast_drop(trend: Trend, months: int) -> float | None:
+    """Return the relative drop of the forecast line after some months; None where it is too long or too large."""
+    forecast, last = trend.forecast, days_since_epoch(trend.points[-1].time)
+    at = last + months * DAYS_PER_MONTH
+    if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
+        return None
+    change = float(np.interp(at, forecast.dates, forecast.mean_line)) - float(forecast.fitted[-1])
+    share = -math.expm1(min(change, 0.0) / 100)
+    return share if share < MAX_FORECAST_DROP else None
+
+
+def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
+    stiffness = model_softening(assembly)[0](fall)
+    modes = (assembly.x if direction == "x" else assembly.y) or ()
+    return [mode.scaled(1 - fall, stiffness, "foretold") for mode in modes]

@@ -116,8 +116,8 @@ def make_lobe_history(data: ReportData) -> list[Section]:
     return [Section("", [Fragment("lobe_course.html", {"course": data.lobe_history})], has_plot=True)]
 
 
-SectionMaker = Callable[[ReportData], Sequence[Section]]
-"""Function that makes some sections of the report, none where there is nothing to show."""
+SectionMakers = Sequence[Callable[[ReportData], Sequence[Section]]]
+"""Functions that make sections of the report in the order of the page, none where there is nothing to show."""
 CHANGE_VALUES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
@@ -377,7 +377,7 @@ def _sensor_text(channel: Channel) -> str:
     return f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
 
 
-SECTIONS: tuple[SectionMaker, ...] = (
+SECTIONS: SectionMakers = (
     make_programs,
     make_forecast,
     make_notes,

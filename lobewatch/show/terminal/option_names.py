@@ -11,18 +11,10 @@ from typing import Any
 OPTION_NAMES: Mapping[str, str] = {
     "accept_questions.codes": "--accept",
     "accept_settings.keys": "--accept",
-    "acknowledge_alarms.until": "--until",
-    "acquire_cut.file": "--file",
-    "acquire_cut.port": "--port",
     "acquisition.measure_rate": "lobewatch sensors",
     "acquisition.scan_ports": "lobewatch ports",
-    "add_event.new_baseline": "--new-baseline",
     "build_power_reading.power_kw": "--power",
-    "calibrate_joints.mode": "--mode",
     "calibrate_joints.tools": "--tool",
-    "choose_cut.cut": "--cut",
-    "choose_cut.program": "--program",
-    "compare_lobes.cut": "--cut",
     "compute_lobe_chart.method": "--method",
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
@@ -32,11 +24,8 @@ OPTION_NAMES: Mapping[str, str] = {
     "EmulationSetup.tcp": "--tcp",
     "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",
-    "exclude_entry.reason": "--reason",
     "find_setup_question.name": "--edit",
     "fit_file_modes": "lobewatch modes",
-    "fit_file_modes.accept": "--accept",
-    "fit_file_modes.conjugate": "--conjugate",
     "fit_file_modes.sensor": "--sensor-mass",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_files.make_machine_folder.template": "lobewatch init --example",
@@ -45,7 +34,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "folder_updates.exclude_entry": "lobewatch exclude",
     "folder_updates.store_cut": "observe",
     "folder_updates.store_mode_edits": "lobewatch modes MACHINE TAP",
-    "list_comparison_files.beside": "--beside",
     "LobeChart.source": "--source",
     "lobes.materials_by_name": "lobewatch materials",
     "Logbook.verdicts": "lobewatch check",
@@ -74,23 +62,24 @@ OPTION_NAMES: Mapping[str, str] = {
     "rebuild_files.rebuild_files": "lobewatch rebuild",
     "record_cut.time_limit": "--seconds",
     "rotate_structure.degrees": "--askew",
-    "rotate_structure.direction": "--direction",
     "screen.ScreenServer": "--screen",
-    "ScreenServer.listen": "--listen",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
     "session.TapSession": "lobewatch tap",
     "store_recordings.keep_going": "--keep-going",
     "TapSession.run": "lobewatch tap",
-    "Window.hit_at": "--hit-at",
     "Window.start": "--window-start",
     "Window.time_constant": "--window",
 }
 """Option or command for each field or function that a message names."""
-OPTION_OWNERS = ("Circumstances", "Conditions", "Description", "ModeEdits", "ProgramTable", "SeriesStatus", "Workers")
+OPTION_OWNERS = (
+    *("Circumstances", "Conditions", "Description", "ModeEdits", "ProgramTable", "SeriesStatus", "Workers"),
+    *("ScreenServer", "Window", "acquire_cut", "add_event", "calibrate_joints", "choose_cut", "compare_lobes"),
+    *("acknowledge_alarms", "exclude_entry", "fit_file_modes", "list_comparison_files", "rotate_structure"),
+)
 """Owners of fields that have the name of their option, such as date_pattern, unless OPTION_NAMES has another."""
 
 _LISTED = "|".join(map(re.escape, sorted(OPTION_NAMES, key=len, reverse=True)))
-_NAMES = re.compile(rf"\b(?:{_LISTED}|(?:{'|'.join(OPTION_OWNERS)})\.(\w+))\b")
+_NAMES = re.compile(rf"\b(?:(?:{'|'.join(OPTION_OWNERS)})\.(\w+)|(?:{_LISTED}))\b")
 
 
 def with_option_names(text: str) -> str:

@@ -31,8 +31,6 @@ JsonObject = dict[str, Any]
 """Object of the JSON output."""
 Texts = list[str | Table]
 """Texts and tables of the output for people."""
-REPLACEMENT_CHARACTER = "\ufffd"
-"""Character shown instead of a control character."""
 
 
 class SafeConsole(Console):
@@ -128,7 +126,7 @@ def count_noun(count: int, noun: str) -> str:
 def make_printable(text: str, kept: str = "\n\t") -> str:
     """Replace control characters except those to keep, and name options instead of library fields."""
     named = with_option_names(text)
-    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else REPLACEMENT_CHARACTER, named)
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", named)
 
 
 def _json_value(value: Any) -> Any:

@@ -193,14 +193,17 @@ class TerminalScreen:
     def __init__(self, session: RunningTest, console: Console | None = None) -> None:
         """Set the console, by default standard error."""
         self._session = session
-        self._console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
+        self._console = console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
         self._keys = KeyReader()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
-        show = {"get_renderable": lambda: render_state(self._session.state, self._muted)}
-        self._live = Live(console=self._console, refresh_per_second=10, **show)
+        self._live = Live(
+            console=self._console,
+            get_renderable=lambda: render_state(session.state, self._muted),
+            refresh_per_second=10,
+        )
 
     def __enter__(self) -> Self:
         """Show it, and listen to keys."""

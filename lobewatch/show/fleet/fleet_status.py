@@ -87,6 +87,11 @@ def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return format_csv([FLEET_COLUMNS, *([row[name] for name in FLEET_COLUMNS] for row in rows)])
 
 
+def due_text(days_left: float) -> str:
+    """Return when the next tap test is due."""
+    return f"in {math.floor(days_left)} d" if days_left >= 0 else f"{math.ceil(-days_left)} d overdue"
+
+
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
     drop = "" if row["fall"] is None else format_with_error(row["fall"], row["fall_std"])
@@ -94,7 +99,7 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     due, left = "", row["days_left"]
     if left is not None:
         last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
-        due = f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")
+        due = f"{last}, {'due ' if left >= 0 else ''}{due_text(left)}"
     return _to_one_line(row["key"]), light, drop, due, row["limit"]
 
 

@@ -7,12 +7,8 @@ from pathlib import Path
 from lobewatch.paper import Comparison, PaperStudy
 from lobewatch.show.terminal.output import JsonObject, pick
 
-PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
 """Widths of the columns, 80 characters in all."""
-
-PAPER_DIGITS = 7
-"""Largest number of digits of a number of the paper."""
 
 
 def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
@@ -34,7 +30,7 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
     yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, beside a surrogate of the"
     yield "spindle (its drawing is not public): fitted to the frequencies in the paper."
     for section in study.sections:
-        yield from ("", section.title, _table_line(PAPER_HEADINGS))
+        yield from ("", section.title, _table_line(("", "place", "paper", "ours", "unit", "differs")))
         for row in section.comparisons:
             yield _table_line(paper_cells(row))
             yield from _indent(row.reason, width)
@@ -46,7 +42,7 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
 
 def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
     """Return quantity, place, both values, unit and difference."""
-    printed = "-" if row.printed is None else number_text(row.printed, PAPER_DIGITS, whole=False)
+    printed = "-" if row.printed is None else number_text(row.printed, 7, whole=False)
     return row.quantity, row.where, printed, number_text(row.ours, row.digits), row.unit, difference_text(row)
 
 

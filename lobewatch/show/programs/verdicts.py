@@ -29,7 +29,6 @@ NOT_ROTATING_TEXT = (
 )
 """Note on reading a table of verdicts."""
 FROM_MACHINE_FILE = "machine.toml"
-UNCERTAINTY_KEYS = "frequency", "damping_ratio", "stiffness", "phase_deg"
 DEGREES_PER_RADIAN = 180 / np.pi
 MIN_SHOWN_WIDTH = 5e-5
 """Smallest half-width that is shown."""
@@ -49,9 +48,9 @@ def factor_text(name: str) -> str:
 
 def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     """Return relative half-widths by cause (degrees for phases) of the modes in x, then y."""
-    units = [1, 1, 1, DEGREES_PER_RADIAN]
-    columns = {cause: (widths * units).T.tolist() for cause, widths in uncertainty.modes.items()}
-    modes = {cause: dict(zip(UNCERTAINTY_KEYS, values, strict=True)) for cause, values in columns.items()}
+    units = {"frequency": 1, "damping_ratio": 1, "stiffness": 1, "phase_deg": DEGREES_PER_RADIAN}
+    columns = {cause: (widths * [*units.values()]).T.tolist() for cause, widths in uncertainty.modes.items()}
+    modes = {cause: dict(zip(units, values, strict=True)) for cause, values in columns.items()}
     ranges = {"tangential": uncertainty.tangential, "radial_over_tangential": uncertainty.ratio}
     coefficients = {name: [factor.low - 1, factor.high - 1] for name, factor in ranges.items()}
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}

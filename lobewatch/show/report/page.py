@@ -79,7 +79,6 @@ def _label_svg(picture: str, name: str) -> Markup:
 
 GAUGE_WIDTH = 120.0
 """Width of the scale (units of the figure)."""
-GAUGE_OVERSHOOT = 1.25
 
 
 class Gauge(NamedTuple):
@@ -97,6 +96,6 @@ class Gauge(NamedTuple):
 
 def make_gauge(fall: float, warn: float, alarm: float) -> Gauge:
     """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty."""
-    scale = GAUGE_WIDTH / (GAUGE_OVERSHOOT * alarm)
+    scale = GAUGE_WIDTH / (1.25 * alarm)
     text = f"frequency {-fall:+z.2f} %; warning at -{warn:g} %, alarm at -{alarm:g} %"
     return Gauge(text, min(max(fall, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

@@ -16,8 +16,8 @@ from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ProgramForecast
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE
-from lobewatch.show.figures.trend_figures import plot_frf
-from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS
+from lobewatch.show.figures.trend_figures import plot_frf, plot_trend
+from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, due_text
 from lobewatch.show.history import condition_texts
 from lobewatch.show.programs.advice import ProgramAdvice, format_rpm
 from lobewatch.show.programs.verdicts import VERDICT_STYLES
@@ -135,7 +135,7 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
     points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.curve is not None else ""
-        figure = points.figure(SMALL_FIGURE_SIZE)
+        figure = plot_trend(points, SMALL_FIGURE_SIZE)
         figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
         yield f"Natural frequency in {data.last.direction} (Hz){ahead}", render_svg(figure)
     elif (frf := data.newest.frf) is not None:
@@ -206,9 +206,7 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
 def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine as the template takes it."""
     left, last, fall, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
-    due = "never tapped"
-    if left is not None:
-        due = f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
+    due = "never tapped" if left is None else due_text(left)
     has_changed = fall is not None and std != 0
     return {
         **row,

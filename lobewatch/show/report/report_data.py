@@ -20,13 +20,12 @@ from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
-from lobewatch.machine import LimitsTable, Machine
+from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.measurement import Estimate
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.show.figures.lobe_figures import pick_evenly, plot_lobes, select_test_cuts
-from lobewatch.show.figures.trend_figures import TREND_FIGURE_SIZE, TrendCurve, TrendMarks, make_trend_curve, plot_trend
+from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, make_trend_curve
 from lobewatch.show.programs.advice import ProgramAdvice, advise_program
 from lobewatch.show.report.section import NumberTable
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
@@ -78,8 +77,6 @@ MAX_LOBE_SPEEDS = 600
 """Largest number of speeds of each diagram."""
 MAX_FORECAST_DROP = 0.5
 """Frequency drop from which on no diagram is forecast: no such spindle still cuts; chosen."""
-FORECAST_MONTHS = (6, 12)
-"""Months after the newest test that are forecast."""
 
 
 class LobeHistory(NamedTuple):
@@ -204,59 +201,14 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
     return ReportData(analysis, rows, first, newest, outlook, programs)
 
 
-EXCLUDED_VALUE_RANGE = 0.15
-"""Largest relative distance from the values that count at which an excluded value is drawn."""
 MIN_TAPS_FOR_VALUE = 2
 """Smallest number of tap tests with a value that make a trend."""
-
-
-class SeriesValue(NamedTuple):
-    """Value of the tap tests of a series that is shown over time."""
-
-    field: str
-    """Field of a history row."""
-    heading: str
-    """Heading of its section."""
-    unit: str
-    """Unit shown."""
-    scale: float
-    """Size of this unit (SI)."""
-    text: str
-    """Note on reading the figure."""
-
-    @property
-    def label(self) -> str:
-        """Label of the axis."""
-        return f"{self.heading.lower()} ({self.unit})"
 
 
 FREQUENCY_VALUE = SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Bars: 95 % interval of each tap alone.")
 BEARING_TEXT = "Equivalent stiffness of each bearing in the model."
 SHOWN_VALUES = (FREQUENCY_VALUE, SeriesValue("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, BEARING_TEXT))
 """Values shown over time, in order."""
-
-
-class ValueTrend(NamedTuple):
-    """Trend of one value of a series."""
-
-    value: SeriesValue
-    """Value that is shown."""
-    estimates: Sequence[tuple[datetime, Estimate]]
-    """Times and estimates of the tap tests, at least MIN_TAPS_FOR_VALUE."""
-    excluded: Sequence[tuple[datetime, float]]
-    """Times and values of excluded tap tests, in the unit shown."""
-    marks: TrendMarks
-    """Marks next to the trend."""
-    limits: LimitsTable | None
-    """Limits of its drop; None where it has none."""
-    curve: TrendCurve | None
-    """Fitted line and forecast; None where there is none."""
-
-    def figure(self, size: tuple[float, float] = TREND_FIGURE_SIZE) -> Figure:
-        """Plot the trend in a figure of this size (inches)."""
-        values, stds = np.array([estimate for _, estimate in self.estimates]).T / self.value.scale
-        times = [time for time, _ in self.estimates]
-        return plot_trend(times, values, stds, self.value.label, self.limits, self.marks, self.curve, size)
 
 
 def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
@@ -267,14 +219,11 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
         return None
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
     events = [(event.time, event.text) for event in data.analysis.files.contents.events if event.time >= since]
-    numbers = [estimate.value / value.scale for _, estimate in estimates]
-    low, high = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
-    marks = TrendMarks(events, [(time, number) for time, number in aside if low <= number <= high])
     is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
     limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None
-    return ValueTrend(value, estimates, aside, marks, limits, course)
+    return ValueTrend(value, estimates, aside, events, limits, course)
 
 
 def make_lobe_diagram(data: ReportData) -> LobeDiagram | None:
@@ -317,13 +266,12 @@ def compute_lobe_history(data: ReportData, cut: str) -> LobeHistory | None:
 
 def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
     depths: dict[str, Floats] = {}
-    for months in FORECAST_MONTHS:
+    for months in (6, 12):
         shares = {name: _forecast_drop(trend, months) for name, trend in trends.items()}
         falls = {name: fall for name, fall in shares.items() if fall is not None}
         if not falls:
             break
-        worst = max(falls.values())
-        x, y = (_degraded_modes(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
+        x, y = (_degraded_modes(assembly, name, falls.get(name, max(falls.values()))) for name in ("x", "y"))
         lobes = compute_tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
         if lobes is not None:
             at = assembly.time + timedelta(days=months * DAYS_PER_MONTH)

@@ -21,11 +21,11 @@ from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, 
 from lobewatch.monitoring.threshold_dates import date_of_days
 from lobewatch.show import trend as trends
 from lobewatch.show.figures.lobe_figures import plot_waterfall
-from lobewatch.show.figures.trend_figures import plot_frf
+from lobewatch.show.figures.trend_figures import ValueTrend, plot_frf, plot_trend
 from lobewatch.show.history import cut_result_text
 from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, frequency_margin_text
-from lobewatch.show.report.report_data import SHOWN_VALUES, ReportData, ValueTrend, make_value_trend
+from lobewatch.show.report.report_data import SHOWN_VALUES, ReportData, make_value_trend
 from lobewatch.show.report.section import BulletList, DataTable, Fragment, NumberTable, Paragraph, Section, TableCell
 from lobewatch.show.terminal.output import count_noun, pick
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
@@ -36,8 +36,7 @@ from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
 
 def make_figures(data: ReportData) -> list[Section]:
     """Make all figures that have data."""
-    lobes = [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data)]
-    return [*lobes, *make_frequency_response(data)]
+    return [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data), *make_frequency_response(data)]
 
 
 def make_value_figures(data: ReportData) -> Iterator[Section]:
@@ -45,10 +44,10 @@ def make_value_figures(data: ReportData) -> Iterator[Section]:
     for value in SHOWN_VALUES:
         trend = make_value_trend(data, value)
         if trend is not None:
-            texts = [value.text, *(["Dotted lines: what was done."] if trend.marks.events else [])]
-            texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
+            texts = [value.text, *(["Dotted lines: what was done."] if trend.events else [])]
+            texts += ["Hollow: tests that do not count."] if trend.drawn_excluded else []
             texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
-            yield Section.with_figure(value.heading, " ".join(texts), trend.figure(), _tabulate_trend(trend))
+            yield Section.with_figure(value.heading, " ".join(texts), plot_trend(trend), _tabulate_trend(trend))
 
 
 def _tabulate_trend(trend: ValueTrend) -> NumberTable:
@@ -229,8 +228,7 @@ def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
 
 def make_modes(data: ReportData) -> list[Section]:
     """Make the table of the modes of the newest test."""
-    heads = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"]
-    rows = list[list[str]]()
+    heads, rows = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"], list[list[str]]()
     for frequency, damping, stiffness, _ in data.last.modes:
         shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
         remark = "not a driving point" if stiffness < 0 else ""
@@ -268,9 +266,8 @@ def make_events(data: ReportData) -> list[Section]:
     """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
     files = data.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
-    lines = [
-        (item.time, f"{item.text}{' (new baseline)' if item.new_baseline else ''}") for item in files.contents.events
-    ]
+    ends = {True: " (new baseline)", False: ""}
+    lines = [(event.time, f"{event.text}{ends[event.new_baseline]}") for event in files.contents.events]
     lines += [(word.time, f"{word.alarm_id} {word}") for word in files.contents.acknowledgements]
     for row in data.excluded_rows:
         value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
@@ -352,7 +349,7 @@ def make_provenance(data: ReportData) -> list[Section]:
         ("newest tap test", f"{data.last.time.astimezone():%Y-%m-%d %H:%M}"),
         ("hammer held by", tap.circumstances.operator or "not said"),
         ("device", tap.circumstances.device or "not known: a recorded file"),
-        *((SENSOR_NAMES[channel.quantity], _sensor_text(channel)) for channel in channels),
+        *map(_sensor_row, channels),
         ("failure mode watched", FAILURE_MODE),
         ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
         *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
@@ -362,19 +359,16 @@ def make_provenance(data: ReportData) -> list[Section]:
     return [Section("For whoever signs", [DataTable(["what", "is"], rows, "words"), *unseen])]
 
 
-SENSOR_NAMES = {"force": "hammer", "acceleration": "accelerometer"}
-
-
 def _alarm_text(alarm: Alarm) -> str:
     word = alarm.acknowledgement or "not acknowledged"
     return f"{alarm.about}: {alarm.code}, raised {alarm.triggered_at.astimezone():%Y-%m-%d}, {word}; name: {alarm.id}"
 
 
-def _sensor_text(channel: Channel) -> str:
-    unit = "N" if channel.quantity == "force" else "(m/s²)"
-    number = f"serial number {channel.serial_number}" if channel.serial_number else "serial number not known"
+def _sensor_row(channel: Channel) -> tuple[str, str]:
+    name, unit = ("hammer", "N") if channel.quantity == "force" else ("accelerometer", "(m/s²)")
+    number = f"serial number {channel.serial_number or 'not known'}"
     calibrated = f"calibrated {channel.calibration_date}" if channel.calibration_date else "calibration not known"
-    return f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
+    return name, f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
 
 
 SECTIONS: SectionMakers = (

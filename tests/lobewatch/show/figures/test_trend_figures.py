@@ -13,32 +13,39 @@ from matplotlib.dates import date2num
 
 from acquisition import Frf
 from lobewatch.machine import LimitsTable, ProgramTable
+from lobewatch.measurement import Estimate
 from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, new_axes, render_svg
 from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
-from lobewatch.show.figures.trend_figures import TrendMarks, plot_frf, plot_trend
+from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, plot_frf, plot_trend
 from lobewatch.verdicts import Setting, Stability, Verdict
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
 
 
+def trend_of(*values: float) -> ValueTrend:
+    """Return a trend of frequencies with a standard error of 0.5 Hz."""
+    estimates = [(time, Estimate(value, 0.5)) for time, value in zip(TIMES, values, strict=False)]
+    return ValueTrend(SeriesValue("frequency", "f", "Hz", 1.0, ""), estimates)
+
+
 def test_limits_stand_below_the_first_value() -> None:
-    figure = plot_trend(TIMES, np.array([1700.0, 1690.0, 1650.0]), np.full(3, 0.5), "f", LimitsTable())
+    figure = plot_trend(trend_of(1700.0, 1690.0, 1650.0)._replace(limits=LimitsTable()))
     data = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
     levels = [points[0, 1] for points in data if points[0, 0] == 0]
     assert levels == pytest.approx([1700 * 0.95, 1700 * 0.90])
 
 
 def test_bars_are_the_95_percent_interval() -> None:
-    figure = plot_trend(TIMES[:1], np.array([1700.0]), np.array([2.0]), "f")
+    figure = plot_trend(trend_of(1700.0))
     (bars,) = figure.axes[0].collections
     assert isinstance(bars, LineCollection)
     ((low, high),) = [np.asarray(segment)[:, 1] for segment in bars.get_segments()]
-    assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
+    assert (low, high) == pytest.approx((1700 - 0.98, 1700 + 0.98))
 
 
 def test_events_are_lines_with_their_text_and_what_does_not_count_is_hollow() -> None:
-    marks = TrendMarks([(TIMES[1], "bearings greased with the new grease of the maker")], [(TIMES[2], 1600.0)])
-    figure = plot_trend(TIMES, np.full(3, 1700.0), np.full(3, 0.5), "f", None, marks)
+    events = [(TIMES[1], "bearings greased with the new grease of the maker")]
+    figure = plot_trend(trend_of(*3 * [1700.0])._replace(events=events, excluded=[(TIMES[2], 1600.0)]))
     *_, hollow, event = figure.axes[0].lines
     assert hollow.get_markerfacecolor() == "none"
     assert np.asarray(hollow.get_xydata()).tolist() == [[date2num(TIMES[2]), 1600.0]]

@@ -15,7 +15,7 @@ from lobewatch.monitoring import MachineStatus, SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ProgramForecast
 from lobewatch.show.figures.drawing import render_svg
-from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE
+from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE, plot_lobes
 from lobewatch.show.figures.trend_figures import plot_frf, plot_trend
 from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, due_text
 from lobewatch.show.history import condition_texts
@@ -143,7 +143,7 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "Receptance at the tool tip", render_svg(figure)
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""
-        yield f"Depth (mm), {diagram.cut}: chatter above the line{then}", render_svg(diagram.figure(is_small=True))
+        yield f"Depth (mm), {diagram.cut}: chatter above the line{then}", render_svg(plot_lobes(diagram, is_small=True))
 
 
 def write_report(

@@ -9,12 +9,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from acquisition import Frf, TapTest
-from lobes import StabilityLobes
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.cuts.learning.verdict_at_speed import compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.history.tap_measurements import measure_excluded_taps
@@ -24,52 +22,15 @@ from lobewatch.machine import Machine
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.show.figures.lobe_figures import pick_evenly, plot_lobes, select_test_cuts
+from lobewatch.show.figures.lobe_figures import LobeDiagram, pick_evenly, select_test_cuts
 from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, make_trend_curve
 from lobewatch.show.programs.advice import ProgramAdvice, advise_program
 from lobewatch.show.report.section import NumberTable
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
 from lobewatch.tool.assembly import compute_tip_lobes
-from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.frequency_drop import model_softening
-from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
+from lobewatch.verdicts.monte_carlo import compute_limit_band
 from modal import Mode
-
-
-class LobeDiagram(NamedTuple):
-    """Lobe diagram of one cut, then and now."""
-
-    cut: str
-    """Name of the cut: the reference cut, or else the first program of the tool."""
-    now: StabilityLobes
-    """Lobes of the newest tap tests."""
-    depths: Mapping[str, Floats]
-    """Limiting depths (m), shape (n,), at first, where known, and now, by the dates of the tap tests."""
-    verdicts: Sequence[Verdict]
-    """Verdicts on the programs with the same cut."""
-    advice: Sequence[Setting]
-    """Settings recommended for these programs."""
-    band: LimitBand | None
-    """Uncertainty band of the limit."""
-    heard: Sequence[CutEntry]
-    """Test cuts of the same cut."""
-    learned: LobesAtSpeed | None
-    """Lobes of the rotating spindle, corrected by test cuts."""
-
-    def figure(self, *, is_small: bool = False) -> Figure:
-        """Plot the diagram; is_small: smaller, to accompany text."""
-        drawn = self.depths, self.verdicts, "", self.band, self.advice, self.heard, self.learned
-        return plot_lobes(self.now.speed_rpm, *drawn, is_small=is_small)
-
-    @property
-    def edges(self) -> dict[str, Floats]:
-        """Depths (m) of the bands and of the rotating spindle, by name."""
-        edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
-        if self.learned is not None:
-            lobes, band = self.learned.lobes, self.learned.band
-            edges |= {"at speed": lobes.depth, "at speed, lowest": band.low, "at speed, highest": band.high}
-        return edges
-
 
 MAX_LOBE_DIAGRAMS = 24
 """Largest number of tap tests shown."""

@@ -20,7 +20,7 @@ from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
 from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
 from lobewatch.monitoring.threshold_dates import date_of_days
 from lobewatch.show import trend as trends
-from lobewatch.show.figures.lobe_figures import plot_waterfall
+from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
 from lobewatch.show.figures.trend_figures import ValueTrend, plot_frf, plot_trend
 from lobewatch.show.history import cut_result_text
 from lobewatch.show.programs import verdicts
@@ -84,7 +84,7 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
         text += f" Rings and crosses: {count_noun(len(diagram.heard), 'test cut')}, as heard."
     heading = "Stability lobes, then and now" if len(diagram.depths) > 1 else "Stability lobes"
     numbers = NumberTable.from_lobes(diagram.now.speed_rpm, {**diagram.depths, **diagram.edges})
-    return [Section.with_figure(heading, text, diagram.figure(), numbers)]
+    return [Section.with_figure(heading, text, plot_lobes(diagram), numbers)]
 
 
 def make_waterfall(data: ReportData) -> list[Section]:

@@ -97,8 +97,6 @@ HISTORY_HEADINGS = (
 )
 MIN_SHORT_NAME = 6
 """Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
-CONDITION_NAMES = tuple(field.name for field in fields(Conditions))
-HISTORY_COLUMNS = ("time", "kind", "id", "tool", "direction")
 CONDITION_FORMATS = {
     "temperature_c": "{:g} °C",
     "stick_out_mm": "stick-out {:g} mm",
@@ -134,7 +132,8 @@ def history_csv(logbook: Logbook) -> str:
     """Return a CSV line for each tap test, cut, event and acknowledgement, oldest first, below the headings."""
     values = [heading for name in VALUE_SCALES for heading in (name, f"{name}_std")]
     verdicts = {program.name: f"verdict: {program.name}" for program in logbook.machine.program}
-    headings = [*HISTORY_COLUMNS, *values, *CONDITION_NAMES, "questions", *verdicts.values(), "reason", "text"]
+    values += (field.name for field in fields(Conditions))
+    headings = ["time", "kind", "id", "tool", "direction", *values, "questions", *verdicts.values(), "reason", "text"]
     rows: list[list[Any]] = [headings]
     for entry in _history_entries(logbook):
         cells = {key: value for key, value in entry.items() if key in headings} | entry.get("conditions", {})

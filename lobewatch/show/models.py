@@ -82,8 +82,7 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
 def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
-    headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
-    table = new_table(*headings)
+    table = new_table("mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)")
     for number, mode in enumerate(model.modes, 1):
         is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
         stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
@@ -106,15 +105,14 @@ UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written
 def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
-    return stiffness_fit_json(fit) | {
-        "taps": {tap.tool: tap.tap_id for tap in calibration.taps},
-        "tool": [calibration.taps[i].tool for i in fit.shaft],
-        "fits_one_spindle": not fit.has_misfit,
-        "not_counted_hz": calibration.unmatched,
-        "machine_toml": _joint_lines(calibration.joints),
-        "predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()},
-        "remarks": [*fit.remarks, *calibration.remarks],
-    }
+    return (
+        stiffness_fit_json(fit)
+        | {"taps": {tap.tool: tap.tap_id for tap in calibration.taps}}
+        | {"tool": [calibration.taps[i].tool for i in fit.shaft], "fits_one_spindle": not fit.has_misfit}
+        | {"not_counted_hz": calibration.unmatched, "machine_toml": _joint_lines(calibration.joints)}
+        | {"predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()}}
+        | {"remarks": [*fit.remarks, *calibration.remarks]}
+    )
 
 
 def tools_texts(calibration: JointCalibration) -> Texts:

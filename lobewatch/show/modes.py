@@ -28,14 +28,12 @@ NON_FILE_ORIGINS = "option", "default"
 
 def mode_json(mode: Mode) -> JsonObject:
     """Return one mode with its standard errors over the hits and of the fit."""
-    values = {"frequency_hz": mode.frequency, "damping_ratio": mode.damping_ratio, "stiffness_n_per_m": mode.stiffness}
-    errors = zip(mode.standard_error.tolist(), mode.fit_error.tolist(), strict=True)
+    std, of_fit = mode.standard_error, mode.fit_error
     return (
-        {
-            key: number
-            for (name, value), (std, of_fit) in zip(values.items(), errors, strict=True)
-            for key, number in ((name, value), (f"{name}_std", std), (f"{name}_std_of_fit", of_fit))
-        }
+        {"frequency_hz": mode.frequency, "frequency_hz_std": std[0], "frequency_hz_std_of_fit": of_fit[0]}
+        | {"damping_ratio": mode.damping_ratio, "damping_ratio_std": std[1], "damping_ratio_std_of_fit": of_fit[1]}
+        | {"stiffness_n_per_m": mode.stiffness, "stiffness_n_per_m_std": std[2]}
+        | {"stiffness_n_per_m_std_of_fit": of_fit[2]}
         | {"interval_95": mode.interval(), "correlation": mode.correlation, "hits": mode.n_hits}
         | {"driving_point": mode.is_driving_point}
         | pick(mode, "phase_deg", "phase_deg_std", "coherence", "misfit", "misfit_share")

@@ -269,14 +269,11 @@ def suggestion_json(next_cut: NextCut) -> JsonObject:
         | {"chance_of_chatter": cut.chatter_probability, "expected_gain": cut.gain, "settles": cut.most_informative}
         | {"repeats": cut.repeats or None}
     )
-    return {
-        "program": learning.program.name,
-        "suggested": suggested,
-        "cuts_made": len(learning.own_cuts),
-        "cuts_left": next_cut.cuts_left,
-        "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
-        "learnt": learned_json(learning),
-    }
+    return (
+        {"program": learning.program.name, "suggested": suggested}
+        | {"cuts_made": len(learning.own_cuts), "cuts_left": next_cut.cuts_left}
+        | {"best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]}, "learnt": learned_json(learning)}
+    )
 
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
@@ -326,15 +323,12 @@ def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
 def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
     before, posterior = learning.prior.intervals, learning.posterior
-    return {
-        "cuts": [cut.id for cut in learning.accepted_cuts],
-        "chatter_frequencies": posterior.n_frequencies,
-        "frequency_learnt": bool(posterior.n_frequencies),
-        "effective_sample_size": posterior.effective_size,
-        "factors": {
-            name: {**after._asdict(), "before": before[name]._asdict()} for name, after in posterior.intervals.items()
-        },
-    }
+    factors = {name: {**now._asdict(), "before": before[name]._asdict()} for name, now in posterior.intervals.items()}
+    return (
+        {"cuts": [cut.id for cut in learning.accepted_cuts], "chatter_frequencies": posterior.n_frequencies}
+        | {"frequency_learnt": bool(posterior.n_frequencies), "effective_sample_size": posterior.effective_size}
+        | {"factors": factors}
+    )
 
 
 def learned_texts(learning: LearningResult) -> Texts:

@@ -100,12 +100,9 @@ def frequency_margin_text(advice: Advice) -> str:
 def count_unsafe(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
     """Count the programs of each kind that may not be run."""
     words = Counter(program.verdict.stability for program in programs)
-    return {
-        "unstable": words[Stability.NOT_STABLE],
-        "doubtful": words[Stability.DOUBTFUL],
-        "not_checked": words[Stability.UNKNOWN],
-        "beyond_drive": sum(program.verdict.is_beyond_drive for program in programs),
-    }
+    keys = {"unstable": Stability.NOT_STABLE, "doubtful": Stability.DOUBTFUL, "not_checked": Stability.UNKNOWN}
+    beyond = sum(program.verdict.is_beyond_drive for program in programs)
+    return {key: words[word] for key, word in keys.items()} | {"beyond_drive": beyond}
 
 
 def check_summary_text(programs: Sequence[ProgramAdvice], others: int) -> str:

@@ -24,13 +24,12 @@ def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) 
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
     others = [{"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives]
     named = pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
-    return named | {
-        "recommended": _recommended_json(answer.setting, answer.verdict, answer),
-        "reason": answer.reason or None,
-        "what_would_change_it": answer.remedies,
-        "alternatives": others,
-        "remarks": [*remarks, *_other_remarks(answer)],
-    }
+    return (
+        named
+        | {"recommended": _recommended_json(answer.setting, answer.verdict, answer), "reason": answer.reason or None}
+        | {"what_would_change_it": answer.remedies, "alternatives": others}
+        | {"remarks": [*remarks, *_other_remarks(answer)]}
+    )
 
 
 def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: Recommendation) -> JsonObject | None:
@@ -48,12 +47,9 @@ def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: 
 
 def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> JsonObject:
     feed = None if answer.feed_mm is None else answer.feed_mm[1]
-    return {
-        **setting_json(setting),
-        "cutting_speed_m_min": cutting_speed(setting, answer.program),
-        "feed_per_tooth_mm": feed,
-        "chips_cm3_per_min": math.nan if feed is None else removal_rate(setting, answer.program, feed),
-    }
+    rate = math.nan if feed is None else removal_rate(setting, answer.program, feed)
+    speed = setting_json(setting) | {"cutting_speed_m_min": cutting_speed(setting, answer.program)}
+    return speed | {"feed_per_tooth_mm": feed, "chips_cm3_per_min": rate}
 
 
 def cutting_speed(setting: Setting, program: ProgramTable) -> float:

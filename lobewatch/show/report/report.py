@@ -99,13 +99,9 @@ def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]
         Stability.NOT_STABLE: "not stable already",
         Stability.UNKNOWN: "not known",
     }
-    return {
-        "name": name,
-        "kind": VERDICT_STYLES[word].css_class,
-        "word": f"{VERDICT_STYLES[word].symbol} {word}",
-        "until": until[word],
-        "instead": alternative_text(program),
-    }
+    style = VERDICT_STYLES[word]
+    shown = {"name": name, "kind": style.css_class, "word": f"{style.symbol} {word}"}
+    return shown | {"until": until[word], "instead": alternative_text(program)}
 
 
 def alternative_text(program: ProgramAdvice) -> str:

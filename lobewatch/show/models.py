@@ -98,10 +98,6 @@ def model_texts(model: ModelSummary) -> Texts:
     ]
 
 
-MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
-UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written into machine.toml"
-
-
 def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
@@ -130,7 +126,8 @@ def tools_texts(calibration: JointCalibration) -> Texts:
         caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
         lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
-        lines.append(MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT)
+        why = "the tools do not fit one spindle" if calibration.fit.has_misfit else "no measured mode feels the joints"
+        lines.append(f"{why}: nothing is to be written into machine.toml")
     if not calibration.predicted or calibration.fit.has_misfit:
         return [*lines]
     table = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")

@@ -69,8 +69,7 @@ def mode_table(modes: Sequence[Mode]) -> Table:
         ]
         phase = format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
         texts += [phase] if with_phase else []
-        matches = "" if mode.match_count is None else "{} of {}".format(*mode.match_count)
-        texts += [matches] if with_matches else []
+        texts += ["" if mode.match_count is None else "{} of {}".format(*mode.match_count)] if with_matches else []
         table.add_row(*texts, TRUST_SYMBOLS[assess_trust(mode)])
     return table
 
@@ -135,8 +134,7 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
         fit, difference = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None), "not fitted"
         if fit is not None and abs(fit.frequency - mode.frequency) < mode.damping_ratio * mode.frequency:
             zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
-            off = mode.frequency - fit.frequency
-            difference = f"f_n {off:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+            difference = f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
         stiffness = format_rounded(mode.stiffness, scale=1e6, digits=5)
         table.add_row(f"{mode.frequency:.5g}", f"{100 * mode.damping_ratio:.5g}", stiffness, difference)
     return table

@@ -25,8 +25,6 @@ from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
 """Names of the steps of a replay."""
-REBUILD_PROGRESS_STEP = 10
-"""Number of tap tests between two progress lines of a rebuild."""
 
 
 class ReplayProgress(Progress):
@@ -45,10 +43,10 @@ class ReplayProgress(Progress):
 
 
 def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
-    """Return a function that prints a progress line every few tap tests of this machine."""
+    """Return a function that prints a progress line every ten tap tests of this machine."""
 
     def show(done: int, of: int) -> None:
-        if done % REBUILD_PROGRESS_STEP == 0:
+        if done % 10 == 0:
             notes.print(f"{name}: {done} of {of} tap tests", markup=False)
 
     return show

@@ -43,8 +43,7 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
 
 def _drop_json(trend: Trend) -> JsonObject | None:
     drop, since = trend.open_drop, trend.drop_since
-    start = since and since.isoformat()
-    return drop and {"kind": drop.change.kind, "since": start, "size_percent": drop.change.size}
+    return drop and {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
 
 
 def trend_csv(series: SeriesStatus) -> str:

@@ -60,11 +60,6 @@ NEXT_STEP_TEXTS: Mapping[str, str] = {
 """Next step for each verdict on a recorded cut."""
 
 
-def next_step_text(comparison: CutComparison) -> str:
-    """Return the next step after a recorded cut."""
-    return NEXT_STEP_TEXTS[comparison.detected.verdict]
-
-
 def reason_text(comparison: CutComparison) -> str:
     """Return what the verdict on a recorded cut rests on, or why there is none."""
     heard = comparison.detected
@@ -158,7 +153,6 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
 def recorded_cut_json(comparison: CutComparison) -> JsonObject:
     """Return a recorded cut with all that was detected in it."""
     heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
-    times = pick(heard.parts, "begin", "end", "steady_begin", "steady_end")
     return (
         {"word": heard.verdict, "reason": heard.reason, "chatter_frequency_hz": chatter and chatter.frequency}
         | {"chatter_frequency_hz_std": chatter and chatter.error, "elsewhere_rpm": heard.distant_rpm}
@@ -172,7 +166,7 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
         | {"predicted": expected and ("stable" if expected.stable else "chatter")}
         | {"predicted_frequency_hz": expected and expected.frequency}
         | {"predicted_apart_hz": comparison.frequency_difference}
-        | {f"{name}_s": time for name, time in times.items()}
+        | {f"{name}_s": time for name, time in pick(heard.parts, "begin", "end", "steady_begin", "steady_end").items()}
     )
 
 

@@ -117,8 +117,7 @@ class LabelPlacer:
         self._taken.append(boxes[best])
         right, up = LABEL_SIDES[best]
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": LABEL_FONT_SIZE, "bbox": LABEL_BACKGROUND}
-        style["ha"] = {1: "left", -1: "right"}.get(right, "center")
-        style["va"] = {1: "bottom", -1: "top"}.get(up, "center")
+        style |= {"ha": {1: "left", -1: "right"}.get(right, "center"), "va": {1: "bottom", -1: "top"}.get(up, "center")}
         self._axes.annotate(text, place, (LABEL_DISTANCE * right, self._above * up), color=color, **style)
 
     def reserve_area(self, low: Point, high: Point) -> None:

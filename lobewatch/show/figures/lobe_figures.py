@@ -33,11 +33,9 @@ from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 DEPTH_COLORMAP = "cividis"
 """Colormap of depth: dark is shallow, bright is deep, in grey too."""
 BAND_LABEL = "what is not known of spindle and cut moves the limit within this band"
-WINDOW_LABEL = "safe speeds and depths"
-DOUBTFUL_YELLOW = "#B58900"
 VERDICT_MARKS = {
     Stability.STABLE: (Paint.GOOD, "o"),
-    Stability.DOUBTFUL: (DOUBTFUL_YELLOW, "^"),
+    Stability.DOUBTFUL: ("#B58900", "^"),
     Stability.NOT_STABLE: (Paint.ALARM, "X"),
     Stability.UNKNOWN: (Paint.UNKNOWN, "D"),
 }
@@ -187,7 +185,7 @@ def _draw_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:
     style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
     for i, pocket in enumerate(diagram.pockets):
         (low, high), depth = pocket.window_rpm, pocket.depth_mm
-        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else WINDOW_LABEL, **style))
+        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else "safe speeds and depths", **style))
         labels.reserve_area((low, 0.0), (high, depth))
     places = [(program.program.speed_rpm, program.program.depth_mm) for program in diagram.verdicts]
     for program, place in zip(diagram.verdicts, places, strict=True):
@@ -224,7 +222,6 @@ def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) ->
             labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
 
 
-RADIAL_IMMERSIONS = np.linspace(0.05, 1.0, 39)
 MAX_WATERFALL_ROWS = 200
 """Largest number of tap tests in a waterfall."""
 
@@ -276,7 +273,7 @@ def plot_radial_lobes(machine: Machine, now: LobeChart, method: LobeMethod) -> t
         cuts = [replace(simultaneous, immersion=cut.immersion) for simultaneous in now.cuts]
         return compute_lobe_chart(method, now.x, now.y, cuts, speeds)
 
-    radial = radial_lobes(limits, now.cuts[0], RADIAL_IMMERSIONS)
+    radial = radial_lobes(limits, now.cuts[0], np.linspace(0.05, 1.0, 39))
     diameter = now.table.tool_diameter_mm / 1e3
     return plot_radial_map(radial, diameter, now.cuts[0].immersion, _lobes_title(machine, now)), radial.remarks
 
@@ -298,5 +295,4 @@ def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
 
 def pick_evenly(rows: Sequence[HistoryRow], most: int) -> list[HistoryRow]:
     """Return the first row, the newest, and others evenly spaced between them, no more than `most`."""
-    places = np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int)
-    return [rows[i] for i in np.unique(places)]
+    return [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int))]

@@ -103,8 +103,7 @@ def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [(now, "now", Paint.NEWEST, "-")]
-    tests += [] if first is None else [(first, "first", Paint.FIRST, "--")]
+    tests = [(now, "now", Paint.NEWEST, "-"), *([] if first is None else [(first, "first", Paint.FIRST, "--")])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}

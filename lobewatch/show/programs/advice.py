@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from rich.table import Table
@@ -44,11 +45,6 @@ class ProgramAdvice:
         """Remarks of verdict and advice."""
         return (*self.verdict.remarks, *self.advice.remarks)
 
-    @property
-    def other_remarks(self) -> tuple[Remark, ...]:
-        """Remarks that the advice lines do not contain."""
-        return tuple(remark for remark in self.remarks if remark.code not in LINE_REMARK_CODES)
-
 
 def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvice:
     """Return one program with its verdict and advice."""
@@ -79,12 +75,12 @@ def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> Texts:
     """Return all programs in words: the table, the advice, and notes on reading it."""
     decays = [frequency_margin_text(program.advice) for program in programs]
-    verdicts = [program.verdict for program in programs]
+    verdicts, about = [program.verdict for program in programs], chain(*(program.remarks for program in programs))
     return [
         verdict_table(verdicts, decays),
         *(line for program in programs for line in advice_lines(program, machine)),
         *verdict_notes(verdicts, machine),
-        *remark_lines([*remarks, *(remark for program in programs for remark in program.other_remarks)]),
+        *remark_lines([*remarks, *(remark for remark in about if remark.code not in LINE_REMARK_CODES)]),
     ]
 
 
@@ -130,8 +126,7 @@ def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
             texts.append(f"until then {_alternative_text(program, machine)}")  # open measurements come first
         yield f"{name}: {'; '.join(texts)}"
     if verdict.is_beyond_drive:
-        allowed = math.floor(verdict.drive_limit * 1e5) / 100
-        yield f"{name}: [drive] allows no more than {allowed:.2f} mm at this speed"
+        yield f"{name}: [drive] allows no more than {math.floor(verdict.drive_limit * 1e5) / 100:.2f} mm at this speed"
 
 
 def _chatter_text(program: ProgramAdvice) -> str:

@@ -59,8 +59,7 @@ def cutting_speed(setting: Setting, program: ProgramTable) -> float:
 
 def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
     """Return the material removal rate (cm3/min) at a feed per tooth (mm)."""
-    area = setting.depth_mm * program.radial_mm[1]
-    return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
+    return setting.depth_mm * program.radial_mm[1] * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
 
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
@@ -144,8 +143,7 @@ def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: 
     table = new_table(*headings, *([] if depth_mm is None else [f"<at {depth_mm:g} mm"]))
     for pitch in (proposal.equal, *proposal.unequal):  # as many lines as its angles need, two at least
         verdict = [] if depth_mm is None else [[pitch.stability.value]]
-        columns = *_pitch_columns(pitch, pitch is proposal.equal), *verdict
-        for cells in zip_longest(*columns, fillvalue=""):
+        for cells in zip_longest(*_pitch_columns(pitch, pitch is proposal.equal), *verdict, fillvalue=""):
             table.add_row(*cells)
     return [table, *_proposal_lines(proposal), *remark_lines(_pitch_remarks(proposal, remarks))]
 

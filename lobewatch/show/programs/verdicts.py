@@ -20,8 +20,6 @@ from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
-UNCERTAINTY_PAGE = "docs/lobes.md"
-"""Page that explains the uncertainties."""
 NOT_ROTATING_TEXT = (
     "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
     "chatter once it turns and cuts, where frequency, damping, stiffness and cutting force may differ; plausible, not "
@@ -66,7 +64,7 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
     about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
-    lines = [f"{about[text]}: {text} ({UNCERTAINTY_PAGE})" for text in named]
+    lines = [f"{about[text]}: {text} (docs/lobes.md)" for text in named]
     lines += [NOT_ROTATING_TEXT] if len(learned) < evaluated else []
     return [*lines, *([at_speed_text(learned)] if learned else [])]
 

@@ -45,29 +45,25 @@ def make_summary(data: ReportData) -> dict[str, Any]:
     standing, limits = data.outlook.status, data.machine.limits
     worst, levels = standing.series[0], (limits.frequency_warn_percent, limits.frequency_alarm_percent)
     has_changed = worst.drop.is_known and not worst.is_baseline
-    return {
-        **_status_content(standing),
-        "gauge": make_gauge(worst.drop.value, *levels) if has_changed else None,
-        "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
-        "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
-        "programs": [_program_content(program, data) for program in data.programs],
-        "no_dates": no_dates_text(data.outlook),
-        "tap": _next_tap_text(standing, data.machine),
-        "pictures": list(draw_summary_figures(data)),
-    }
+    return (
+        _status_content(standing)
+        | {"gauge": make_gauge(worst.drop.value, *levels) if has_changed else None}
+        | {"series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]]}
+        | {"more_series": len(standing.series[MAX_SUMMARY_REASONS:]), "tap": _next_tap_text(standing, data.machine)}
+        | {"programs": [_program_content(program, data) for program in data.programs]}
+        | {"no_dates": no_dates_text(data.outlook), "pictures": list(draw_summary_figures(data))}
+    )
 
 
 def _status_content(standing: MachineStatus) -> dict[str, Any]:
     """Return the status in words, the reasons and the next step."""
     first, others = _pick_reasons(standing)
     notable = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD]
-    shown = notable[: MAX_SUMMARY_REASONS - 1]
-    return {
-        "light": status_label(standing.status, standing.is_early),
-        "kind": status_css_class(standing.status, standing.is_early),
+    shown, status = notable[: MAX_SUMMARY_REASONS - 1], (standing.status, standing.is_early)
+    words = {"light": status_label(*status), "kind": status_css_class(*status), "next_step": standing.next_step}
+    return words | {
         "reasons": [remark.finding for remark in [*first, *shown]],
         "others": [remark.finding for remark in others if remark not in shown],
-        "next_step": standing.next_step,
     }
 
 
@@ -203,17 +199,15 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine as the template takes it."""
     left, last, fall, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
     due = "never tapped" if left is None else due_text(left)
-    has_changed = fall is not None and std != 0
-    return {
-        **row,
-        "kind": status_css_class(row["light"], row["is_early"]),
-        "reasons": row["reasons"] or [row["why"] or ("all is well" if row["light"] is StatusLevel.GOOD else "-")],
-        "fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with",
-        "gauge": make_gauge(fall, *row["limits"]) if has_changed else None,
-        "spark": spark_points(row["points"]),
-        "programs": programs_text(row["programs"]),
-        "due": f"{due}, last {last.partition('T')[0]}" if last else due,
-    }
+    is_good, has_changed = row["light"] is StatusLevel.GOOD, fall is not None and std != 0
+    return (
+        {**row, "kind": status_css_class(row["light"], row["is_early"])}
+        | {"reasons": row["reasons"] or [row["why"] or ("all is well" if is_good else "-")]}
+        | {"fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with"}
+        | {"gauge": make_gauge(fall, *row["limits"]) if has_changed else None, "spark": spark_points(row["points"])}
+        | {"programs": programs_text(row["programs"])}
+        | {"due": f"{due}, last {last.partition('T')[0]}" if last else due}
+    )
 
 
 def programs_text(words: Mapping[str, str]) -> str:

@@ -221,8 +221,7 @@ def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
         values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
         if values and np.isfinite(getattr(history.rows[-1], name)):
             start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
-            change = f"{100 * (values[-1] / values[0] - 1):+z.2f} %"
-            yield [f"{label} tip stiffness, model (N/µm)", start, now, change]
+            yield [f"{label} tip stiffness, model (N/µm)", start, now, f"{100 * (values[-1] / values[0] - 1):+z.2f} %"]
 
 
 def make_modes(data: ReportData) -> list[Section]:
@@ -232,8 +231,7 @@ def make_modes(data: ReportData) -> list[Section]:
         shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
         remark = "not a driving point" if stiffness < 0 else ""
         rows.append([f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, remark])
-    table = DataTable(heads, rows, if_empty="none was found")
-    return [Section("Modes of the newest test", [table], is_framed=False)]
+    return [Section("Modes of the newest test", [DataTable(heads, rows, if_empty="none was found")], is_framed=False)]
 
 
 TAP_TABLE_HEADS = (
@@ -340,7 +338,6 @@ def make_provenance(data: ReportData) -> list[Section]:
     points = 0 if data.series.trend is None else len(data.series.trend.points)
     confidence = ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS
     tap = data.newest
-    channels = tap.hits[0].channels or () if tap.hits else ()
     rows = [
         ("machine", data.machine.machine.name),
         ("folder", data.analysis.folder.path.resolve().name),
@@ -348,7 +345,7 @@ def make_provenance(data: ReportData) -> list[Section]:
         ("newest tap test", f"{data.last.time.astimezone():%Y-%m-%d %H:%M}"),
         ("hammer held by", tap.circumstances.operator or "not said"),
         ("device", tap.circumstances.device or "not known: a recorded file"),
-        *map(_sensor_row, channels),
+        *map(_sensor_row, tap.hits[0].channels or () if tap.hits else ()),
         ("failure mode watched", FAILURE_MODE),
         ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
         *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),

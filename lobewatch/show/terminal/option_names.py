@@ -4,6 +4,7 @@ The library does not know the command line: its errors and remarks name a field 
 (`Logbook.verdicts`). A person at the terminal, and a program that reads the JSON, needs the option or the command.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -88,9 +89,11 @@ def with_option_names(text: str) -> str:
 
 
 def with_option_names_inside(value: Any) -> Any:
-    """Replace the names in all texts of a value made of dicts, lists and texts."""
+    """Replace the names in all texts of a value made of dicts, lists and texts; infinite and NaN become None."""
     if isinstance(value, dict):
         return {key: with_option_names_inside(entry) for key, entry in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [with_option_names_inside(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return with_option_names(value) if type(value) is str else value

@@ -23,7 +23,7 @@ from rich.text import Text
 
 from acquisition import Remark, merge_remarks
 from acquisition.errors import CONTROL_CHARACTERS
-from lobewatch.show.terminal.option_names import with_option_names
+from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
@@ -47,8 +47,7 @@ class SafeTable(Table):
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
         """Add a row."""
-        safe = (make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells)
-        super().add_row(*safe, **options)
+        super().add_row(*(make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells), **options)
 
     @property
     def min_table_width(self) -> int:
@@ -75,7 +74,7 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     if as_json:
         import msgspec  # only JSON output waits for it
 
-        plain = _json_value(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
+        plain = with_option_names_inside(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
         exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
@@ -125,18 +124,7 @@ def count_noun(count: int, noun: str) -> str:
 
 def make_printable(text: str, kept: str = "\n\t") -> str:
     """Replace control characters except those to keep, and name options instead of library fields."""
-    named = with_option_names(text)
-    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", named)
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_value(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json_value(entry) for entry in value]
-    if isinstance(value, str):
-        return with_option_names(value)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", with_option_names(text))
 
 
 def pick(record: Any, *names: str) -> JsonObject:

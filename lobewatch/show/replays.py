@@ -253,8 +253,7 @@ def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
     made = f"made anew from {rebuild.n_taps} tap test(s)"
     missing = "not made anew (see above); the next command that can write makes it"
-    history = f"history.rows: {made if rebuild.is_saved else missing}"
-    return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
+    return [*rebuild.repairs, *remark_lines(rebuild.remarks), f"history.rows: {made if rebuild.is_saved else missing}"]
 
 
 def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> JsonObject:

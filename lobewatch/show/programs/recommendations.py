@@ -23,9 +23,8 @@ UNIT_FEED_MM = 0.1
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
     others = [{"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives]
-    named = pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
     return (
-        named
+        pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
         | {"recommended": _recommended_json(answer.setting, answer.verdict, answer), "reason": answer.reason or None}
         | {"what_would_change_it": answer.remedies, "alternatives": others}
         | {"remarks": [*remarks, *_other_remarks(answer)]}

@@ -136,12 +136,9 @@ def make_programs(data: ReportData) -> list[Section]:
     remarks = [remark for program in data.programs for remark in program.verdict.remarks]
     speeds = merge_remarks(remark for remark in remarks if remark.code == SPEEDS_ONLY_CODE)
     lines = [line for program in data.programs for line in advice_lines(program, data.machine)]
-    content = {
-        "programs": [_program_row(program) for program in data.programs],
-        "lines": [*lines, *map(str, speeds)],
-        "doubt": verdicts.verdict_notes(checked, data.machine),
-        "method": checked[0].method if checked else "",
-    }
+    notes, method = verdicts.verdict_notes(checked, data.machine), checked[0].method if checked else ""
+    rows = {"programs": list(map(_program_row, data.programs)), "lines": [*lines, *map(str, speeds)]}
+    content = rows | {"doubt": notes, "method": method}
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
 
 

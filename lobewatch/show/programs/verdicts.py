@@ -32,14 +32,10 @@ MIN_SHOWN_WIDTH = 5e-5
 """Smallest half-width that is shown."""
 
 
-FACTOR_NAMES = {"tangential": "Kt", "ratio": "Kr/Kt"}
-"""Names of learned factors without a direction."""
-
-
 def factor_text(name: str) -> str:
     """Return the name of a learned factor, such as "frequency in x, mode 2" for "frequency_x_2"."""
-    if name in FACTOR_NAMES:
-        return FACTOR_NAMES[name]
+    if "_" not in name:
+        return {"tangential": "Kt", "ratio": "Kr/Kt"}[name]
     quantity, direction, *mode = name.split("_")
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, serve_screen
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
 
 if TYPE_CHECKING:
     from acquisition.files.cut_file import CutSignal
@@ -86,7 +86,8 @@ def listen(
             from lobewatch.screen import CutScreenServer  # imports aiohttp
 
             server = CutScreenServer(publisher, listen=listen, token=token, watch_token=watch_token)
-            screens.enter_context(serve_screen(server))
+            screens.enter_context(server)
+            show_address(server.url, server.watch_url)
         signal = recorder.acquire_cut(
             logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
         )

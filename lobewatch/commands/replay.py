@@ -110,7 +110,7 @@ def replay(
         not_chosen = store_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]
-        emit_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)
+        emit_replay(outcome, logbook, len(recordings), passed, accepted, as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
             raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lobewatch.commands.shared_options import Machine
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, serve_screen
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, show_address
 
 if TYPE_CHECKING:
     from acquisition import TapDirection
@@ -91,7 +91,8 @@ def tap(
                 from lobewatch.screen import ScreenServer  # imports aiohttp
 
                 server = ScreenServer(visit, listen=listen, token=token, watch_token=watch_token)
-                screens.enter_context(serve_screen(server))
+                screens.enter_context(server)
+                show_address(server.url, server.watch_url)
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:

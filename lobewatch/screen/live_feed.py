@@ -13,7 +13,7 @@ from aiohttp import WSCloseCode, web
 from numpy.typing import NDArray
 
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.show.cuts.recorded_cuts import next_step_text, reason_text, recorded_cut_texts
+from lobewatch.show.cuts.recorded_cuts import NEXT_STEP_TEXTS, reason_text, recorded_cut_texts
 from lobewatch.show.terminal.option_names import with_option_names_inside
 from lobewatch.tap.cut_recording import CutState
 from lobewatch.tap.state import ListedHit, LiveCurves, TapState
@@ -110,7 +110,7 @@ def _comparison_json(comparison: CutComparison) -> dict[str, Any]:
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,
         "speed_rpm": None if comparison.detected.spindle_speed is None else comparison.speed_rpm,
         "texts": [text for text in recorded_cut_texts(comparison)[1:] if text != reason],
-        "next_step": next_step_text(comparison),
+        "next_step": NEXT_STEP_TEXTS[comparison.detected.verdict],
     }
 
 

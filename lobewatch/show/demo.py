@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import astuple
-from datetime import datetime
 from pathlib import Path
 
 from lobewatch.monitoring.threshold_dates import date_of_days
-from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, new_table
 from lobewatch.show.trend import reach_text
-from lobewatch.tap.demo import DemoTap, LevelForecast
+from lobewatch.tap.demo import DemoTap, LevelForecast, SpindleState
 
 STATE_NAMES = ("f_1", "zeta", "K", "bearing stiffness")
 """Names of the values of a SpindleState for people."""
@@ -16,19 +15,20 @@ DEMO_COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k
 """Heading, size of the unit and decimals of each value."""
 
 
-STATE_FIELDS = json_fields("""
-    frequency_hz=frequency damping_ratio stiffness_n_per_m=stiffness bearing_stiffness_n_per_m=bearing_stiffness
-""")
-TAP_FIELDS = json_fields(
-    "date=plan.date direction=plan.direction truth=plan.truth found=result",
-    {"date": datetime.isoformat, "truth": STATE_FIELDS, "found": STATE_FIELDS},
-)
-
-
 def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> JsonObject:
     """Return all tap tests of the demo, and the forecast with the true dates."""
     levels = {item.level: {**item.reached.to_row(), "truth": _date_text(item.truth)} for item in forecasts}
-    return {"taps": list(map(TAP_FIELDS, taps)), "forecast": levels, "report": str(report)}
+    rows = [
+        {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
+        | {"truth": _state_json(tap.plan.truth), "found": _state_json(tap.result)}
+        for tap in taps
+    ]
+    return {"taps": rows, "forecast": levels, "report": str(report)}
+
+
+def _state_json(state: SpindleState) -> JsonObject:
+    keys = "frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m"
+    return dict(zip(keys, astuple(state), strict=True))
 
 
 def _date_text(days: float | None) -> str | None:

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
-from operator import attrgetter
 from typing import Any
 
 from acquisition import Conditions, Remark
@@ -13,10 +12,12 @@ from dsm import format_rounded
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
+from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.machine.journal.entries import MaintenanceEvent
-from lobewatch.show.programs.materials import power_text
-from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, json_fields
+from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 
 
 def cut_text(cut: CutEntry) -> str:
@@ -46,30 +47,25 @@ def _utc_text(time: datetime | str) -> str:
     return moment.astimezone(UTC).isoformat(timespec="microseconds")
 
 
-cut_json = json_fields(
-    """
-    id time=at program tool feed speed_rpm commanded_rpm depth_mm=depth*1e3 word chatter_frequency_hz
-    chatter_frequency_hz_std=chatter_frequency_std_hz by power_kw=power.watts/1e3
-    tangential_by_power_n_per_mm2=power.tangential/1e6 reason recording=recording.file excluded
-    """,
-    {"time": _utc_text},
-)
-"""Function that returns one test cut as a JSON object."""
-event_json = json_fields("id time text new_baseline", {"time": _utc_text})
-"""Function that returns one event as a JSON object."""
-acknowledgement_json = json_fields("id=alarm_id time operator until note", {"time": _utc_text, "until": _utc_text})
-"""Function that returns one acknowledged alarm as a JSON object."""
-TAP_FIELDS = json_fields(
-    """
-    id=tap_id time tool direction frequency_hz=frequency.value frequency_hz_std=frequency.std
-    damping_ratio=damping_ratio.value damping_ratio_std=damping_ratio.std stiffness_n_per_m=stiffness.value
-    stiffness_n_per_m_std=stiffness.std baseline series conditions=conditions.specified software questions
-    """,
-    {"time": _utc_text, "baseline": _utc_text, "questions": attrgetter("code")},
-)
-EXCLUDED_FIELDS = json_fields(
-    "id time tool direction conditions=conditions.specified reason=excluded", {"time": _utc_text}
-)
+def cut_json(cut: CutEntry) -> JsonObject:
+    """Return one test cut as a JSON object."""
+    return (
+        {"id": cut.id, "time": _utc_text(cut.at), **pick(cut, "program", "tool", "feed", "speed_rpm", "commanded_rpm")}
+        | {"depth_mm": cut.depth * 1e3, "word": cut.word, "chatter_frequency_hz": cut.chatter_frequency_hz}
+        | {"chatter_frequency_hz_std": cut.chatter_frequency_std_hz, "by": cut.by}
+        | power_json(cut.power)
+        | {"reason": cut.reason, "recording": cut.recording and cut.recording.file, "excluded": cut.excluded}
+    )
+
+
+def event_json(event: MaintenanceEvent) -> JsonObject:
+    """Return one event as a JSON object."""
+    return {**vars(event), "time": _utc_text(event.time)}
+
+
+def _acknowledgement_json(ack: Acknowledgement) -> JsonObject:
+    until = ack.until and _utc_text(ack.until)
+    return {"id": ack.alarm_id, "time": _utc_text(ack.time), "operator": ack.operator, "until": until, "note": ack.note}
 
 
 def saved_cut_remarks(logbook: Logbook, cut: CutEntry, earlier: Sequence[CutEntry]) -> list[Remark]:
@@ -99,12 +95,8 @@ HISTORY_HEADINGS = (
     ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
 )
-NUMBER_COLUMNS = 4, 5, 6
-"""Columns that are aligned to the right."""
 MIN_SHORT_NAME = 6
 """Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
-CONDITION_NAMES = tuple(field.name for field in fields(Conditions))
-HISTORY_COLUMNS = ("time", "kind", "id", "tool", "direction")
 CONDITION_FORMATS = {
     "temperature_c": "{:g} °C",
     "stick_out_mm": "stick-out {:g} mm",
@@ -129,9 +121,9 @@ def history_json(logbook: Logbook) -> JsonObject:
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
-        "excluded": list(map(EXCLUDED_FIELDS, logbook.files.excluded)),
+        "excluded": list(map(_excluded_json, logbook.files.excluded)),
         "events": list(map(event_json, logbook.files.contents.events)),
-        "acknowledged": list(map(acknowledgement_json, logbook.files.contents.acknowledgements)),
+        "acknowledged": list(map(_acknowledgement_json, logbook.files.contents.acknowledgements)),
         "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.contents.cuts],
     }
 
@@ -140,7 +132,8 @@ def history_csv(logbook: Logbook) -> str:
     """Return a CSV line for each tap test, cut, event and acknowledgement, oldest first, below the headings."""
     values = [heading for name in VALUE_SCALES for heading in (name, f"{name}_std")]
     verdicts = {program.name: f"verdict: {program.name}" for program in logbook.machine.program}
-    headings = [*HISTORY_COLUMNS, *values, *CONDITION_NAMES, "questions", *verdicts.values(), "reason", "text"]
+    values += (field.name for field in fields(Conditions))
+    headings = ["time", "kind", "id", "tool", "direction", *values, "questions", *verdicts.values(), "reason", "text"]
     rows: list[list[Any]] = [headings]
     for entry in _history_entries(logbook):
         cells = {key: value for key, value in entry.items() if key in headings} | entry.get("conditions", {})
@@ -157,7 +150,7 @@ def history_lines(logbook: Logbook) -> list[str]:
     names: dict[str, str] = {entry["id"]: entry.get("name", "") for entry in entries}
     names |= zip(taps, shorten_ids(taps), strict=True)
     cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
-    lines = align_columns([*HISTORY_HEADINGS, *cells], NUMBER_COLUMNS)
+    lines = align_columns([*HISTORY_HEADINGS, *cells], numbers=(4, 5, 6))
     texts = ["", "", *map(_note_text, entries)]
     return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
 
@@ -167,16 +160,14 @@ def shorten_ids(ids: Sequence[str]) -> list[str]:
 
     Commands accept it instead of the identity.
     """
-    names, size = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
-    left = [name for name in names if len(name) > size]
+    names, n = dict(zip(ids, ids, strict=True)), MIN_SHORT_NAME
+    left = [name for name in names if len(name) > n]
     while left:
-        ends = {name[-size:] for name in left}
-        parts = Counter(
-            part for name in ids for i in range(len(name) - size + 1) if (part := name[i : i + size]) in ends
-        )
-        names |= {name: name[-size:] for name in left if parts[name[-size:]] == 1}
-        size += 1
-        left = [name for name in left if names[name] == name and len(name) > size]
+        ends = {name[-n:] for name in left}
+        parts = Counter(part for name in ids for i in range(len(name) - n + 1) if (part := name[i : i + n]) in ends)
+        names |= {name: name[-n:] for name in left if parts[name[-n:]] == 1}
+        n += 1
+        left = [name for name in left if names[name] == name and len(name) > n]
     return [names[name] for name in ids]
 
 
@@ -196,22 +187,32 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
         kind = "new baseline" if event["new_baseline"] else "event"
         entries.append({**event, "kind": kind, "name": event["id"]})
     for cut in history["cuts"]:
-        shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
-        kind = "excluded" if cut["excluded"] else "cut"
-        entries.append({**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}})
+        shown = {"kind": "excluded" if cut["excluded"] else "cut", "reason": cut["excluded"], "conditions": {}}
+        entries.append(shown | {"name": cut["id"], **{name: cut[name] for name in ("id", "time", "tool", "text")}})
     for ack in logbook.files.contents.acknowledgements:
-        text, time = f"{ack.alarm_id}: {ack}", _utc_text(ack.time)
-        entries.append({"kind": "ack", "id": ack.alarm_id, "time": time, "text": text})
+        told = {"kind": "ack", "id": ack.alarm_id, "time": _utc_text(ack.time)}
+        entries.append(told | {"text": f"{ack.alarm_id}: {ack}"})
     return sorted(entries, key=lambda entry: entry["time"])
 
 
 def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
     verdicts = row.verdicts or {}
     names = [program.name for program in logbook.machine.program if program.name in verdicts]
-    return TAP_FIELDS(row) | {
-        "software": row.software or logbook.history.software,
-        "verdicts": {name: verdicts[name].stability.value for name in names},
-    }
+    return (
+        {"id": row.tap_id, "time": _utc_text(row.time), "tool": row.tool, "direction": row.direction}
+        | {"frequency_hz": row.frequency.value, "frequency_hz_std": row.frequency.std}
+        | {"damping_ratio": row.damping_ratio.value, "damping_ratio_std": row.damping_ratio.std}
+        | {"stiffness_n_per_m": row.stiffness.value, "stiffness_n_per_m_std": row.stiffness.std}
+        | {"baseline": row.baseline and _utc_text(row.baseline), "series": row.series}
+        | {"conditions": row.conditions.specified, "software": row.software or logbook.history.software}
+        | {"questions": [question.code for question in row.questions]}
+        | {"verdicts": {name: verdicts[name].stability.value for name in names}}
+    )
+
+
+def _excluded_json(tap: TapEntry) -> JsonObject:
+    named = {"id": tap.id, "time": _utc_text(tap.time), "tool": tap.tool, "direction": tap.direction}
+    return named | {"conditions": tap.conditions.specified, "reason": tap.excluded}
 
 
 def _note_text(line: Mapping[str, Any]) -> str:

@@ -1,7 +1,7 @@
 """Show what one tap test measured, and the results at the end of tap tests."""
 
 from collections.abc import Sequence
-from datetime import datetime
+from itertools import starmap
 
 from acquisition import Conditions
 from dsm import RemainingPreload
@@ -11,31 +11,29 @@ from lobewatch.measurement import Measurement, check_modes_together
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS, find_accepted_codes, format_not_asked
 from lobewatch.monitoring.series_history import build_series_history, estimate_preload
 from lobewatch.show.history import condition_texts
-from lobewatch.show.models import CALIBRATION_FIELDS
+from lobewatch.show.models import calibration_json
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
 from lobewatch.show.programs.advice import lobes_json
 from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
-from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, notes, pick, remark_lines
 from lobewatch.show.terminal.status_labels import status_label
 from lobewatch.tap.session import TapSession
 from lobewatch.tool import compute_lobes
-
-MEASUREMENT_FIELDS = json_fields(
-    "tap_id time tool direction conditions=self modes followed calibration",
-    {"time": datetime.isoformat, "modes": mode_json, "followed": mode_json, "calibration": CALIBRATION_FIELDS},
-)
 
 
 def measurement_json(measurement: Measurement, logbook: Logbook) -> JsonObject:
     """Return a measurement, the diagrams of its tool as it was known then, and the remarks on it."""
     assembly = logbook.assembly(until=measurement.tap_id)
     lobes = compute_lobes(assembly, logbook.machine)
-    return MEASUREMENT_FIELDS(measurement) | {
-        "conditions": _tap_conditions(measurement, logbook).specified,
-        "preload_left": _remaining_preload(measurement, logbook),
-        "lobes": [lobes_json(name, diagram) for name, diagram in lobes.items()],
-        "remarks": assembly.remarks,
-    }
+    followed, calibration = measurement.followed, measurement.calibration
+    return (
+        {"tap_id": measurement.tap_id, "time": measurement.time.isoformat(), **pick(measurement, "tool", "direction")}
+        | {"conditions": _tap_conditions(measurement, logbook).specified}
+        | {"modes": list(map(mode_json, measurement.modes)), "followed": followed and mode_json(followed)}
+        | {"calibration": calibration and calibration_json(calibration)}
+        | {"preload_left": _remaining_preload(measurement, logbook)}
+        | {"lobes": list(starmap(lobes_json, lobes.items())), "remarks": assembly.remarks}
+    )
 
 
 def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:

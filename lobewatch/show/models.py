@@ -7,39 +7,42 @@ import numpy as np
 from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
-from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 
 NODE_STIFFNESS_RATIO = 1e4
 """Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
 
 
-CALIBRATION_FIELDS = json_fields("""
-    frequency_hz=frequency mode theory=spindle.theory bearing_stiffness_n_per_m=bearing_stiffness
-    bearing_stiffness_n_per_m_std=bearing_stiffness_std bearing_stiffness_n_per_m_interval=bearing_stiffness_interval
-    residual_hz=residual factor sensitivity remarks energy_share static_tip_stiffness_n_per_m=static_stiffness_after
-    static_tip_stiffness_before_n_per_m=static_stiffness_before modal_tip_stiffness_n_per_m=modal_stiffness_after
-    modal_tip_stiffness_before_n_per_m=modal_stiffness_before
-""")
-STIFFNESS_FIT_FIELDS = json_fields("""
-    groups factor factor_std stiffness_n_per_m=stiffness stiffness_n_per_m_std=stiffness_std correlation mode
-    frequency_hz=frequency residual_hz=residual energy_share condition remarks
-""")
-DAMPING_FIELDS = json_fields("""
-    damping_ratio bearing_damping_n_s_per_m=bearing_damping bearing_damping_sensitivity=sensitivity
-""")
-MODEL_MODE_FIELDS = json_fields("""
-    frequency_hz=frequency modal_tip_stiffness_n_per_m=tip_stiffness bearing_energy_share=bearing_share
-    segment_energy_share=segment_share joint_energy_share=joint_share
-""")
-model_json = json_fields(
-    """
-    tool=state.tool bearings_from=state.origin theory=state.spindle.theory length_mm=state.spindle.length*1e3
-    mass_kg=state.spindle.mass modes static_tip_stiffness_n_per_m=static_stiffness critical_speed_rpm=critical_speed
-    first_frequency_with_rigid_bearings_hz=rigid_frequency
-    """,
-    {"modes": MODEL_MODE_FIELDS},
-)
-"""Function that returns a spindle model with its modes."""
+def calibration_json(calibration: Calibration) -> JsonObject:
+    """Return a bearing stiffness calibrated to one mode, and the stiffness at the tool tip before and after."""
+    return (
+        {"frequency_hz": calibration.frequency, "mode": calibration.mode, "theory": calibration.spindle.theory}
+        | {"bearing_stiffness_n_per_m": calibration.bearing_stiffness}
+        | {"bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std}
+        | {"bearing_stiffness_n_per_m_interval": calibration.bearing_stiffness_interval}
+        | {"residual_hz": calibration.residual, **pick(calibration, "factor", "sensitivity", "remarks", "energy_share")}
+        | {"static_tip_stiffness_n_per_m": calibration.static_stiffness_after}
+        | {"static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before}
+        | {"modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after}
+        | {"modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before}
+    )
+
+
+def model_json(model: ModelSummary) -> JsonObject:
+    """Return a spindle model with its modes."""
+    spindle = model.state.spindle
+    modes = [
+        {"frequency_hz": mode.frequency, "modal_tip_stiffness_n_per_m": mode.tip_stiffness}
+        | {"bearing_energy_share": mode.bearing_share, "segment_energy_share": mode.segment_share}
+        | {"joint_energy_share": mode.joint_share}
+        for mode in model.modes
+    ]
+    return (
+        {"tool": model.state.tool, "bearings_from": model.state.origin, "theory": spindle.theory}
+        | {"length_mm": spindle.length * 1e3, "mass_kg": spindle.mass, "modes": modes}
+        | {"static_tip_stiffness_n_per_m": model.static_stiffness, "critical_speed_rpm": model.critical_speed}
+        | {"first_frequency_with_rigid_bearings_hz": model.rigid_frequency}
+    )
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
@@ -47,15 +50,23 @@ def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
     errors = None if std is None else np.where(is_fitted, std, np.nan)
     values = np.where(is_fitted, fit.stiffness, np.nan)
-    return STIFFNESS_FIT_FIELDS(fit) | {"stiffness_n_per_m": values, "stiffness_n_per_m_std": errors}
+    return (
+        pick(fit, "groups", "factor", "factor_std")
+        | {"stiffness_n_per_m": values, "stiffness_n_per_m_std": errors, "correlation": fit.correlation}
+        | {"mode": fit.mode, "frequency_hz": fit.frequency, "residual_hz": fit.residual}
+        | pick(fit, "energy_share", "condition", "remarks")
+    )
 
 
 def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
     """Return the stiffnesses and dampers that make a model fit."""
     stiffness, dampers = calibration.stiffness, calibration.dampers
-    damping = {} if dampers is None else DAMPING_FIELDS(dampers)
+    damping: JsonObject = {}
+    if dampers is not None:
+        damping = {"damping_ratio": dampers.damping_ratio, "bearing_damping_n_s_per_m": dampers.bearing_damping}
+        damping |= {"bearing_damping_sensitivity": dampers.sensitivity}
     if isinstance(stiffness, Calibration):
-        return CALIBRATION_FIELDS(stiffness) | {"preload_left": stiffness.remaining_preload} | damping
+        return calibration_json(stiffness) | {"preload_left": stiffness.remaining_preload} | damping
     return stiffness_fit_json(stiffness) | damping
 
 
@@ -71,8 +82,7 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
 def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
-    headings = "mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)"
-    table = new_table(*headings)
+    table = new_table("mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)")
     for number, mode in enumerate(model.modes, 1):
         is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
         stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
@@ -88,22 +98,17 @@ def model_texts(model: ModelSummary) -> Texts:
     ]
 
 
-MISFIT_TEXT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
-UNDETERMINED_TEXT = "no measured mode feels the joints: nothing is to be written into machine.toml"
-
-
 def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
-    return stiffness_fit_json(fit) | {
-        "taps": {tap.tool: tap.tap_id for tap in calibration.taps},
-        "tool": [calibration.taps[i].tool for i in fit.shaft],
-        "fits_one_spindle": not fit.has_misfit,
-        "not_counted_hz": calibration.unmatched,
-        "machine_toml": _joint_lines(calibration.joints),
-        "predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()},
-        "remarks": [*fit.remarks, *calibration.remarks],
-    }
+    return (
+        stiffness_fit_json(fit)
+        | {"taps": {tap.tool: tap.tap_id for tap in calibration.taps}}
+        | {"tool": [calibration.taps[i].tool for i in fit.shaft], "fits_one_spindle": not fit.has_misfit}
+        | {"not_counted_hz": calibration.unmatched, "machine_toml": _joint_lines(calibration.joints)}
+        | {"predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()}}
+        | {"remarks": [*fit.remarks, *calibration.remarks]}
+    )
 
 
 def tools_texts(calibration: JointCalibration) -> Texts:
@@ -121,7 +126,8 @@ def tools_texts(calibration: JointCalibration) -> Texts:
         caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
         lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
-        lines.append(MISFIT_TEXT if calibration.fit.has_misfit else UNDETERMINED_TEXT)
+        why = "the tools do not fit one spindle" if calibration.fit.has_misfit else "no measured mode feels the joints"
+        lines.append(f"{why}: nothing is to be written into machine.toml")
     if not calibration.predicted or calibration.fit.has_misfit:
         return [*lines]
     table = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")

@@ -9,11 +9,9 @@ from rich.table import Table
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.show.terminal.output import Texts, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
-TRUST_ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
-"""Order in which modes are shown."""
 TRUST_SYMBOLS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
 """Mark after a mode."""
 MIN_SHOWN_PHASE = 1.0
@@ -28,17 +26,20 @@ NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
 
-mode_json = json_fields(
-    """
-    frequency_hz=frequency frequency_hz_std=standard_error.0 frequency_hz_std_of_fit=fit_error.0
-    damping_ratio damping_ratio_std=standard_error.1 damping_ratio_std_of_fit=fit_error.1
-    stiffness_n_per_m=stiffness stiffness_n_per_m_std=standard_error.2 stiffness_n_per_m_std_of_fit=fit_error.2
-    interval_95=self correlation hits=n_hits driving_point=is_driving_point phase_deg phase_deg_std coherence misfit
-    misfit_share trust=self found_again=match_count half_power_damping_ratio=half_power_damping remarks method
-    """,
-    {"interval_95": Mode.interval, "trust": assess_trust},
-)
-"""Function that returns one mode with its standard errors over the hits and of the fit."""
+def mode_json(mode: Mode) -> JsonObject:
+    """Return one mode with its standard errors over the hits and of the fit."""
+    std, of_fit = mode.standard_error, mode.fit_error
+    return (
+        {"frequency_hz": mode.frequency, "frequency_hz_std": std[0], "frequency_hz_std_of_fit": of_fit[0]}
+        | {"damping_ratio": mode.damping_ratio, "damping_ratio_std": std[1], "damping_ratio_std_of_fit": of_fit[1]}
+        | {"stiffness_n_per_m": mode.stiffness, "stiffness_n_per_m_std": std[2]}
+        | {"stiffness_n_per_m_std_of_fit": of_fit[2]}
+        | {"interval_95": mode.interval(), "correlation": mode.correlation, "hits": mode.n_hits}
+        | {"driving_point": mode.is_driving_point}
+        | pick(mode, "phase_deg", "phase_deg_std", "coherence", "misfit", "misfit_share")
+        | {"trust": assess_trust(mode), "found_again": mode.match_count}
+        | {"half_power_damping_ratio": mode.half_power_damping, "remarks": mode.remarks, "method": mode.method}
+    )
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
@@ -47,7 +48,7 @@ def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
     def is_kept(mode: Mode) -> bool:
         return rejected or assess_trust(mode) is not Trust.REJECTED or any(r.code == "by-hand" for r in mode.remarks)
 
-    return sorted(filter(is_kept, modes), key=lambda mode: (TRUST_ORDER.index(assess_trust(mode)), mode.frequency))
+    return sorted(filter(is_kept, modes), key=lambda mode: ([*Trust].index(assess_trust(mode)), mode.frequency))
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
@@ -68,8 +69,7 @@ def mode_table(modes: Sequence[Mode]) -> Table:
         ]
         phase = format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
         texts += [phase] if with_phase else []
-        matches = "" if mode.match_count is None else "{} of {}".format(*mode.match_count)
-        texts += [matches] if with_matches else []
+        texts += ["" if mode.match_count is None else "{} of {}".format(*mode.match_count)] if with_matches else []
         table.add_row(*texts, TRUST_SYMBOLS[assess_trust(mode)])
     return table
 
@@ -109,7 +109,7 @@ def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> li
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
     """Return how many modes are trusted, doubtful and rejected."""
     count = Counter(assess_trust(mode) for mode in modes)
-    counts = ", ".join(f"{count[trust]} {trust}" for trust in TRUST_ORDER)
+    counts = ", ".join(f"{count[trust]} {trust}" for trust in Trust)
     looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
     hints = [] if looked else ["--beside looks for them in other measurements"]
     hints = hints if everything or not modes else ["--all shows each, with every remark", *hints]
@@ -120,7 +120,7 @@ def trust_reasons(modes: Sequence[Mode]) -> list[str]:
     """Return which modes are no driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
-    for trust in TRUST_ORDER[1:]:
+    for trust in (Trust.DOUBTFUL, Trust.REJECTED):
         alike = (mode for mode in modes if assess_trust(mode) is trust)
         texts = [f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})" for mode in alike]
         lines += [f"{TRUST_SYMBOLS[trust]} {trust}: {', '.join(texts)}"] if texts else []
@@ -134,21 +134,21 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
         fit, difference = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None), "not fitted"
         if fit is not None and abs(fit.frequency - mode.frequency) < mode.damping_ratio * mode.frequency:
             zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
-            off = mode.frequency - fit.frequency
-            difference = f"f_n {off:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+            difference = f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
         stiffness = format_rounded(mode.stiffness, scale=1e6, digits=5)
         table.add_row(f"{mode.frequency:.5g}", f"{100 * mode.damping_ratio:.5g}", stiffness, difference)
     return table
 
 
-file_modes_json = json_fields(
-    """
-    file=path n_averages=frf.n_averages usable_band_hz=frf.usable_band facts by_hand modes=fitted peak_picking=picked
-    remarks
-    """,
-    {"file": str, "modes": mode_json, "peak_picking": mode_json},
-)
-"""Function that returns the modes of one file, fitted and by peak picking."""
+def file_modes_json(file_modes: FileModes) -> JsonObject:
+    """Return the modes of one file, fitted and by peak picking."""
+    frf = file_modes.frf
+    return (
+        {"file": str(file_modes.path), "n_averages": frf and frf.n_averages, "usable_band_hz": frf and frf.usable_band}
+        | {"facts": file_modes.facts, "by_hand": file_modes.by_hand}
+        | {"modes": list(map(mode_json, file_modes.fitted)), "peak_picking": list(map(mode_json, file_modes.picked))}
+        | {"remarks": file_modes.remarks}
+    )
 
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Texts:

@@ -2,13 +2,11 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from datetime import datetime
 from itertools import chain
-from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from acquisition import DataError, Fact, Remark
@@ -22,42 +20,33 @@ from lobewatch.measurement.recording_questions import find_open_questions, quest
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
-from lobewatch.show.terminal.output import JsonObject, Texts, emit, json_fields, new_table, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, emit, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
 """Names of the steps of a replay."""
-REBUILD_PROGRESS_STEP = 10
-"""Number of tap tests between two progress lines of a rebuild."""
 
 
-class ReplayProgress:
+class ReplayProgress(Progress):
     """Progress bar of each step of a replay, shown on a terminal only."""
 
     def __init__(self) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bars = Progress(*columns, console=notes, transient=True, disable=not notes.is_terminal)
-        self._tasks: dict[str, int] = {}
-
-    def __enter__(self) -> Self:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bars.stop()
+        super().__init__(*columns, console=notes, transient=True, disable=not notes.is_terminal)
+        self._step_ids: dict[str, TaskID] = {}
 
     def __call__(self, step: str, done: int, of: int) -> None:
         """Update the bar of a step: so many files are done, of so many."""
-        if step not in self._tasks:
-            self._tasks[step] = self._bars.add_task(REPLAY_STEP_NAMES[step], total=of)
-        self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
+        if step not in self._step_ids:
+            self._step_ids[step] = self.add_task(REPLAY_STEP_NAMES[step], total=of)
+        self.update(self._step_ids[step], completed=done, total=of)
 
 
 def make_rebuild_progress(name: str) -> Callable[[int, int], None]:
-    """Return a function that prints a progress line every few tap tests of this machine."""
+    """Return a function that prints a progress line every ten tap tests of this machine."""
 
     def show(done: int, of: int) -> None:
-        if done % REBUILD_PROGRESS_STEP == 0:
+        if done % 10 == 0:
             notes.print(f"{name}: {done} of {of} tap tests", markup=False)
 
     return show
@@ -75,24 +64,21 @@ def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, a
         raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
 
 
-STATUS_FIELDS = json_fields("file known=stored_tap_id refused=rejection", {"file": str})
-QUESTION_FIELDS = json_fields("code text")
-PREVIEW_FIELDS = json_fields(
-    """
-    format=recording.title facts=recording.facts time=measurement.time tool=measurement.tool
-    direction=measurement.direction hits=tap.flags lines=tap.frf.frequency.size averages=tap.frf.n_averages
-    modes=measurement.modes followed=measurement.followed questions=measurement.remarks
-    """,
-    {"time": datetime.isoformat, "hits": attrgetter("words"), "modes": mode_json, "followed": mode_json},
-)
-
-
 def preview_json(preview: ReplayPreview) -> JsonObject:
     """Return what would become of one file."""
-    if preview.measurement is None or preview.tap is None or preview.recording is None:
-        return STATUS_FIELDS(preview)
-    asked = find_open_questions(preview.measurement.remarks)
-    return STATUS_FIELDS(preview) | PREVIEW_FIELDS(preview) | {"questions": list(map(QUESTION_FIELDS, asked))}
+    recording, tap, measurement = preview.recording, preview.tap, preview.measurement
+    status = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
+    if measurement is None or tap is None or recording is None:
+        return status
+    followed, asked = measurement.followed, find_open_questions(measurement.remarks)
+    return (
+        status
+        | {"format": recording.title, "facts": recording.facts, "time": measurement.time.isoformat()}
+        | {"tool": measurement.tool, "direction": measurement.direction, "hits": [flags.words for flags in tap.flags]}
+        | {"lines": tap.frf and tap.frf.frequency.size, "averages": tap.frf and tap.frf.n_averages}
+        | {"modes": list(map(mode_json, measurement.modes)), "followed": followed and mode_json(followed)}
+        | {"questions": [{"code": question.code, "text": question.text} for question in asked]}
+    )
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
@@ -182,15 +168,9 @@ MAX_KNOWN_LISTED = 3
 
 
 def emit_replay(
-    outcome: ReplayOutcome,
-    logbook: Logbook,
-    n_files: int,
-    passed: Sequence[Path],
-    accepted: Sequence[str],
-    *,
-    as_json: bool,
+    outcome: ReplayOutcome, logbook: Logbook, n_files: int, passed: Sequence[Path], codes: Sequence[str], as_json: bool
 ) -> None:
-    """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
+    """Print what has become of files; passed: other files of the folders; codes: of questions answered."""
     known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
     if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
         known = [f"{len(known)} of {n_files} files are stored already"]
@@ -198,9 +178,9 @@ def emit_replay(
     for line in known:
         notes.print(line, markup=False)
     if as_json:
-        emit(replay_json(outcome, logbook) | {"accepted": accepted, "questions": logbook.questions}, as_json)
+        emit(replay_json(outcome, logbook) | {"accepted": codes, "questions": logbook.questions}, as_json)
         return
-    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in codes)]
     emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 
@@ -264,16 +244,16 @@ class MachineRebuild(NamedTuple):
     """Remarks on the machine after the rebuild."""
 
 
-rebuild_json = json_fields("done=repairs tap_tests=n_taps remarks")
-"""Function that returns the outcome of rebuilding one machine."""
+def rebuild_json(rebuild: MachineRebuild) -> JsonObject:
+    """Return the outcome of rebuilding one machine."""
+    return {"done": rebuild.repairs, "tap_tests": rebuild.n_taps, "remarks": rebuild.remarks}
 
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
     made = f"made anew from {rebuild.n_taps} tap test(s)"
     missing = "not made anew (see above); the next command that can write makes it"
-    history = f"history.rows: {made if rebuild.is_saved else missing}"
-    return [*rebuild.repairs, *remark_lines(rebuild.remarks), history]
+    return [*rebuild.repairs, *remark_lines(rebuild.remarks), f"history.rows: {made if rebuild.is_saved else missing}"]
 
 
 def folder_rebuild_json(rebuilds: Mapping[str, MachineRebuild]) -> JsonObject:

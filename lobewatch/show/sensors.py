@@ -8,7 +8,7 @@ from rich.markup import escape
 from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPort, explain_no_ports
 from dsm import format_with_error
 from lobewatch.sensors import Finding, MassCheck, SensorList, SkewCheck
-from lobewatch.show.terminal.output import JsonObject, Texts, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 
 NO_ANSWER_TEXT = (
     "No DAQ answers. One that was just plugged in may need some seconds; a DATAQ device must blink yellow (CDC mode)."
@@ -34,15 +34,20 @@ def _usb_id(port: PortInfo) -> str:
     return "" if port.vendor is None else f"{port.vendor:04x}:{port.product or 0:04x}"
 
 
-ANSWER_FIELDS = json_fields("""
-    driver model=identity.model serial=identity.serial firmware=identity.firmware tried_on_hardware=is_hardware_tested
-""")
-PORT_FIELDS = json_fields(
-    "device=port.device usb=port serial_number=port.serial_number description=port.description answer problem",
-    {"usb": _usb_id, "answer": ANSWER_FIELDS, "problem": lambda problem: problem or None},
-)
-ports_json = json_fields("ports remarks", {"ports": PORT_FIELDS})
-"""Function that returns every port with the device that answers, and what is wrong with drivers."""
+def ports_json(scan: PortScan) -> JsonObject:
+    """Return every port with the device that answers, and what is wrong with drivers."""
+    return {"ports": list(map(_port_json, scan.ports)), "remarks": scan.remarks}
+
+
+def _port_json(scanned: ScannedPort) -> JsonObject:
+    port, answer = scanned.port, scanned.answer
+    identified = answer and {
+        "driver": answer.driver,
+        **pick(answer.identity, "model", "serial", "firmware"),
+        "tried_on_hardware": answer.is_hardware_tested,
+    }
+    named = {"device": port.device, "usb": _usb_id(port), "serial_number": port.serial_number}
+    return named | {"description": port.description, "answer": identified, "problem": scanned.problem or None}
 
 
 def _answer_text(scanned: ScannedPort) -> str:
@@ -65,35 +70,42 @@ def _ports_summary(ports: tuple[ScannedPort, ...]) -> str:
     return f"{len(answering)} of {len(ports)} answer; next: {following}"
 
 
-CHANNEL_FIELDS = json_fields(
-    """
-    quantity direction sensitivity_v_per_si=sensitivity full_scale_v=full_scale full_scale_si=self adc_bits
-    serial_number calibration_date skew_us=skew*1e6
-    """,
-    {"full_scale_si": lambda channel: channel.full_scale / abs(channel.sensitivity)},
-)
-sensors_json = json_fields(
-    """
-    model=identity.model serial=identity.serial channels sample_rate_hz=nominal_rate measured_rate_hz=measured_rate.rate
-    measured_rate_hz_std=measured_rate.std remarks errors
-    """,
-    {"channels": CHANNEL_FIELDS},
-)
-"""Function that returns the device, its channels and its sample rate."""
-mass_check_json = json_fields("""
-    mass_kg=calibration.mass ratio=calibration.ratio ratio_std=calibration.ratio_std phase_deg=calibration.phase
-    inverted=calibration.inverted flatness=calibration.flatness band_hz=calibration.band hits=calibration.n_hits
-    agrees=calibration.agrees force_sensitivity_v_per_n=calibration.force_sensitivity
-    acceleration_sensitivity_v_per_m_s2=calibration.acceleration_sensitivity remarks=calibration.remarks
-""")
-"""Function that returns the ratio F/(m a) of a hung mass, and the sensitivities that follow from it."""
-skew_check_json = json_fields(
-    """
-    skew_us=measured.skew*1e6 skew_us_std=measured.std*1e6 skew_samples=self coherent_share=measured.coherent_share
-    """,
-    {"skew_samples": lambda check: check.measured.skew * check.sample_rate},
-)
-"""Function that returns the skew between the channels and its standard error."""
+def sensors_json(sensors: SensorList) -> JsonObject:
+    """Return the device, its channels and its sample rate."""
+    measured = sensors.measured_rate
+    return (
+        pick(sensors.identity, "model", "serial")
+        | {"channels": list(map(_channel_json, sensors.channels)), "sample_rate_hz": sensors.nominal_rate}
+        | {"measured_rate_hz": measured and measured.rate, "measured_rate_hz_std": measured and measured.std}
+        | {"remarks": sensors.remarks, "errors": sensors.errors}
+    )
+
+
+def _channel_json(channel: Channel) -> JsonObject:
+    return (
+        {"quantity": channel.quantity, "direction": channel.direction, "sensitivity_v_per_si": channel.sensitivity}
+        | {"full_scale_v": channel.full_scale, "full_scale_si": channel.full_scale / abs(channel.sensitivity)}
+        | pick(channel, "adc_bits", "serial_number", "calibration_date")
+        | {"skew_us": channel.skew * 1e6}
+    )
+
+
+def mass_check_json(check: MassCheck) -> JsonObject:
+    """Return the ratio F/(m a) of a hung mass, and the sensitivities that follow from it."""
+    result = check.calibration
+    return (
+        {"mass_kg": result.mass, "ratio": result.ratio, "ratio_std": result.ratio_std, "phase_deg": result.phase}
+        | {"inverted": result.inverted, "flatness": result.flatness, "band_hz": result.band, "hits": result.n_hits}
+        | {"agrees": result.agrees, "force_sensitivity_v_per_n": result.force_sensitivity}
+        | {"acceleration_sensitivity_v_per_m_s2": result.acceleration_sensitivity, "remarks": result.remarks}
+    )
+
+
+def skew_check_json(check: SkewCheck) -> JsonObject:
+    """Return the skew between the channels and its standard error."""
+    skew = check.measured
+    microseconds = {"skew_us": skew.skew * 1e6, "skew_us_std": skew.std * 1e6}
+    return microseconds | {"skew_samples": skew.skew * check.sample_rate, "coherent_share": skew.coherent_share}
 
 
 def sensors_texts(sensors: SensorList) -> Texts:

@@ -15,43 +15,35 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
 
 FORECAST_ASSUMPTIONS = (
     "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
     " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
 """Note below every table of forecast dates."""
-UNKNOWN_NOW_TEXT = "unknown now, see check"
-"""Text instead of the dates of a program without a verdict."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
-CHART_POINT, CHART_LINE = "o", "."
-
-
-ALARM_FIELDS = json_fields(
-    "kind=open_drop.change.kind since=drop_since size_percent=open_drop.change.size", {"since": datetime.isoformat}
-)
-RATE_FIELDS = json_fields("value low high")
-SERIES_FIELDS = json_fields(
-    """
-    tool direction points=self score=trend.detection.scores.-1 alarm=trend alarms=self light=self
-    fall_percent=drop.value fall_std_percent=drop.std preload_left=self rate_percent_per_month=trend.rate
-    """,
-    {"alarm": lambda trend: trend.open_drop and ALARM_FIELDS(trend), "rate_percent_per_month": RATE_FIELDS},
-)
 
 
 def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> JsonObject:
     """Return points, score, alarm, status and forecast; percents are 100 ln of the frequency over that of the first."""
-    status, points = outlook.status, series.trend.points if series.trend else ()
-    return SERIES_FIELDS(series) | {
-        "points": [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points],
-        "alarms": [alarm.to_row(status.time) for alarm in status.alarms],
-        "light": status.status,
-        "preload_left": preload,
-        "forecast": build_forecast_rows(outlook.programs, outlook.limits),
-    }
+    status, trend = outlook.status, series.trend
+    points, rate = trend.points if trend else (), trend and trend.rate
+    used = [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points]
+    return (
+        {"tool": series.tool, "direction": series.direction, "points": used}
+        | {"score": trend and trend.detection.scores[-1], "alarm": trend and _drop_json(trend)}
+        | {"alarms": [alarm.to_row(status.time) for alarm in status.alarms], "light": status.status}
+        | {"fall_percent": series.drop.value, "fall_std_percent": series.drop.std, "preload_left": preload}
+        | {"rate_percent_per_month": rate and rate._asdict()}
+        | {"forecast": build_forecast_rows(outlook.programs, outlook.limits)}
+    )
+
+
+def _drop_json(trend: Trend) -> JsonObject | None:
+    drop, since = trend.open_drop, trend.drop_since
+    return drop and {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
 
 
 def trend_csv(series: SeriesStatus) -> str:
@@ -82,7 +74,7 @@ def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     now, rows = outlook.status.time, list[tuple[str, str, str]]()
     for name, fate in outlook.programs.items():
         dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
-        rows.append((name, *((UNKNOWN_NOW_TEXT,) * 2 if name in outlook.unknown_programs else dates)))
+        rows.append((name, *(("unknown now, see check",) * 2 if name in outlook.unknown_programs else dates)))
     return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
 
 
@@ -200,9 +192,9 @@ def chart_lines(trend: Trend) -> list[str]:
     canvas = np.full((rows, CHART_WIDTH), " ")
     if trend.forecast is not None:
         line = np.interp(np.linspace(dates[0], dates[-1], CHART_WIDTH), dates, trend.forecast.fitted - trend.start)
-        canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = CHART_LINE
+        canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = "."
     columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
-    canvas[_canvas_indices(percent, high, low, rows), columns] = CHART_POINT
+    canvas[_canvas_indices(percent, high, low, rows), columns] = "o"
     ticks = [f"{value:+8.2f} %" for value in np.linspace(high, low, rows).tolist()]
     labels = [tick if row % 4 == 0 or row == rows - 1 else " " * 10 for row, tick in enumerate(ticks)]
     drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]

@@ -3,7 +3,6 @@
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,9 @@ from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
-from lobewatch.show.programs.materials import power_text
+from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.programs.verdicts import factor_text
-from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
 FAULT_TEXTS: Mapping[str, str] = {
@@ -50,8 +49,6 @@ MICROPHONE_NOTE = (
     "from one of the cut, and it does not tell how far the tool moves"
 )
 """Limits of a recording by microphone."""
-MIN_RATE_FACTOR = 2 * MIN_TOOTH_HARMONICS
-"""Sample rate over tooth-passing frequency that holds enough harmonics of tooth passing."""
 
 
 NEXT_STEP_TEXTS: Mapping[str, str] = {
@@ -61,11 +58,6 @@ NEXT_STEP_TEXTS: Mapping[str, str] = {
     "cannot tell": "listen again; this one teaches nothing",
 }
 """Next step for each verdict on a recorded cut."""
-
-
-def next_step_text(comparison: CutComparison) -> str:
-    """Return the next step after a recorded cut."""
-    return NEXT_STEP_TEXTS[comparison.detected.verdict]
 
 
 def reason_text(comparison: CutComparison) -> str:
@@ -84,7 +76,7 @@ def _fault_text(comparison: CutComparison) -> str:
         case "tacho-contradicts":
             return f"{text}: {_speed_conflict_text(comparison)}"
         case "slow-sampling":
-            return f"{text}: {MIN_RATE_FACTOR * comparison.tooth_passing_frequency:.0f} Hz or more"
+            return f"{text}: {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
             distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
@@ -158,24 +150,24 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
     return texts
 
 
-recorded_cut_json = json_fields(
-    """
-    word=detected.verdict reason=detected.reason chatter_frequency_hz=detected.chatter.frequency
-    chatter_frequency_hz_std=detected.chatter.error elsewhere_rpm=detected.distant_rpm
-    unexplained_tone_hz=detected.tone sensor speed_rpm=detected.speed_rpm
-    speed_rpm_std=detected.spindle_speed.error*60 commanded_rpm=setting.speed_rpm measured_rpm=detected.measured_rpm
-    depth_mm=setting.depth*1e3 tooth_frequency_hz=tooth_passing_frequency energy_ratio=detected.energy_ratio
-    lobe=lobe_number side_bands_hz=detected power_kw=power.watts/1e3
-    tangential_by_power_n_per_mm2=power.tangential/1e6 predicted=predicted.stable
-    predicted_frequency_hz=predicted.frequency predicted_apart_hz=frequency_difference begin_s=detected.parts.begin
-    end_s=detected.parts.end steady_begin_s=detected.parts.steady_begin steady_end_s=detected.parts.steady_end
-    """,
-    {
-        "side_bands_hz": lambda heard: sorted(heard.chatter.peaks.frequency.tolist()) if heard.chatter else [],
-        "predicted": lambda is_stable: "stable" if is_stable else "chatter",
-    },
-)
-"""Function that returns a recorded cut with all that was detected in it."""
+def recorded_cut_json(comparison: CutComparison) -> JsonObject:
+    """Return a recorded cut with all that was detected in it."""
+    heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
+    return (
+        {"word": heard.verdict, "reason": heard.reason, "chatter_frequency_hz": chatter and chatter.frequency}
+        | {"chatter_frequency_hz_std": chatter and chatter.error, "elsewhere_rpm": heard.distant_rpm}
+        | {"unexplained_tone_hz": heard.tone, "sensor": comparison.sensor, "speed_rpm": heard.speed_rpm}
+        | {"speed_rpm_std": heard.spindle_speed and heard.spindle_speed.error * 60}
+        | {"commanded_rpm": comparison.setting.speed_rpm, "measured_rpm": heard.measured_rpm}
+        | {"depth_mm": comparison.setting.depth * 1e3, "tooth_frequency_hz": comparison.tooth_passing_frequency}
+        | {"energy_ratio": heard.energy_ratio, "lobe": comparison.lobe_number}
+        | {"side_bands_hz": sorted(chatter.peaks.frequency.tolist()) if chatter else []}
+        | power_json(comparison.power)
+        | {"predicted": expected and ("stable" if expected.stable else "chatter")}
+        | {"predicted_frequency_hz": expected and expected.frequency}
+        | {"predicted_apart_hz": comparison.frequency_difference}
+        | {f"{name}_s": time for name, time in pick(heard.parts, "begin", "end", "steady_begin", "steady_end").items()}
+    )
 
 
 def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:
@@ -194,28 +186,9 @@ def _known_mm(depth: float) -> float | None:
     return _round_to_mm(depth) if depth and math.isfinite(depth) else None
 
 
-speed_pocket_json = json_fields(
-    "speed_rpm window_rpm depth_mm=self over_lowest_limit=gain", {"depth_mm": lambda _: None}
-)
-"""Function that returns one pocket of unknown depth."""
-TRIED_FIELDS = json_fields(
-    "cut_at_rpm=speed_rpm cuts heard_stable_mm=stable_depth heard_chatter_mm=chatter_depth",
-    {"cuts": attrgetter("id"), "heard_stable_mm": _known_mm, "heard_chatter_mm": _known_mm},
-)
-SUGGESTED_CUT_FIELDS = json_fields(
-    """
-    speed_rpm depth_mm=depth chance_of_chatter=chatter_probability expected_gain=gain settles=most_informative repeats
-    """,
-    {"depth_mm": lambda depth: round(1e3 * depth, 6), "repeats": lambda name: name or None},
-)
-INTERVAL_FIELDS = json_fields("mean low high std")
-LEARNED_FIELDS = json_fields(
-    """
-    cuts=accepted_cuts chatter_frequencies=posterior.n_frequencies frequency_learnt=posterior.n_frequencies
-    effective_sample_size=posterior.effective_size
-    """,
-    {"cuts": attrgetter("id"), "frequency_learnt": bool},
-)
+def speed_pocket_json(pocket: SpeedPocket) -> JsonObject:
+    """Return one pocket of unknown depth."""
+    return {**pick(pocket, "speed_rpm", "window_rpm"), "depth_mm": None, "over_lowest_limit": pocket.gain}
 
 
 def speed_pocket_table(pockets: Sequence[SpeedPocket]) -> Table:
@@ -239,26 +212,29 @@ def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Seque
     return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
 
 
-def tried_depths_json(program: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
+def tried_depths_json(table: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
     """Return the next test cut, and the depths that were tried in each pocket; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     return {
-        "program": program.name,
+        "program": table.name,
         "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
-        "pockets": [speed_pocket_json(tried.pocket) | TRIED_FIELDS(tried) for tried in depths],
+        "pockets": [
+            speed_pocket_json(tried.pocket)
+            | {"cut_at_rpm": tried.speed_rpm, "cuts": [cut.id for cut in tried.cuts]}
+            | {"heard_stable_mm": _known_mm(tried.stable_depth), "heard_chatter_mm": _known_mm(tried.chatter_depth)}
+            for tried in depths
+        ],
     }
 
 
-def tried_depths_lines(
-    program: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path
-) -> Iterator[str]:
+def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path) -> Iterator[str]:
     """Return the next test cut, and the depths that were stable; first: depth of the first cut (m)."""
     following = _next_depth(depths, first)
     if following is not None:
         speed, depth = following
         number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the pocket nearest to it"
-        yield f"{program.name}: {number}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm"
-        yield _observe_text(folder, program.name, speed, f"{_round_to_mm(depth):g}")
+        yield f"{table.name}: {number}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm"
+        yield _observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
     stable = [tried for tried in depths if tried.stable_depth]
     for tried in stable:
         chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
@@ -281,15 +257,17 @@ def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, flo
 
 def suggestion_json(next_cut: NextCut) -> JsonObject:
     """Return the next test cut, and what it rests on."""
-    learning, best = next_cut.learning, _best_stable_cut(next_cut.learning)
-    return {
-        "program": learning.program.name,
-        "suggested": next_cut.suggestion and SUGGESTED_CUT_FIELDS(next_cut.suggestion),
-        "cuts_made": len(learning.own_cuts),
-        "cuts_left": next_cut.cuts_left,
-        "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
-        "learnt": learned_json(learning),
-    }
+    learning, best, cut = next_cut.learning, _best_stable_cut(next_cut.learning), next_cut.suggestion
+    suggested = cut and (
+        {"speed_rpm": cut.speed_rpm, "depth_mm": round(1e3 * cut.depth, 6)}
+        | {"chance_of_chatter": cut.chatter_probability, "expected_gain": cut.gain, "settles": cut.most_informative}
+        | {"repeats": cut.repeats or None}
+    )
+    return (
+        {"program": learning.program.name, "suggested": suggested}
+        | {"cuts_made": len(learning.own_cuts), "cuts_left": next_cut.cuts_left}
+        | {"best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]}, "learnt": learned_json(learning)}
+    )
 
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
@@ -324,8 +302,9 @@ def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
 def _no_suggestion_text(next_cut: NextCut) -> str:
     if not next_cut.cuts_left:
         return f"{len(next_cut.learning.own_cuts)} test cuts are made; a larger --cuts asks for more"
-    reason = f"no test cut: {next_cut.cut_range.text}; choose another tool"
-    return reason if next_cut.cut_range.is_empty else "no test cut is worth making: nothing more is to be gained"
+    if next_cut.cut_range.is_empty:
+        return f"no test cut: {next_cut.cut_range.text}; choose another tool"
+    return "no test cut is worth making: nothing more is to be gained"
 
 
 def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
@@ -337,9 +316,13 @@ def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
 
 def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
-    before, after = learning.prior.intervals, learning.posterior.intervals
-    factors = {name: INTERVAL_FIELDS(after[name]) | {"before": INTERVAL_FIELDS(before[name])} for name in after}
-    return LEARNED_FIELDS(learning) | {"factors": factors}
+    before, posterior = learning.prior.intervals, learning.posterior
+    factors = {name: {**now._asdict(), "before": before[name]._asdict()} for name, now in posterior.intervals.items()}
+    return (
+        {"cuts": [cut.id for cut in learning.accepted_cuts], "chatter_frequencies": posterior.n_frequencies}
+        | {"frequency_learnt": bool(posterior.n_frequencies), "effective_sample_size": posterior.effective_size}
+        | {"factors": factors}
+    )
 
 
 def learned_texts(learning: LearningResult) -> Texts:

@@ -1,18 +1,17 @@
 """Style, axes, files and label placement of all figures."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter
+from matplotlib.transforms import Bbox
 
 from lobewatch.show.terminal.output import make_printable
 
@@ -98,26 +97,6 @@ LABEL_BACKGROUND = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
 """Background of labels that lie on lines."""
 
 
-class _Box(NamedTuple):
-    """Rectangle in points of the axes."""
-
-    left: float
-    low: float
-    right: float
-    high: float
-
-    @property
-    def area(self) -> float:
-        """Area (points squared)."""
-        return (self.right - self.left) * (self.high - self.low)
-
-    def overlap(self, box: _Box) -> float:
-        """Return the common area (points squared)."""
-        wide = min(self.right, box.right) - max(self.left, box.left)
-        high = min(self.high, box.high) - max(self.low, box.low)
-        return wide * high if wide > 0 and high > 0 else 0.0
-
-
 class LabelPlacer:
     """Labels of one figure that avoid each other; the limits of the axes are set before."""
 
@@ -127,41 +106,40 @@ class LabelPlacer:
         self._room = room
         self._above = LABEL_DISTANCE / 2 * room / LABEL_FONT_SIZE
         self._may_lack = may_lack
-        self._taken: list[_Box] = []
+        self._taken: list[Bbox] = []
 
     def add(self, text: str, place: Point, color: str = "black", sides: Sequence[LabelSide] = (*LABEL_SIDES,)) -> None:
         """Add a label at the side of a point where it covers least, the first of several equal sides."""
         boxes = {side: self._box(text, place, side) for side in sides}
         best = min(boxes, key=lambda side: self._covered(boxes[side]))
-        if self._may_lack and self._covered(boxes[best]) > MAX_HIDDEN_SHARE * boxes[best].area:
+        if self._may_lack and self._covered(boxes[best]) > MAX_HIDDEN_SHARE * _area(boxes[best]):
             return
         self._taken.append(boxes[best])
         right, up = LABEL_SIDES[best]
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": LABEL_FONT_SIZE, "bbox": LABEL_BACKGROUND}
-        style["ha"] = {1: "left", -1: "right"}.get(right, "center")
-        style["va"] = {1: "bottom", -1: "top"}.get(up, "center")
+        style |= {"ha": {1: "left", -1: "right"}.get(right, "center"), "va": {1: "bottom", -1: "top"}.get(up, "center")}
         self._axes.annotate(text, place, (LABEL_DISTANCE * right, self._above * up), color=color, **style)
 
     def reserve_area(self, low: Point, high: Point) -> None:
         """Keep labels out of the rectangle between two corners where they have a choice."""
-        self._taken.append(_Box(*self._points(low), *self._points(high)))
+        self._taken.append(Bbox.from_extents(*self._points(low), *self._points(high)))
 
     def reserve_mark(self, place: Point, size: float) -> None:
         """Keep labels off a mark of this size (points) where they have a choice."""
         x, y = self._points(place)
-        self._taken.append(_Box(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
+        self._taken.append(Bbox.from_extents(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
 
-    def _box(self, text: str, place: Point, side: LabelSide) -> _Box:
+    def _box(self, text: str, place: Point, side: LabelSide) -> Bbox:
         lines, (right, up) = text.split("\n"), LABEL_SIDES[side]
         wide, high = LETTER_WIDTH * self._room * max(map(len, lines)), LINE_HEIGHT * self._room * len(lines)
         x, y = self._points(place)
         x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (self._above + high / 2)
-        return _Box(x - wide / 2, y - high / 2, x + wide / 2, y + high / 2)
+        return Bbox.from_extents(x - wide / 2, y - high / 2, x + wide / 2, y + high / 2)
 
-    def _covered(self, box: _Box) -> float:
+    def _covered(self, box: Bbox) -> float:
         """Return the area of a box on other labels and outside of the axes."""
-        inside = box.overlap(_Box(0, 0, *self._size))
-        return box.area - inside + sum(box.overlap(taken) for taken in self._taken)
+        inside = _area(Bbox.intersection(box, Bbox.from_extents(0, 0, *self._size)))
+        return _area(box) - inside + sum(_area(Bbox.intersection(box, taken)) for taken in self._taken)
 
     def _points(self, place: Point) -> Point:
         (x, y), (wide, high) = place, self._size
@@ -173,3 +151,7 @@ class LabelPlacer:
         box = self._axes.get_window_extent()
         points = 72 / self._axes.figure.dpi
         return box.width * points, box.height * points
+
+
+def _area(box: Bbox | None) -> float:
+    return 0.0 if box is None else box.width * box.height

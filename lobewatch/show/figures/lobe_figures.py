@@ -5,7 +5,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -33,11 +33,9 @@ from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 DEPTH_COLORMAP = "cividis"
 """Colormap of depth: dark is shallow, bright is deep, in grey too."""
 BAND_LABEL = "what is not known of spindle and cut moves the limit within this band"
-WINDOW_LABEL = "safe speeds and depths"
-DOUBTFUL_YELLOW = "#B58900"
 VERDICT_MARKS = {
     Stability.STABLE: (Paint.GOOD, "o"),
-    Stability.DOUBTFUL: (DOUBTFUL_YELLOW, "^"),
+    Stability.DOUBTFUL: ("#B58900", "^"),
     Stability.NOT_STABLE: (Paint.ALARM, "X"),
     Stability.UNKNOWN: (Paint.UNKNOWN, "D"),
 }
@@ -59,45 +57,61 @@ MAX_SPEED_TICKS = 6
 """Largest number of speed labels of a small figure."""
 
 
-def plot_lobes(
-    speed_rpm: Floats,
-    depths: Mapping[str, Floats],
-    programs: Sequence[Verdict] = (),
-    title: str = "",
-    band: LimitBand | None = None,
-    pockets: Sequence[Setting] = (),
-    heard: Sequence[CutEntry] = (),
-    learnt: LobesAtSpeed | None = None,
-    *,
-    is_small: bool = False,
-) -> Figure:
-    """Plot a stability lobe diagram: the last of `depths` (m, by label) is the newest, those before it are the first.
+class LobeDiagram(NamedTuple):
+    """Lobe diagram of one cut, then and now."""
 
-    band: uncertainty band of the newest; pockets: recommended settings; heard: test cuts of this cut; learnt: lobes
-    corrected by them; is_small: smaller, with only the names of programs as labels.
-    """
+    cut: str
+    """Name of the cut: the reference cut, or else the first program of the tool."""
+    now: StabilityLobes
+    """Lobes of the newest tap tests."""
+    depths: Mapping[str, Floats]
+    """Limiting depths (m), shape (n,), by label, the newest last."""
+    verdicts: Sequence[Verdict] = ()
+    """Verdicts on the programs with the same cut."""
+    pockets: Sequence[Setting] = ()
+    """Recommended settings."""
+    band: LimitBand | None = None
+    """Uncertainty band of the limit."""
+    heard: Sequence[CutEntry] = ()
+    """Test cuts of the same cut."""
+    learned: LobesAtSpeed | None = None
+    """Lobes of the rotating spindle, corrected by test cuts."""
+
+    @property
+    def edges(self) -> dict[str, Floats]:
+        """Depths (m) of the bands and of the rotating spindle, by name."""
+        edges = {} if self.band is None else {"lowest": self.band.low, "highest": self.band.high}
+        if self.learned is not None:
+            lobes, band = self.learned.lobes, self.learned.band
+            edges |= {"at speed": lobes.depth, "at speed, lowest": band.low, "at speed, highest": band.high}
+        return edges
+
+
+def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False) -> Figure:
+    """Plot a stability lobe diagram; is_small: smaller, to accompany text, with only the names of programs."""
     figure, (axes,) = new_axes(1, SMALL_FIGURE_SIZE if is_small else LARGE_FIGURE_SIZE)
-    *earlier, now = depths.items()
-    finite = now[1][np.isfinite(now[1])] * 1e3
-    wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
-    wanted += [1e3 * cut.depth for cut in heard]
+    speed_rpm, band = diagram.now.speed_rpm, diagram.band
+    *earlier, (label, now) = diagram.depths.items()
+    finite = now[np.isfinite(now)] * 1e3
+    wanted = [verdict.program.depth_mm for verdict in diagram.verdicts]
+    wanted += [pocket.depth_mm for pocket in diagram.pockets] + [1e3 * cut.depth for cut in diagram.heard]
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
-    edges = (now[1], now[1]) if band is None else (band.low, band.high)
+    edges = (now, now) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in edges)
     axes.fill_between(speed_rpm, high, 2 * top, color=Paint.NEWEST, alpha=0.10, lw=0)
     if band is not None:
         axes.fill_between(speed_rpm, low, high, color=Paint.NEWEST, alpha=0.35, lw=0, label=BAND_LABEL)
-    axes.plot(speed_rpm, now[1] * 1e3, color=Paint.NEWEST, lw=1.6, label=now[0])
-    for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=Paint.FIRST, ls="--", lw=1.2, label=f"{label}, first tap tests")
-    if learnt is not None:
-        _draw_learned(axes, learnt, 2 * top)
+    axes.plot(speed_rpm, now * 1e3, color=Paint.NEWEST, lw=1.6, label=label)
+    for first, depth in earlier:
+        axes.plot(speed_rpm, depth * 1e3, color=Paint.FIRST, ls="--", lw=1.2, label=f"{first}, first tap tests")
+    if diagram.learned is not None:
+        _draw_learned(axes, diagram.learned, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     axes.set(xlabel="spindle speed (rpm)", ylabel="" if is_small else "limiting depth (mm)")
     if is_small:
         axes.xaxis.set_major_locator(MaxNLocator(MAX_SPEED_TICKS))
         figure.draw_without_rendering()  # its room is known from now on
-    _draw_marks(axes, programs, pockets, heard, is_small)
+    _draw_marks(axes, diagram, is_small=is_small)
     if not is_small:
         figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
@@ -164,26 +178,24 @@ def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
 
 
-def _draw_marks(
-    axes: Axes, programs: Sequence[Verdict], pockets: Sequence[Setting], heard: Sequence[CutEntry], is_small: bool
-) -> None:
+def _draw_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:
     """Draw test cuts, pockets and programs with their labels."""
     labels = LabelPlacer(axes, PHONE_FONT_SIZE, may_lack=True) if is_small else LabelPlacer(axes)
-    draw_test_cuts(axes, heard, labels)
+    draw_test_cuts(axes, diagram.heard, labels)
     style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
-    for i, pocket in enumerate(pockets):
+    for i, pocket in enumerate(diagram.pockets):
         (low, high), depth = pocket.window_rpm, pocket.depth_mm
-        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else WINDOW_LABEL, **style))
+        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else "safe speeds and depths", **style))
         labels.reserve_area((low, 0.0), (high, depth))
-    places = [(program.program.speed_rpm, program.program.depth_mm) for program in programs]
-    for program, place in zip(programs, places, strict=True):
+    places = [(program.program.speed_rpm, program.program.depth_mm) for program in diagram.verdicts]
+    for program, place in zip(diagram.verdicts, places, strict=True):
         colour, mark = VERDICT_MARKS[program.stability]
         axes.plot(*place, mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
         labels.reserve_mark(place, PROGRAM_MARK_SIZE)
-    for pocket in () if is_small else pockets:
+    for pocket in () if is_small else diagram.pockets:
         text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
         labels.add(text, (pocket.speed_rpm, pocket.depth_mm), POCKET_GREEN, ("above", "right", "left"))
-    for program, place in zip(programs, places, strict=True):
+    for program, place in zip(diagram.verdicts, places, strict=True):
         name = program.program.name
         labels.add(name if is_small else f"{name}\n{program.stability}", place)
 
@@ -210,7 +222,6 @@ def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) ->
             labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
 
 
-RADIAL_IMMERSIONS = np.linspace(0.05, 1.0, 39)
 MAX_WATERFALL_ROWS = 200
 """Largest number of tap tests in a waterfall."""
 
@@ -240,14 +251,13 @@ def save_lobe_figures(
 
 def plot_comparison(machine: Machine, comparison: LobeComparison, cuts: Sequence[CutEntry]) -> Figure:
     """Plot the newest diagram with its uncertainty band and the first one, with pockets, programs and test cuts."""
-    now = comparison.now
+    now, verdicts = comparison.now, comparison.verdicts
     depths = {diagram.assembly.label: diagram.lobes.depth for diagram in (comparison.then, now) if diagram is not None}
-    title = f"{_lobes_title(machine, now)}, from the {now.source}"
     band = compute_limit_band(now.lobes, now.name, now.assembly, machine)
     heard = select_test_cuts(cuts, now.name, now.assembly.tool, now.cuts[0])
-    verdicts, pockets = comparison.verdicts, comparison.pockets
-    learnt = compute_lobes_at_speed(verdicts, machine)
-    return plot_lobes(now.lobes.speed_rpm, depths, verdicts, title, band, pockets, heard, learnt)
+    learned = compute_lobes_at_speed(verdicts, machine)
+    diagram = LobeDiagram(now.name, now.lobes, depths, verdicts, comparison.pockets, band, heard, learned)
+    return plot_lobes(diagram, f"{_lobes_title(machine, now)}, from the {now.source}")
 
 
 def _lobes_title(machine: Machine, now: LobeChart) -> str:
@@ -263,7 +273,7 @@ def plot_radial_lobes(machine: Machine, now: LobeChart, method: LobeMethod) -> t
         cuts = [replace(simultaneous, immersion=cut.immersion) for simultaneous in now.cuts]
         return compute_lobe_chart(method, now.x, now.y, cuts, speeds)
 
-    radial = radial_lobes(limits, now.cuts[0], RADIAL_IMMERSIONS)
+    radial = radial_lobes(limits, now.cuts[0], np.linspace(0.05, 1.0, 39))
     diameter = now.table.tool_diameter_mm / 1e3
     return plot_radial_map(radial, diameter, now.cuts[0].immersion, _lobes_title(machine, now)), radial.remarks
 
@@ -285,5 +295,4 @@ def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
 
 def pick_evenly(rows: Sequence[HistoryRow], most: int) -> list[HistoryRow]:
     """Return the first row, the newest, and others evenly spaced between them, no more than `most`."""
-    places = np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int)
-    return [rows[i] for i in np.unique(places)]
+    return [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), most)).round().astype(int))]

@@ -7,7 +7,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from acquisition import Frf
@@ -15,7 +14,7 @@ from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook import ModelFigureData
 from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
-from modal import Extraction, FittedBand, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
+from modal import Extraction, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
 
 CIRCLES_PER_ROW = 4
 """Number of circles in a row."""
@@ -50,7 +49,8 @@ def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
         chart = figure.add_subplot(grid[1, :], sharex=top)
         _draw_accelerance(top, state, modes)
         _draw_stabilization_chart(chart, state, modes)
-        _draw_circles(figure, grid, state, sorted(circles, key=lambda mode: mode.frequency))
+        for k, mode in enumerate(sorted(circles, key=lambda mode: mode.frequency)):
+            _draw_circle(figure.add_subplot(grid[2 + k // CIRCLES_PER_ROW, k % CIRCLES_PER_ROW]), state, mode)
     top.set_title(title, pad=10 + 6 * max((len(_mode_label(mode)) for mode in modes), default=0))
     return figure
 
@@ -121,19 +121,13 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
     axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
 
 
-def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequence[Mode]) -> None:
-    for k, mode in enumerate(modes):
-        axes = figure.add_subplot(grid[2 + k // CIRCLES_PER_ROW, k % CIRCLES_PER_ROW])
-        band = min(state.bands, key=lambda band: float(np.min(np.abs(band.fit.frequency - mode.frequency))))
-        _draw_circle(axes, state, band, mode)
-
-
-def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) -> None:
+def _draw_circle(axes: Axes, state: Extraction, mode: Mode) -> None:
     """Draw the mobility circle of a mode near its resonance: measured minus all other modes, and fitted.
 
     The line from the origin to the natural frequency has the angle of the modal constant: 0 degrees for a real mode of
     a driving point.
     """
+    band = min(state.bands, key=lambda band: float(np.min(np.abs(band.fit.frequency - mode.frequency))))
     f = state.frf.frequency[band.lines]
     reach = CIRCLE_HALF_WIDTHS * mode.damping_ratio * mode.frequency
     near = np.abs(f - mode.frequency) < reach

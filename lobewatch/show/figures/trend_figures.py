@@ -13,22 +13,16 @@ from matplotlib.figure import Figure
 from acquisition import Frf
 from lobewatch.arrays import Floats
 from lobewatch.machine import LimitsTable
+from lobewatch.measurement import Estimate
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import Paint, new_axes
 
 TREND_FIGURE_SIZE = (8.0, 2.8)
 """Size of a figure of one value (inches)."""
+EXCLUDED_VALUE_RANGE = 0.15
+"""Largest relative distance from the values that count at which an excluded value is drawn."""
 FORECAST_SHARE = 0.5
 """Forecast time drawn, as a share of the length of the series."""
-
-
-class TrendMarks(NamedTuple):
-    """Marks next to a trend."""
-
-    events: Sequence[tuple[datetime, str]] = ()
-    """Times and texts of maintenance events."""
-    excluded: Sequence[tuple[datetime, float]] = ()
-    """Times and values of excluded tap tests."""
 
 
 class TrendCurve(NamedTuple):
@@ -46,6 +40,50 @@ class TrendCurve(NamedTuple):
     """90 % quantile of the forecast, shape (m,)."""
 
 
+class SeriesValue(NamedTuple):
+    """Value of the tap tests of a series that is shown over time."""
+
+    field: str
+    """Field of a history row."""
+    heading: str
+    """Heading of its section."""
+    unit: str
+    """Unit shown."""
+    scale: float
+    """Size of this unit (SI)."""
+    text: str
+    """Note on reading the figure."""
+
+    @property
+    def label(self) -> str:
+        """Label of the axis."""
+        return f"{self.heading.lower()} ({self.unit})"
+
+
+class ValueTrend(NamedTuple):
+    """Trend of one value of a series."""
+
+    value: SeriesValue
+    """Value that is shown."""
+    estimates: Sequence[tuple[datetime, Estimate]]
+    """Times and estimates of the tap tests."""
+    excluded: Sequence[tuple[datetime, float]] = ()
+    """Times and values of excluded tap tests, in the unit shown."""
+    events: Sequence[tuple[datetime, str]] = ()
+    """Times and texts of maintenance events."""
+    limits: LimitsTable | None = None
+    """Limits of its drop; None where it has none."""
+    curve: TrendCurve | None = None
+    """Fitted line and forecast; None where there is none."""
+
+    @property
+    def drawn_excluded(self) -> list[tuple[datetime, float]]:
+        """Excluded tap tests near enough to the others to be drawn."""
+        numbers = [estimate.value / self.value.scale for _, estimate in self.estimates]
+        low, high = (1 - EXCLUDED_VALUE_RANGE) * min(numbers), (1 + EXCLUDED_VALUE_RANGE) * max(numbers)
+        return [(time, number) for time, number in self.excluded if low <= number <= high]
+
+
 def make_trend_curve(trend: Trend) -> TrendCurve | None:
     """Return the curve of a trend; None below 8 points."""
     forecast = trend.forecast
@@ -58,17 +96,14 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
     return TrendCurve(np.append(past, forecast.dates[near]), line, forecast.dates[near], low, high)
 
 
-def plot_frf(
-    earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
-) -> Figure:
+def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None) -> Figure:
     """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test.
 
     size: of a smaller figure (inches) that shows the receptance only.
     """
     rows = 2 if now.coherence is None or size is not None else 3
     figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
-    tests = [(now, "now", Paint.NEWEST, "-")]
-    tests += [] if earliest is None else [(earliest, "first", Paint.FIRST, "--")]
+    tests = [(now, "now", Paint.NEWEST, "-"), *([] if first is None else [(first, "first", Paint.FIRST, "--")])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -81,55 +116,44 @@ def plot_frf(
     if rows == 3:
         axes[2].set(ylabel="coherence", ylim=(min(0.9, axes[2].get_ylim()[0]), 1.005))
     axes[-1].set(xlabel="frequency (Hz)", xlim=band)
-    if earliest is not None:
+    if first is not None:
         axes[0].legend(loc="upper right", ncols=2)
     return figure
 
 
-def plot_trend(
-    times: Sequence[datetime],
-    values: Floats,
-    stds: Floats,
-    label: str,
-    limits: LimitsTable | None = None,
-    marks: TrendMarks | None = None,
-    course: TrendCurve | None = None,
-    size: tuple[float, float] = TREND_FIGURE_SIZE,
-) -> Figure:
+def plot_trend(trend: ValueTrend, size: tuple[float, float] = TREND_FIGURE_SIZE) -> Figure:
     """Plot a value over time with its 95 % interval, and the limits of its drop where given.
 
-    limits: in % of the first value of the curve, or else of the first value; size: of the figure (inches).
+    The limits are in % of the first value of the curve, or else of the first value; size: of the figure (inches).
     """
     figure, (axes,) = new_axes(1, size)
-    days = date2num(times)
+    curve, days = trend.curve, date2num([time for time, _ in trend.estimates])
+    values, stds = np.array([estimate for _, estimate in trend.estimates]).T / trend.value.scale
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=Paint.NEWEST, capsize=2)
-    if limits is not None:
-        warn, alarm = limits.frequency_warn_percent, limits.frequency_alarm_percent
+    if trend.limits is not None:
+        warn, alarm = trend.limits.frequency_warn_percent, trend.limits.frequency_alarm_percent
         style: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
         for percent, colour, dashes in ((warn, Paint.FIRST, "--"), (alarm, Paint.ALARM, "-")):
-            level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
+            level = (values[0] if curve is None else curve.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
             axes.annotate(f"-{percent:g} %", (1, level), color=colour, **style)
-    if len(days) == 1:
-        axes.set_xlim(days[0] - 15, days[0] + 15)
-    if course is not None:
-        axes.plot(course.days, course.line, color=Paint.NEWEST, lw=1)
-        axes.fill_between(course.days_ahead, course.low, course.high, color=Paint.NEWEST, alpha=0.2, lw=0)
-    if marks is not None:
-        _add_marks(axes, marks)
+    if curve is not None:
+        axes.plot(curve.days, curve.line, color=Paint.NEWEST, lw=1)
+        axes.fill_between(curve.days_ahead, curve.low, curve.high, color=Paint.NEWEST, alpha=0.2, lw=0)
+    _add_marks(axes, trend)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
-    axes.set(ylabel=label)
+    axes.set(ylabel=trend.value.label)
     axes.margins(y=0.12)
     return figure
 
 
-def _add_marks(axes: Axes, marks: TrendMarks) -> None:
-    if marks.excluded:
-        days = date2num([time for time, _ in marks.excluded])
-        axes.plot(days, [value for _, value in marks.excluded], "o", ms=5, mfc="none", mec=Paint.NEWEST)
-    for time, text in marks.events:
+def _add_marks(axes: Axes, trend: ValueTrend) -> None:
+    if excluded := trend.drawn_excluded:
+        days = date2num([time for time, _ in excluded])
+        axes.plot(days, [value for _, value in excluded], "o", ms=5, mfc="none", mec=Paint.NEWEST)
+    for time, text in trend.events:
         day = date2num(time)
         axes.axvline(day, color=Paint.EVENT, ls=":", lw=1)
         shown, coordinates = shorten(text, 26, placeholder="…"), (("data", "axes fraction"), "offset points")

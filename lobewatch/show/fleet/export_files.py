@@ -115,7 +115,6 @@ def write_table(tables: Iterable[TapTestTable], path: Path) -> ExportOutcome:
 
 def _write_sqlite(tables: Iterable[TapTestTable], path: Path) -> int:
     count = series = 0
-    insert = f"INSERT INTO tap VALUES ({', '.join('?' * (4 + len(TAP_NUMBER_COLUMNS)))})"
     with closing(sqlite3.connect(path, isolation_level=None)) as base:
         base.execute("PRAGMA journal_mode = OFF")
         base.execute("PRAGMA synchronous = OFF")  # a new file under another name: whole, or thrown away
@@ -129,7 +128,7 @@ def _write_sqlite(tables: Iterable[TapTestTable], path: Path) -> int:
             of_series = [series + n for n in table.series_numbers]
             values = np.where(table.numbers > 1e7, np.rint(table.numbers), table.numbers)  # integers: half the bytes
             taps = zip(of_series, table.tap_id, table.time, table.remarks, *values.T.tolist(), strict=True)
-            base.executemany(insert, taps)
+            base.executemany(f"INSERT INTO tap VALUES ({', '.join('?' * (4 + len(TAP_NUMBER_COLUMNS)))})", taps)
             count, series = count + len(of_series), series + len(table.series)
         base.execute("COMMIT")
     return count

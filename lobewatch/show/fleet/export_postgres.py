@@ -48,7 +48,6 @@ UPDATE {POSTGRES_TABLE} AS stored SET counts = false WHERE counts AND folder = A
 """
 
 
-POSTGRES_SCHEMES = ("postgresql://", "postgres://")
 EXPORT_LOCK_QUERY = f"SELECT pg_advisory_xact_lock(hashtext('{POSTGRES_TABLE}'))"
 HAS_TIMESCALE = "SELECT EXISTS (SELECT FROM pg_proc WHERE proname = 'create_hypertable')"
 PSYCOPG_LOG = logging.getLogger("psycopg")
@@ -85,7 +84,7 @@ def server_name(address: str) -> str:
     except ImportError as error:
         raise DataError('--to needs psycopg; install it with: pip install "lobewatch[postgres]"') from error
     try:
-        settings = conninfo_to_dict(address) if address.startswith(POSTGRES_SCHEMES) else {}
+        settings = conninfo_to_dict(address) if address.startswith(("postgresql://", "postgres://")) else {}
     except ProgrammingError:  # its text may hold the password
         settings = {}
     if not settings:

@@ -8,13 +8,8 @@ from typing import Any
 from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
-from lobewatch.monitoring.threshold_dates import (
-    ThresholdDates,
-    build_forecast_rows,
-    build_limit_row,
-    date_of_days,
-    find_next_limit,
-)
+from lobewatch.monitoring import threshold_dates
+from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
 from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
@@ -30,35 +25,22 @@ def fleet_rows(machines: Sequence[FleetMachine]) -> list[JsonObject]:
 def fleet_row(machine: FleetMachine) -> JsonObject:
     """Return the row of one machine, with the series of the largest frequency drop."""
     summary, dated = machine.summary, machine.current
-    ahead = find_next_limit(summary.limits)
-    worst = summary.series[0] if summary.series else None
+    ahead, worst = threshold_dates.find_next_limit(summary.limits), next(iter(summary.series), None)
     remarks = merge_remarks(dated.remarks)
     reasons = [remark.finding for remark in remarks if remark.code not in SEPARATE_REASON_CODES]
-    return {
-        "key": machine.key,
-        "name": summary.name,
-        "light": dated.status,
-        "is_early": dated.is_early,
-        "word": status_label(dated.status, dated.is_early),
-        "can_be_judged": dated.is_readable,
-        "fall": worst.drop if worst else None,
-        "fall_std": worst.drop_std if worst else None,
-        "series": worst.name if worst else "",
-        "last_tap": summary.last_tap,
-        "days_left": dated.days_left,
-        "reasons": reasons,
-        "note": "; ".join(reasons),
-        "why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue"),
-        "next_step": dated.next_step,
-        "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
-        "next_limit": build_limit_row(ahead),
-        "limit": next_limit_text(ahead, dated.time),
-        "forecast": build_forecast_rows(summary.forecasts, summary.limits),
-        "has_port": summary.has_port,
-        "programs": summary.programs,
-        "points": worst.points if worst else (),
-        "limits": [percent for percent, _ in summary.limits],
-    }
+    return (
+        {"key": machine.key, "name": summary.name, "light": dated.status, "is_early": dated.is_early}
+        | {"word": status_label(dated.status, dated.is_early), "can_be_judged": dated.is_readable}
+        | {"fall": worst.drop if worst else None, "fall_std": worst.drop_std if worst else None}
+        | {"series": worst.name if worst else "", "last_tap": summary.last_tap, "days_left": dated.days_left}
+        | {"reasons": reasons, "note": "; ".join(reasons)}
+        | {"why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue")}
+        | {"next_step": dated.next_step, "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms]}
+        | {"next_limit": threshold_dates.build_limit_row(ahead), "limit": next_limit_text(ahead, dated.time)}
+        | {"forecast": threshold_dates.build_forecast_rows(summary.forecasts, summary.limits)}
+        | {"has_port": summary.has_port, "programs": summary.programs, "points": worst.points if worst else ()}
+        | {"limits": [percent for percent, _ in summary.limits]}
+    )
 
 
 def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:
@@ -78,19 +60,24 @@ def _month_text(days: float | None) -> str:
 
 FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
 """Keys of a row that are columns of the CSV, in order."""
-FLEET_HEADINGS = ("machine", "light", "fallen (%)", "last tap", "limit ahead")
 
 
 def fleet_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a line for each machine, with its worst reason and the next step below it."""
-    lines = align_columns([FLEET_HEADINGS, *map(_fleet_cells, rows)])
-    texts = [[], *map(_machine_notes, rows)]
-    return "\n".join(part for line, below in zip(lines, texts, strict=True) for part in (line, *below))
+    headings = "machine", "light", "fallen (%)", "last tap", "limit ahead"
+    first, *lines = align_columns([headings, *map(_fleet_cells, rows)])
+    parts = (part for line, row in zip(lines, rows, strict=True) for part in (line, *_machine_notes(row)))
+    return "\n".join([first, *parts])
 
 
 def fleet_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a CSV line for each machine, below the headings."""
     return format_csv([FLEET_COLUMNS, *([row[name] for name in FLEET_COLUMNS] for row in rows)])
+
+
+def due_text(days_left: float) -> str:
+    """Return when the next tap test is due."""
+    return f"in {math.floor(days_left)} d" if days_left >= 0 else f"{math.ceil(-days_left)} d overdue"
 
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
@@ -100,7 +87,7 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     due, left = "", row["days_left"]
     if left is not None:
         last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
-        due = f"{last}, " + (f"due in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue")
+        due = f"{last}, {'due ' if left >= 0 else ''}{due_text(left)}"
     return _to_one_line(row["key"]), light, drop, due, row["limit"]
 
 

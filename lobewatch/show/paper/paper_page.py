@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import jinja2
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from acquisition import DataError
 from acquisition.file_io import atomic_write, make_folder
@@ -20,8 +19,8 @@ from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.show.figures.spindle_figures import draw_shaft, draw_shapes
 from lobewatch.show.paper.paper_text import paper_cells
 
-PAPER_FIGURE_SIZE = (8.0, 4.4)
-"""Size of a figure (inches)."""
+PAPER_FIGURE_SIZES = {1: (8.0, 4.4), 2: (8.0, 6.0)}
+"""Size of a figure (inches) by its number of axes."""
 PAPER_MARK: dict[str, Any] = {"color": Paint.ALARM, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
 """Mark of a number of the paper."""
 RESPONSE_BAND = (1300.0, 2200.0)
@@ -30,17 +29,14 @@ MAX_DEPTH_RATIO = 6.0
 """Largest depth drawn, in lowest limits of the new spindle."""
 
 
-def _plot_shaft(study: PaperStudy) -> Figure:
-    figure, (shaft, shapes) = new_axes(2, (8.0, 6.0))
+def _draw_modes(shaft: Axes, shapes: Axes, study: PaperStudy) -> None:
     spindle = study.plain.new.spindle
     draw_shaft(shaft, spindle)
     shaft.set(title="surrogate, to scale: not the paper's dimensions", xlabel="")
     draw_shapes(shapes, mode_shapes(spindle, 3, np.linspace(0.0, spindle.length, 400)))
-    return figure
 
 
-def _plot_convergence(study: PaperStudy) -> Figure:
-    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+def _draw_convergence(axes: Axes, study: PaperStudy) -> None:
     looks: tuple[tuple[ElementKind, str, str, str], ...] = (
         ("linear", "straight lines with shear (as BEAM188)", Paint.ALARM, "s"),
         ("timoshenko", "cubics with shear", Paint.NEWEST, "o"),
@@ -53,11 +49,9 @@ def _plot_convergence(study: PaperStudy) -> Figure:
     axes.loglog(printed.FEM_ELEMENTS, paper, label="paper: FEM above DSM", **PAPER_MARK)
     axes.set(xlabel="elements", ylabel="share above the exact f_1 (-)")
     axes.legend(loc="lower left")
-    return figure
 
 
-def _plot_response(study: PaperStudy, part: str) -> Figure:
-    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+def _draw_response(axes: Axes, study: PaperStudy, part: str) -> None:
     tap = study.tap
 
     def values(receptance: Complexes) -> Floats:
@@ -77,7 +71,6 @@ def _plot_response(study: PaperStudy, part: str) -> Figure:
     axes.axhline(0, color="black", lw=0.6)
     axes.set(xlabel="frequency (Hz)", ylabel=f"{part} G (µm/N)", xlim=RESPONSE_BAND)
     axes.legend(loc="lower left")
-    return figure
 
 
 def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
@@ -86,8 +79,7 @@ def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
     axes.annotate(f"{name}: {frequency:.1f} Hz, {height:.4f} µm/N", (frequency, height), **text)
 
 
-def _plot_whirl(study: PaperStudy, whirl: str, critical: float) -> Figure:
-    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+def _draw_whirl(axes: Axes, study: PaperStudy, whirl: str, critical: float) -> None:
     plain, shear = (getattr(shaft, whirl) for shaft in (study.plain, study.shear))
     speed, label = plain.speed_rpm / 1e3, "seen from the shaft, as in the paper"
     axes.plot(speed, plain.rotating_forward[0], color=Paint.NEWEST, lw=1.8, label=label)
@@ -101,11 +93,9 @@ def _plot_whirl(study: PaperStudy, whirl: str, critical: float) -> Figure:
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="first frequency (Hz)")
     axes.set(xlim=(0, speed[-1]), ylim=(0, 1.65 * plain.forward[0, 0]))
     axes.legend(loc="upper left", ncols=2, fontsize=9)
-    return figure
 
 
-def _plot_stiffness_curve(study: PaperStudy) -> Figure:
-    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+def _draw_stiffness_curve(axes: Axes, study: PaperStudy) -> None:
     looks = (study.plain, "Euler-Bernoulli, as in the paper", "-"), (study.shear, "Timoshenko", "--")
     for shaft, name, dashes in looks:
         axes.semilogx(*shaft.curve, color=Paint.NEWEST, ls=dashes, label=f"surrogate, {name}")
@@ -117,11 +107,9 @@ def _plot_stiffness_curve(study: PaperStudy) -> Figure:
     axes.set(xlabel="stiffness of each bearing (N/m)", ylabel="first frequency (Hz)")
     axes.set(xlim=(1e7, 1.5e13), ylim=(0, 2600))
     axes.legend(loc="lower right")
-    return figure
 
 
-def _plot_paper_lobes(study: PaperStudy) -> Figure:
-    figure, (axes,) = new_axes(1, PAPER_FIGURE_SIZE)
+def _draw_paper_lobes(axes: Axes, study: PaperStudy) -> None:
     lobes = study.lobes
     looks = (
         (lobes.new, "new: 1722 Hz", Paint.FIRST, "-"),
@@ -136,7 +124,6 @@ def _plot_paper_lobes(study: PaperStudy) -> Figure:
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="limiting depth / lowest limit, new (-)")
     axes.set(xlim=(lobes.new.speed_rpm[0] / 1e3, lobes.new.speed_rpm[-1] / 1e3), ylim=(0, MAX_DEPTH_RATIO))
     axes.legend(loc="upper left")
-    return figure
 
 
 class PaperFigure(NamedTuple):
@@ -144,33 +131,31 @@ class PaperFigure(NamedTuple):
 
     caption: str
     """Caption of the figure."""
-    draw: Callable[..., Figure]
-    """Function that draws it from the study."""
+    draw: Callable[..., None]
+    """Function that draws it from axes and the study."""
     options: tuple[Any, ...] = ()
     """Further arguments of the function."""
+    rows: int = 1
+    """Number of axes, one above the other."""
 
 
 RIGID_WHIRL, WHIRL = ("rigid_whirl", printed.RIGID_CRITICAL_SPEED), ("whirl", printed.CRITICAL_SPEED)
 PAPER_FIGURES: Mapping[str, PaperFigure] = {
-    "fig-3": PaperFigure("Fig. 3: the surrogate with its ten bearings, and its first modes", _plot_shaft),
-    "fig-8": PaperFigure("Fig. 8: the first frequency over the stiffness of each bearing", _plot_stiffness_curve),
-    "convergence": PaperFigure("Finite elements against the exact first frequency", _plot_convergence),
-    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _plot_whirl, RIGID_WHIRL),
-    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _plot_whirl, WHIRL),
-    "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _plot_response, ("Re",)),
-    "fig-6": PaperFigure("Fig. 6: its imaginary part", _plot_response, ("Im",)),
-    "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _plot_paper_lobes),
+    "fig-3": PaperFigure("Fig. 3: the surrogate with its ten bearings, and its first modes", _draw_modes, (), 2),
+    "fig-8": PaperFigure("Fig. 8: the first frequency over the stiffness of each bearing", _draw_stiffness_curve),
+    "convergence": PaperFigure("Finite elements against the exact first frequency", _draw_convergence),
+    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _draw_whirl, RIGID_WHIRL),
+    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _draw_whirl, WHIRL),
+    "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _draw_response, ("Re",)),
+    "fig-6": PaperFigure("Fig. 6: its imaginary part", _draw_response, ("Im",)),
+    "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _draw_paper_lobes),
 }
 """Figures 3 and 5 to 10, and the convergence of the finite elements, by file name."""
 
 
-PAPER_PAGE_NAME = "paper.md"
-"""Name of the page and of its template."""
-
-
 def render_paper_page(study: PaperStudy) -> str:
     """Return the page in Markdown."""
-    template = resources.files("lobewatch.show.paper").joinpath(PAPER_PAGE_NAME).read_text(encoding="utf-8")
+    template = resources.files("lobewatch.show.paper").joinpath("paper.md").read_text(encoding="utf-8")
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     return environment.from_string(template).render(study=study, cells=paper_cells, figures=PAPER_FIGURES)
 
@@ -181,7 +166,9 @@ def write_paper_page(study: PaperStudy, folder: Path) -> Path:
         raise DataError(f"{folder}: is a file; name a folder with --out")
     make_folder(folder / "images")
     for name, picture in PAPER_FIGURES.items():
-        save_figure(picture.draw(study, *picture.options), folder / "images" / f"paper-{name}.png")
-    page = folder / PAPER_PAGE_NAME
+        figure, axes = new_axes(picture.rows, PAPER_FIGURE_SIZES[picture.rows])
+        picture.draw(*axes, study, *picture.options)
+        save_figure(figure, folder / "images" / f"paper-{name}.png")
+    page = folder / "paper.md"
     atomic_write(page, render_paper_page(study).encode())
     return page

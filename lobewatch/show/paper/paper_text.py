@@ -5,26 +5,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lobewatch.paper import Comparison, PaperStudy
-from lobewatch.show.terminal.output import JsonObject, json_fields
+from lobewatch.show.terminal.output import JsonObject, pick
 
-PAPER_HEADINGS = ("", "place", "paper", "ours", "unit", "differs")
 PAPER_COLUMN_WIDTHS = (32, 9, 10, 10, 5, 9)
 """Widths of the columns, 80 characters in all."""
-
-PAPER_DIGITS = 7
-"""Largest number of digits of a number of the paper."""
-
-
-NUMBER_FIELDS = json_fields("quantity where unit paper=printed ours difference reason")
-CLAIM_FIELDS = json_fields("claim=text verdict evidence")
 
 
 def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
     """Return every number and every claim of the paper, and the page that was written."""
-    rows = ((section.title, row) for section in study.sections for row in section.comparisons)
     return {
-        "numbers": [{"section": title, **NUMBER_FIELDS(row)} for title, row in rows],
-        "claims": list(map(CLAIM_FIELDS, study.claims)),
+        "numbers": [
+            {"section": section.title, **pick(row, "quantity", "where", "unit"), "paper": row.printed}
+            | pick(row, "ours", "difference", "reason")
+            for section in study.sections
+            for row in section.comparisons
+        ],
+        "claims": [{"claim": claim.text, **pick(claim, "verdict", "evidence")} for claim in study.claims],
         "page": page and str(page),
     }
 
@@ -34,7 +30,7 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
     yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, beside a surrogate of the"
     yield "spindle (its drawing is not public): fitted to the frequencies in the paper."
     for section in study.sections:
-        yield from ("", section.title, _table_line(PAPER_HEADINGS))
+        yield from ("", section.title, _table_line(("", "place", "paper", "ours", "unit", "differs")))
         for row in section.comparisons:
             yield _table_line(paper_cells(row))
             yield from _indent(row.reason, width)
@@ -46,7 +42,7 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
 
 def paper_cells(row: Comparison) -> tuple[str, str, str, str, str, str]:
     """Return quantity, place, both values, unit and difference."""
-    printed = "-" if row.printed is None else number_text(row.printed, PAPER_DIGITS, whole=False)
+    printed = "-" if row.printed is None else number_text(row.printed, 7, whole=False)
     return row.quantity, row.where, printed, number_text(row.ours, row.digits), row.unit, difference_text(row)
 
 

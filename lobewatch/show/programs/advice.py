@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from rich.table import Table
@@ -15,7 +16,7 @@ from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
@@ -44,48 +45,42 @@ class ProgramAdvice:
         """Remarks of verdict and advice."""
         return (*self.verdict.remarks, *self.advice.remarks)
 
-    @property
-    def other_remarks(self) -> tuple[Remark, ...]:
-        """Remarks that the advice lines do not contain."""
-        return tuple(remark for remark in self.remarks if remark.code not in LINE_REMARK_CODES)
-
-    @property
-    def is_no_longer_stable(self) -> bool:
-        """True if the program chatters now and did not at first."""
-        return self.verdict.is_stable is False and self.first_verdict is not None and bool(self.first_verdict.is_stable)
-
 
 def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvice:
     """Return one program with its verdict and advice."""
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.initial_verdict(verdict))
 
 
-setting_json = json_fields("speed_rpm depth_mm window_rpm depth_margin frequency_left=drop_margin")
-"""Function that returns a recommended speed and depth with its robustness."""
-ADVICE_FIELDS = json_fields(
-    """
-    was_stable_at_first=first_verdict.is_stable verdict_at_first=first_verdict.stability advice=advice.best
-    advice_here=advice.deepest_here tolerable_decay=advice.tolerable_drop remarks
-    """,
-    {"advice": setting_json, "advice_here": setting_json},
-)
+def setting_json(setting: Setting) -> JsonObject:
+    """Return a recommended speed and depth with its robustness."""
+    named = pick(setting, "speed_rpm", "depth_mm", "window_rpm", "depth_margin")
+    return named | {"frequency_left": setting.drop_margin}
+
+
+def _advice_json(program: ProgramAdvice) -> JsonObject:
+    best, here, first = program.advice.best, program.advice.deepest_here, program.first_verdict
+    return (
+        verdict_json(program.verdict)
+        | {"was_stable_at_first": first and first.is_stable, "verdict_at_first": first and first.stability}
+        | {"advice": best and setting_json(best), "advice_here": here and setting_json(here)}
+        | {"tolerable_decay": program.advice.tolerable_drop, "remarks": program.remarks}
+    )
 
 
 def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> JsonObject:
     """Return all programs with advice, and how many may not be run; remarks: on the files."""
-    advised = [verdict_json(program.verdict) | ADVICE_FIELDS(program) for program in programs]
-    return {"programs": advised, **count_unsafe(programs), "remarks": remarks}
+    return {"programs": list(map(_advice_json, programs)), **count_unsafe(programs), "remarks": remarks}
 
 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> Texts:
     """Return all programs in words: the table, the advice, and notes on reading it."""
     decays = [frequency_margin_text(program.advice) for program in programs]
-    verdicts = [program.verdict for program in programs]
+    verdicts, about = [program.verdict for program in programs], chain(*(program.remarks for program in programs))
     return [
         verdict_table(verdicts, decays),
         *(line for program in programs for line in advice_lines(program, machine)),
         *verdict_notes(verdicts, machine),
-        *remark_lines([*remarks, *(remark for program in programs for remark in program.other_remarks)]),
+        *remark_lines([*remarks, *(remark for remark in about if remark.code not in LINE_REMARK_CODES)]),
     ]
 
 
@@ -101,12 +96,9 @@ def frequency_margin_text(advice: Advice) -> str:
 def count_unsafe(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
     """Count the programs of each kind that may not be run."""
     words = Counter(program.verdict.stability for program in programs)
-    return {
-        "unstable": words[Stability.NOT_STABLE],
-        "doubtful": words[Stability.DOUBTFUL],
-        "not_checked": words[Stability.UNKNOWN],
-        "beyond_drive": sum(program.verdict.is_beyond_drive for program in programs),
-    }
+    keys = {"unstable": Stability.NOT_STABLE, "doubtful": Stability.DOUBTFUL, "not_checked": Stability.UNKNOWN}
+    beyond = sum(program.verdict.is_beyond_drive for program in programs)
+    return {key: words[word] for key, word in keys.items()} | {"beyond_drive": beyond}
 
 
 def check_summary_text(programs: Sequence[ProgramAdvice], others: int) -> str:
@@ -134,15 +126,14 @@ def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
             texts.append(f"until then {_alternative_text(program, machine)}")  # open measurements come first
         yield f"{name}: {'; '.join(texts)}"
     if verdict.is_beyond_drive:
-        allowed = math.floor(verdict.drive_limit * 1e5) / 100
-        yield f"{name}: [drive] allows no more than {allowed:.2f} mm at this speed"
+        yield f"{name}: [drive] allows no more than {math.floor(verdict.drive_limit * 1e5) / 100:.2f} mm at this speed"
 
 
 def _chatter_text(program: ProgramAdvice) -> str:
     verdict = program.verdict
     word = "period-two chatter" if verdict.kind == "flip" else "chatter"
     where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    was = "stable at first, no longer: " if program.is_no_longer_stable else ""
+    was = "stable at first, no longer: " if program.first_verdict and program.first_verdict.is_stable else ""
     return f"{was}{word}{where}{worst_feed_text(verdict)}"
 
 
@@ -190,33 +181,33 @@ def robustness_text(setting: Setting) -> str:
     return f"({low} to {high} rpm is safe; {margin}; the frequency may fall by {drop})"
 
 
-POCKET_TIP_FIELDS = json_fields("speed_rpm depth_mm=depth*1e3 from_rpm to_rpm")
-SHIFT_FIELDS = json_fields(
-    "then=before now=after speed_change depth_change", {"then": POCKET_TIP_FIELDS, "now": POCKET_TIP_FIELDS}
-)
-COMPARISON_FIELDS = json_fields(
-    """
-    tap_id=now.assembly.tap_id source=now.source speed_rpm=now.lobes.speed_rpm depth_mm=now.lobes.depth*1e3
-    chatter_frequencies_hz=now.lobes.chatter_frequency kind=now.lobes.kind pockets pocket_shifts=shifts
-    programs=verdicts
-    """,
-    {"pockets": setting_json, "pocket_shifts": SHIFT_FIELDS, "programs": verdict_json},
-)
-LOBES_FIELDS = json_fields("""
-    method method_detail=detail minimum_depth_mm=minimum.depth*1e3 at_speed_rpm=minimum.speed_rpm
-    chatter_frequency_hz=minimum.chatter_frequency
-""")
-
-
 def lobes_json(name: str, lobes: StabilityLobes) -> JsonObject:
     """Return the method and the lowest point of a diagram."""
-    return {"cut": name} | LOBES_FIELDS(lobes)
+    low = lobes.minimum
+    lowest = {"minimum_depth_mm": low.depth * 1e3, "at_speed_rpm": low.speed_rpm}
+    lowest |= {"chatter_frequency_hz": low.chatter_frequency}
+    return {"cut": name, "method": lobes.method, "method_detail": lobes.detail} | lowest
 
 
 def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> JsonObject:
     """Return the newest diagram, its pockets, and the verdicts on the programs with this cut."""
-    diagram = lobes_json(comparison.now.name, comparison.now.lobes) | COMPARISON_FIELDS(comparison)
-    return diagram | {"remarks": merge_remarks(remarks)}
+    now, lobes = comparison.now, comparison.now.lobes
+    return (
+        lobes_json(now.name, lobes)
+        | {"tap_id": now.assembly.tap_id, "source": now.source, "speed_rpm": lobes.speed_rpm}
+        | {"depth_mm": lobes.depth * 1e3, "chatter_frequencies_hz": lobes.chatter_frequency, "kind": lobes.kind}
+        | {"pockets": list(map(setting_json, comparison.pockets))}
+        | {"pocket_shifts": list(map(_shift_json, comparison.shifts))}
+        | {"programs": list(map(verdict_json, comparison.verdicts)), "remarks": merge_remarks(remarks)}
+    )
+
+
+def _shift_json(shift: PocketShift) -> JsonObject:
+    tips = {
+        name: {"speed_rpm": tip.speed_rpm, "depth_mm": tip.depth * 1e3, **pick(tip, "from_rpm", "to_rpm")}
+        for name, tip in (("then", shift.before), ("now", shift.after))
+    }
+    return tips | pick(shift, "speed_change", "depth_change")
 
 
 def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> Texts:

@@ -9,26 +9,27 @@ from rich.table import Table
 from lobes import Cut, CuttingCoefficients
 from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
 from lobewatch.machine.settings.drive_power import CutPower
-from lobewatch.show.terminal.output import json_fields, new_table
+from lobewatch.show.terminal.output import JsonObject, new_table, pick
 
 MAX_MATERIALS_IN_FULL = 5
 """Largest number of materials that are shown with their sources."""
 
 
-SPECIFIC_FORCE_FIELDS = json_fields("kc1_1_n_per_mm2=at_1_mm/1e6 mc=exponent source")
-material_json = json_fields(
-    """
-    name=material iso_group equivalents kt_n_per_mm2=tangential/1e6 kt_range_n_per_mm2=tangential_range/1e6
-    kr_n_per_mm2=radial/1e6 kr_over_kt=self kr_over_kt_range=ratio_range kte_n_per_mm=tangential_edge/1e3
-    kre_n_per_mm=radial_edge/1e3 chip_thickness_mm=self specific_forces note source
-    """,
-    {
-        "kr_over_kt": lambda material: material.radial / material.tangential,
-        "chip_thickness_mm": lambda material: REFERENCE_CHIP_THICKNESS * 1e3 if material.specific_forces else None,
-        "specific_forces": SPECIFIC_FORCE_FIELDS,
-    },
-)
-"""Function that returns one material; a range is [lowest, highest], or None where no spread is published."""
+def material_json(material: CuttingCoefficients) -> JsonObject:
+    """Return one material; a range is [lowest, highest], or None where no spread is published."""
+    spread = material.tangential_range
+    forces = [
+        {"kc1_1_n_per_mm2": kc.at_1_mm / 1e6, "mc": kc.exponent, "source": kc.source} for kc in material.specific_forces
+    ]
+    return (
+        {"name": material.material, **pick(material, "iso_group", "equivalents")}
+        | {"kt_n_per_mm2": material.tangential / 1e6, "kt_range_n_per_mm2": spread and [kt / 1e6 for kt in spread]}
+        | {"kr_n_per_mm2": material.radial / 1e6, "kr_over_kt": material.radial / material.tangential}
+        | {"kr_over_kt_range": material.ratio_range, "kte_n_per_mm": material.tangential_edge / 1e3}
+        | {"kre_n_per_mm": material.radial_edge / 1e3}
+        | {"chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None, "specific_forces": forces}
+        | pick(material, "note", "source")
+    )
 
 
 def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
@@ -66,3 +67,9 @@ def power_text(power: CutPower, cut: Cut) -> str:
     """Return the power of a cut, its Kt, and that of machine.toml."""
     by_power, known = power.tangential / 1e6, cut.tangential / 1e6
     return f"{power.watts / 1e3:.4g} kW say Kt {by_power:.0f} N/mm2, machine.toml {known:.0f}"
+
+
+def power_json(power: CutPower | None) -> JsonObject:
+    """Return the power of a cut and its Kt, None where no power was read."""
+    kilowatts, tangential = (None, None) if power is None else (power.watts / 1e3, power.tangential / 1e6)
+    return {"power_kw": kilowatts, "tangential_by_power_n_per_mm2": tangential}

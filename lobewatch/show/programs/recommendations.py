@@ -11,8 +11,8 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import LINE_REMARK_CODES, format_rpm, robustness_text, setting_json, worst_feed_text
-from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, JsonObject, Texts, json_fields, new_table, remark_lines
-from lobewatch.verdicts import Setting
+from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, JsonObject, Texts, new_table, pick, remark_lines
+from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation
 
@@ -20,54 +20,35 @@ UNIT_FEED_MM = 0.1
 """Feed per tooth (mm) of the removal rate if the feed is unknown."""
 
 
-PROGRAM_FIELDS = json_fields("name tool material teeth tool_diameter_mm radial_depth_mm")
-RECOMMENDED_FIELDS = json_fields(
-    """
-    direction=self worse_direction=program.direction feed=program.feed worst_feed_deg=verdict.feed_angle
-    verdict=verdict.stability measured=verdict.is_measured cuts=verdict.n_cuts chance_turning=verdict.chatter_risk
-    """,
-    {
-        "direction": lambda answer: "either" if answer.any_direction else answer.program.direction,
-        "worst_feed_deg": math.degrees,
-    },
-)
-PROPOSAL_FIELDS = json_fields(
-    """
-    tool=verdict.program.tool teeth=verdict.program.teeth speed_rpm=verdict.program.speed_rpm depth_mm=self
-    equal_is_as_good=self proposed_deg=proposed.pattern.pitch_deg half_wave_deg
-    chatter_frequency_hz=verdict.chatter_frequency
-    """,
-    {"equal_is_as_good": lambda proposal: proposal.proposed is None},
-)
-PITCH_FIELDS = json_fields("""
-    pitch_deg=pattern.pitch_deg pattern=pattern.name limit_mm=limit*1e3 limit_low_mm=low*1e3 limit_high_mm=high*1e3 gain
-    gain_low gain_high share_worse least_chip=pattern.feed_ratio_range.0 largest_chip=pattern.feed_ratio_range.1
-    verdict=stability off_centre=pattern.imbalance
-""")
-
-
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
-    others = ({"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives)
-    return PROGRAM_FIELDS(answer.program) | {
-        "recommended": _setting_with_feed_json(answer.setting, answer) | RECOMMENDED_FIELDS(answer)
-        if answer.setting and answer.verdict
-        else None,
-        "reason": answer.reason or None,
-        "what_would_change_it": answer.remedies,
-        "alternatives": list(others),
-        "remarks": [*remarks, *_other_remarks(answer)],
-    }
+    others = [{"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives]
+    return (
+        pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
+        | {"recommended": _recommended_json(answer.setting, answer.verdict, answer), "reason": answer.reason or None}
+        | {"what_would_change_it": answer.remedies, "alternatives": others}
+        | {"remarks": [*remarks, *_other_remarks(answer)]}
+    )
+
+
+def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: Recommendation) -> JsonObject | None:
+    if setting is None or verdict is None:
+        return None
+    direction = answer.program.direction
+    return (
+        _setting_with_feed_json(setting, answer)
+        | {"direction": "either" if answer.any_direction else direction, "worse_direction": direction}
+        | {"feed": answer.program.feed, "worst_feed_deg": math.degrees(verdict.feed_angle)}
+        | {"verdict": verdict.stability, "measured": verdict.is_measured}
+        | {"cuts": verdict.n_cuts, "chance_turning": verdict.chatter_risk}
+    )
 
 
 def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> JsonObject:
     feed = None if answer.feed_mm is None else answer.feed_mm[1]
-    return {
-        **setting_json(setting),
-        "cutting_speed_m_min": cutting_speed(setting, answer.program),
-        "feed_per_tooth_mm": feed,
-        "chips_cm3_per_min": math.nan if feed is None else removal_rate(setting, answer.program, feed),
-    }
+    rate = math.nan if feed is None else removal_rate(setting, answer.program, feed)
+    speed = setting_json(setting) | {"cutting_speed_m_min": cutting_speed(setting, answer.program)}
+    return speed | {"feed_per_tooth_mm": feed, "chips_cm3_per_min": rate}
 
 
 def cutting_speed(setting: Setting, program: ProgramTable) -> float:
@@ -77,8 +58,7 @@ def cutting_speed(setting: Setting, program: ProgramTable) -> float:
 
 def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
     """Return the material removal rate (cm3/min) at a feed per tooth (mm)."""
-    area = setting.depth_mm * program.radial_mm[1]
-    return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
+    return setting.depth_mm * program.radial_mm[1] * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
 
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
@@ -132,22 +112,28 @@ def _other_remarks(answer: Recommendation) -> list[Remark]:
     return [remark for remark in answer.remarks if remark.code not in LINE_REMARK_CODES]
 
 
-HIDDEN_PITCH_CODES = ("doubt-decides",)
-"""Codes of remarks on the verdict, which this output does not show."""
-
-
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
     """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
-    return PROPOSAL_FIELDS(proposal) | {
-        "depth_mm": depth_mm,
-        "equal": _pitch_json(proposal.equal, depth_mm),
-        "unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal],
-        "remarks": _pitch_remarks(proposal, remarks),
-    }
+    proposed, verdict = proposal.proposed, proposal.verdict
+    return (
+        pick(verdict.program, "tool", "teeth", "speed_rpm")
+        | {"depth_mm": depth_mm, "equal_is_as_good": proposed is None}
+        | {"proposed_deg": proposed and proposed.pattern.pitch_deg, "half_wave_deg": proposal.half_wave_deg}
+        | {"chatter_frequency_hz": verdict.chatter_frequency, "equal": _pitch_json(proposal.equal, depth_mm)}
+        | {"unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal]}
+        | {"remarks": _pitch_remarks(proposal, remarks)}
+    )
 
 
 def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
-    return PITCH_FIELDS(pitch) | ({"verdict": None} if depth_mm is None else {})
+    pattern, (least, largest) = pitch.pattern, pitch.pattern.feed_ratio_range
+    return (
+        {"pitch_deg": pattern.pitch_deg, "pattern": pattern.name, "limit_mm": pitch.limit * 1e3}
+        | {"limit_low_mm": pitch.low * 1e3, "limit_high_mm": pitch.high * 1e3}
+        | pick(pitch, "gain", "gain_low", "gain_high", "share_worse")
+        | {"least_chip": least, "largest_chip": largest}
+        | {"verdict": None if depth_mm is None else pitch.stability, "off_centre": pattern.imbalance}
+    )
 
 
 def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:
@@ -156,14 +142,13 @@ def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: 
     table = new_table(*headings, *([] if depth_mm is None else [f"<at {depth_mm:g} mm"]))
     for pitch in (proposal.equal, *proposal.unequal):  # as many lines as its angles need, two at least
         verdict = [] if depth_mm is None else [[pitch.stability.value]]
-        columns = *_pitch_columns(pitch, pitch is proposal.equal), *verdict
-        for cells in zip_longest(*columns, fillvalue=""):
+        for cells in zip_longest(*_pitch_columns(pitch, pitch is proposal.equal), *verdict, fillvalue=""):
             table.add_row(*cells)
     return [table, *_proposal_lines(proposal), *remark_lines(_pitch_remarks(proposal, remarks))]
 
 
 def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[Remark]:
-    return [*remarks, *(remark for remark in proposal.verdict.remarks if remark.code not in HIDDEN_PITCH_CODES)]
+    return [*remarks, *(remark for remark in proposal.verdict.remarks if remark.code != "doubt-decides")]
 
 
 def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:

@@ -12,7 +12,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
-from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, json_fields, new_table, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 from lobewatch.verdicts import SpindleAtSpeed, Stability, Verdict
@@ -20,8 +20,6 @@ from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
-UNCERTAINTY_PAGE = "docs/lobes.md"
-"""Page that explains the uncertainties."""
 NOT_ROTATING_TEXT = (
     "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
     "chatter once it turns and cuts, where frequency, damping, stiffness and cutting force may differ; plausible, not "
@@ -29,29 +27,24 @@ NOT_ROTATING_TEXT = (
 )
 """Note on reading a table of verdicts."""
 FROM_MACHINE_FILE = "machine.toml"
-UNCERTAINTY_KEYS = "frequency", "damping_ratio", "stiffness", "phase_deg"
 DEGREES_PER_RADIAN = 180 / np.pi
 MIN_SHOWN_WIDTH = 5e-5
 """Smallest half-width that is shown."""
 
 
-FACTOR_NAMES = {"tangential": "Kt", "ratio": "Kr/Kt"}
-"""Names of learned factors without a direction."""
-
-
 def factor_text(name: str) -> str:
     """Return the name of a learned factor, such as "frequency in x, mode 2" for "frequency_x_2"."""
-    if name in FACTOR_NAMES:
-        return FACTOR_NAMES[name]
+    if "_" not in name:
+        return {"tangential": "Kt", "ratio": "Kr/Kt"}[name]
     quantity, direction, *mode = name.split("_")
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 
 
 def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     """Return relative half-widths by cause (degrees for phases) of the modes in x, then y."""
-    units = [1, 1, 1, DEGREES_PER_RADIAN]
-    columns = {cause: (widths * units).T.tolist() for cause, widths in uncertainty.modes.items()}
-    modes = {cause: dict(zip(UNCERTAINTY_KEYS, values, strict=True)) for cause, values in columns.items()}
+    units = {"frequency": 1, "damping_ratio": 1, "stiffness": 1, "phase_deg": DEGREES_PER_RADIAN}
+    columns = {cause: (widths * [*units.values()]).T.tolist() for cause, widths in uncertainty.modes.items()}
+    modes = {cause: dict(zip(units, values, strict=True)) for cause, values in columns.items()}
     ranges = {"tangential": uncertainty.tangential, "radial_over_tangential": uncertainty.ratio}
     coefficients = {name: [factor.low - 1, factor.high - 1] for name, factor in ranges.items()}
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
@@ -67,7 +60,7 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
     about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
-    lines = [f"{about[text]}: {text} ({UNCERTAINTY_PAGE})" for text in named]
+    lines = [f"{about[text]}: {text} (docs/lobes.md)" for text in named]
     lines += [NOT_ROTATING_TEXT] if len(learned) < evaluated else []
     return [*lines, *([at_speed_text(learned)] if learned else [])]
 
@@ -169,22 +162,22 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
 }
 """Style of each verdict, the same everywhere."""
 VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
-verdict_json = json_fields(
-    """
-    name=program.name speed_rpm=program.speed_rpm depth_mm=program.depth_mm feed=program.feed tap_id=self
-    stable=is_stable verdict=stability measured=is_measured limit_mm=limit*1e3 limit_low_mm=limit_low*1e3
-    limit_high_mm=limit_high*1e3 depth_margin chance_turning=chatter_risk decided_by=decisive_cause cuts=n_cuts
-    chatter_frequency_hz=chatter_frequency kind worst_feed_deg=feed_angle drive_limit_mm=drive_limit*1e3
-    doubt=samples.uncertainty method method_detail=detail
-    """,
-    {
-        "tap_id": lambda verdict: verdict.assembly.tap_id if verdict.assembly else "",
-        "decided_by": lambda cause: cause or None,
-        "worst_feed_deg": math.degrees,
-        "doubt": uncertainty_json,
-    },
-)
-"""Function that returns one verdict as a JSON object; unknown numbers are NaN or None."""
+
+
+def verdict_json(verdict: Verdict) -> JsonObject:
+    """Return one verdict as a JSON object; unknown numbers are NaN or None."""
+    program, samples, assembly = verdict.program, verdict.samples, verdict.assembly
+    return (
+        {"name": program.name, "speed_rpm": program.speed_rpm, "depth_mm": program.depth_mm, "feed": program.feed}
+        | {"tap_id": assembly.tap_id if assembly else "", "stable": verdict.is_stable, "verdict": verdict.stability}
+        | {"measured": verdict.is_measured, "limit_mm": verdict.limit * 1e3, "limit_low_mm": verdict.limit_low * 1e3}
+        | {"limit_high_mm": verdict.limit_high * 1e3, "depth_margin": verdict.depth_margin}
+        | {"chance_turning": verdict.chatter_risk, "decided_by": verdict.decisive_cause or None}
+        | {"cuts": verdict.n_cuts, "chatter_frequency_hz": verdict.chatter_frequency, "kind": verdict.kind}
+        | {"worst_feed_deg": math.degrees(verdict.feed_angle), "drive_limit_mm": verdict.drive_limit * 1e3}
+        | {"doubt": None if samples is None else uncertainty_json(samples.uncertainty)}
+        | {"method": verdict.method, "method_detail": verdict.detail}
+    )
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:

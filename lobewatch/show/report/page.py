@@ -23,11 +23,10 @@ def render_page(template: str, **content: Any) -> str:
     """Return the HTML of a template in this folder; it gets styles, scripts and plots."""
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
-    options: dict[str, Any] = {"autoescape": True, "undefined": jinja2.StrictUndefined, "finalize": _name_options}
-    environment = jinja2.Environment(loader=loader, **options)
-    environment.filters |= {"in_css": _escape_css, "named": _label_svg, "next": next, "unbroken": _join_units}
-    environment.filters["macro_name"] = lambda part: type(part).__name__.lower()
-    return environment.get_template(template).render(_static_files() | content)
+    pages = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, finalize=_name_options)
+    pages.filters |= {"in_css": _escape_css, "named": _label_svg, "next": next, "unbroken": _join_units}
+    pages.filters["macro_name"] = lambda part: type(part).__name__.lower()
+    return pages.get_template(template).render(_static_files() | content)
 
 
 def _name_options(value: object) -> object:
@@ -79,7 +78,6 @@ def _label_svg(picture: str, name: str) -> Markup:
 
 GAUGE_WIDTH = 120.0
 """Width of the scale (units of the figure)."""
-GAUGE_OVERSHOOT = 1.25
 
 
 class Gauge(NamedTuple):
@@ -97,6 +95,6 @@ class Gauge(NamedTuple):
 
 def make_gauge(fall: float, warn: float, alarm: float) -> Gauge:
     """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty."""
-    scale = GAUGE_WIDTH / (GAUGE_OVERSHOOT * alarm)
+    scale = GAUGE_WIDTH / (1.25 * alarm)
     text = f"frequency {-fall:+z.2f} %; warning at -{warn:g} %, alarm at -{alarm:g} %"
     return Gauge(text, min(max(fall, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

@@ -15,22 +15,21 @@ from lobewatch.monitoring import MachineStatus, SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ProgramForecast
 from lobewatch.show.figures.drawing import render_svg
-from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE
-from lobewatch.show.figures.trend_figures import plot_frf
-from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS
+from lobewatch.show.figures.lobe_figures import SMALL_FIGURE_SIZE, plot_lobes
+from lobewatch.show.figures.trend_figures import plot_frf, plot_trend
+from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, due_text
 from lobewatch.show.history import condition_texts
 from lobewatch.show.programs.advice import ProgramAdvice, format_rpm
 from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import FREQUENCY_VALUE, ReportData, collect_report_data, make_value_trend
 from lobewatch.show.report.section import NumberTable
-from lobewatch.show.report.sections import SECTIONS, SectionMaker
-from lobewatch.show.terminal.output import JsonObject, json_fields
+from lobewatch.show.report.sections import SECTIONS, SectionMakers
+from lobewatch.show.terminal.output import JsonObject
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.show.trend import change_text, no_dates_text, rate_text, reach_text, trend_text
 from lobewatch.verdicts import Stability
 
-UNKNOWN_FATE = ProgramForecast(NO_FORECAST, NO_FORECAST)
 MAX_SUMMARY_REASONS = 3
 """Largest number of reasons and of series in the summary."""
 TABLE_REASON_CODES = (
@@ -46,29 +45,25 @@ def make_summary(data: ReportData) -> dict[str, Any]:
     standing, limits = data.outlook.status, data.machine.limits
     worst, levels = standing.series[0], (limits.frequency_warn_percent, limits.frequency_alarm_percent)
     has_changed = worst.drop.is_known and not worst.is_baseline
-    return {
-        **_status_content(standing),
-        "gauge": make_gauge(worst.drop.value, *levels) if has_changed else None,
-        "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
-        "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
-        "programs": [_program_content(program, data) for program in data.programs],
-        "no_dates": no_dates_text(data.outlook),
-        "tap": _next_tap_text(standing, data.machine),
-        "pictures": list(draw_summary_figures(data)),
-    }
+    return (
+        _status_content(standing)
+        | {"gauge": make_gauge(worst.drop.value, *levels) if has_changed else None}
+        | {"series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]]}
+        | {"more_series": len(standing.series[MAX_SUMMARY_REASONS:]), "tap": _next_tap_text(standing, data.machine)}
+        | {"programs": [_program_content(program, data) for program in data.programs]}
+        | {"no_dates": no_dates_text(data.outlook), "pictures": list(draw_summary_figures(data))}
+    )
 
 
 def _status_content(standing: MachineStatus) -> dict[str, Any]:
     """Return the status in words, the reasons and the next step."""
     first, others = _pick_reasons(standing)
     notable = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD]
-    shown = notable[: MAX_SUMMARY_REASONS - 1]
-    return {
-        "light": status_label(standing.status, standing.is_early),
-        "kind": status_css_class(standing.status, standing.is_early),
+    shown, status = notable[: MAX_SUMMARY_REASONS - 1], (standing.status, standing.is_early)
+    words = {"light": status_label(*status), "kind": status_css_class(*status), "next_step": standing.next_step}
+    return words | {
         "reasons": [remark.finding for remark in [*first, *shown]],
         "others": [remark.finding for remark in others if remark not in shown],
-        "next_step": standing.next_step,
     }
 
 
@@ -93,20 +88,16 @@ def _series_content(series: SeriesStatus) -> dict[str, str]:
 
 def _program_content(program: ProgramAdvice, data: ReportData) -> dict[str, str]:
     name, word, outlook = program.verdict.program.name, program.verdict.stability, data.outlook
-    fate, now = outlook.programs.get(name, UNKNOWN_FATE), outlook.status.time
+    fate, now = outlook.programs.get(name, ProgramForecast(NO_FORECAST, NO_FORECAST)), outlook.status.time
     until = {
         Stability.STABLE: f"doubtful {reach_text(fate.doubtful, now)}",
         Stability.DOUBTFUL: f"not stable {reach_text(fate.not_stable, now)}",
         Stability.NOT_STABLE: "not stable already",
         Stability.UNKNOWN: "not known",
     }
-    return {
-        "name": name,
-        "kind": VERDICT_STYLES[word].css_class,
-        "word": f"{VERDICT_STYLES[word].symbol} {word}",
-        "until": until[word],
-        "instead": alternative_text(program),
-    }
+    style = VERDICT_STYLES[word]
+    shown = {"name": name, "kind": style.css_class, "word": f"{style.symbol} {word}"}
+    return shown | {"until": until[word], "instead": alternative_text(program)}
 
 
 def alternative_text(program: ProgramAdvice) -> str:
@@ -136,7 +127,7 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
     points, diagram = make_value_trend(data, FREQUENCY_VALUE), data.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.curve is not None else ""
-        figure = points.figure(SMALL_FIGURE_SIZE)
+        figure = plot_trend(points, SMALL_FIGURE_SIZE)
         figure.axes[0].set_ylabel("")  # its name is the caption, for letters on a phone are large
         yield f"Natural frequency in {data.last.direction} (Hz){ahead}", render_svg(figure)
     elif (frf := data.newest.frf) is not None:
@@ -144,16 +135,11 @@ def draw_summary_figures(data: ReportData) -> Iterator[tuple[str, str]]:
         yield "Receptance at the tool tip", render_svg(figure)
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""
-        caption = f"Depth (mm), {diagram.cut}: chatter above the line{then}"
-        yield caption, render_svg(diagram.figure(is_small=True))
+        yield f"Depth (mm), {diagram.cut}: chatter above the line{then}", render_svg(plot_lobes(diagram, is_small=True))
 
 
 def write_report(
-    logbook: Logbook,
-    path: Path | None = None,
-    tool: str = "",
-    direction: str = "",
-    sections: Sequence[SectionMaker] = SECTIONS,
+    logbook: Logbook, path: Path | None = None, tool: str = "", direction: str = "", sections: SectionMakers = SECTIONS
 ) -> Path:
     """Write the report of one series, that of the newest test where none is named; DataError without a tap test.
 
@@ -167,39 +153,25 @@ def write_report(
 
 
 def render_report(
-    logbook: Logbook,
-    tool: str,
-    direction: str,
-    now: datetime | None = None,
-    sections: Sequence[SectionMaker] = SECTIONS,
+    logbook: Logbook, tool: str, direction: str, now: datetime | None = None, sections: SectionMakers = SECTIONS
 ) -> str:
     """Return the HTML of one series; raise ValueError where it has no tap test. now: None for the current time."""
     return render_page("report.html", **logbook.query(_report_content, tool, direction, now, sections))
 
 
-REPORT_FIELDS = json_fields("""
-    name=machine.machine.name tool=last.tool direction=last.direction last=last.time label=machine.spindle.label
-    tap_id=newest.id software=analysis.history.software
-""")
-
-
 def _report_content(
-    analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: Sequence[SectionMaker]
+    analysis: Analysis, tool: str, direction: str, now: datetime | None, sections: SectionMakers
 ) -> JsonObject:
     """Return all that the template shows, from one analysis."""
     data = collect_report_data(analysis, tool, direction, now)
-    groups, tap = [make(data) for make in sections], data.newest
-    return REPORT_FIELDS(data) | {
+    groups = [make(data) for make in sections]
+    return {
+        "data": data,
         "groups": groups,
         "has_plots": any(section.has_plot for group in groups for section in group),
         "numbering": count(1),
-        "first": data.rows[0].time,
-        "n_taps": len(data.rows),
-        "as_of": data.outlook.status.time.astimezone(),
         "first_screen": make_summary(data),
-        "conditions": [*filter(None, [tap.circumstances.operator]), *condition_texts(data.last.conditions)],
-        "good": len(tap.accepted),
-        "hits": len(tap.hits),
+        "conditions": [*filter(None, [data.newest.circumstances.operator]), *condition_texts(data.last.conditions)],
     }
 
 
@@ -218,8 +190,7 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
     """Return the HTML of a fleet, a line for each machine, in the order of the rows."""
     lights = [row["light"] for row in rows]
     counts = ", ".join(f"{lights.count(light)} {light.value}" for light in StatusLevel if light in lights)
-    cells = [[row[column] for column in FLEET_COLUMNS] for row in rows]
-    numbers = NumberTable(FLEET_COLUMNS, cells)
+    numbers = NumberTable(FLEET_COLUMNS, [[row[column] for column in FLEET_COLUMNS] for row in rows])
     machines = [_machine_content(row) for row in rows]
     return render_page("fleet.html", name=name, now=now, counts=counts, machines=machines, numbers=numbers)
 
@@ -227,20 +198,16 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
 def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine as the template takes it."""
     left, last, fall, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
-    due = "never tapped"
-    if left is not None:
-        due = f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
-    has_changed = fall is not None and std != 0
-    return {
-        **row,
-        "kind": status_css_class(row["light"], row["is_early"]),
-        "reasons": row["reasons"] or [row["why"] or ("all is well" if row["light"] is StatusLevel.GOOD else "-")],
-        "fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with",
-        "gauge": make_gauge(fall, *row["limits"]) if has_changed else None,
-        "spark": spark_points(row["points"]),
-        "programs": programs_text(row["programs"]),
-        "due": f"{due}, last {last.partition('T')[0]}" if last else due,
-    }
+    due = "never tapped" if left is None else due_text(left)
+    is_good, has_changed = row["light"] is StatusLevel.GOOD, fall is not None and std != 0
+    return (
+        {**row, "kind": status_css_class(row["light"], row["is_early"])}
+        | {"reasons": row["reasons"] or [row["why"] or ("all is well" if is_good else "-")]}
+        | {"fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with"}
+        | {"gauge": make_gauge(fall, *row["limits"]) if has_changed else None, "spark": spark_points(row["points"])}
+        | {"programs": programs_text(row["programs"])}
+        | {"due": f"{due}, last {last.partition('T')[0]}" if last else due}
+    )
 
 
 def programs_text(words: Mapping[str, str]) -> str:
@@ -260,6 +227,5 @@ def spark_points(points: Sequence[tuple[float, float]]) -> str:
     (first, *_, last), percents = zip(*points, strict=True)
     top, span, reach = max(percents), last - first or 1.0, max(max(percents) - min(percents), 1.0)
     return " ".join(
-        f"{SPARK_WIDTH * (day - first) / span:.1f},{SPARK_HEIGHT * (top - percent) / reach:.1f}"
-        for day, percent in points
+        f"{SPARK_WIDTH * (day - first) / span:.1f},{SPARK_HEIGHT * (top - drop) / reach:.1f}" for day, drop in points
     )

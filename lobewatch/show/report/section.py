@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,7 +13,7 @@ from lobewatch.arrays import Floats
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.terminal.option_names import with_option_names
 
-MAX_RESPONSE_LINES = 1500
+MAX_FIGURE_LINES = 1500
 """Largest number of lines of a response or a diagram."""
 
 
@@ -32,20 +32,20 @@ class NumberTable(NamedTuple):
         exact = json.dumps({"heads": list(self.heads), "lines": lines}, ensure_ascii=False, separators=(",", ":"))
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")
 
+    @classmethod
+    def from_lobes(cls, speed_rpm: Floats, depths: Mapping[str, Floats]) -> Self:
+        """Tabulate limiting depths (m, by name) over speed."""
+        heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
+        columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])
+        return cls(heads, columns[:: math.ceil(speed_rpm.size / MAX_FIGURE_LINES)].tolist())
 
-def tabulate_lobes(speed_rpm: Floats, depths: Mapping[str, Floats]) -> NumberTable:
-    """Tabulate limiting depths (m, by name) over speed."""
-    heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
-    columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])
-    return NumberTable(heads, columns[:: math.ceil(speed_rpm.size / MAX_RESPONSE_LINES)].tolist())
-
-
-def tabulate_response(frf: Frf) -> NumberTable:
-    """Tabulate a frequency response and its coherence, in no more lines than a figure can show."""
-    coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
-    columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
-    step = math.ceil(frf.frequency.size / MAX_RESPONSE_LINES)
-    return NumberTable(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
+    @classmethod
+    def from_response(cls, frf: Frf) -> Self:
+        """Tabulate a frequency response and its coherence, in no more lines than a figure can show."""
+        coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
+        columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
+        step = math.ceil(frf.frequency.size / MAX_FIGURE_LINES)
+        return cls(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
 
 
 def _json_value(value: Any) -> Any:
@@ -129,7 +129,7 @@ class Section(NamedTuple):
     has_plot: bool = False
     """True if the page needs the plot script."""
 
-
-def make_figure_section(heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Section:
-    """Make a section of a figure below a note on reading it; numbers: data of the figure."""
-    return Section(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])
+    @classmethod
+    def with_figure(cls, heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Self:
+        """Make a section of a figure below a note on reading it; numbers: data of the figure."""
+        return cls(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])

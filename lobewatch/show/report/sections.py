@@ -1,4 +1,7 @@
-"""Make the sections of the report below its summary, in their order."""
+"""Make the sections of the report below its summary, in their order.
+
+What such a report says: ISO 17359 (condition monitoring) and ISO 13381-1 (prognostics).
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -6,29 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import merge_remarks
+from acquisition import Channel, merge_remarks
 from dsm import format_with_error
+from lobewatch.history import HistoryRow
+from lobewatch.machine import REFERENCE_CUT
+from lobewatch.monitoring.alarm import Alarm
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
+from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
+from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
 from lobewatch.monitoring.threshold_dates import date_of_days
-from lobewatch.show.figures.lobe_figures import plot_waterfall
-from lobewatch.show.figures.trend_figures import plot_frf
+from lobewatch.show import trend as trends
+from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
+from lobewatch.show.figures.trend_figures import ValueTrend, plot_frf, plot_trend
+from lobewatch.show.history import cut_result_text
 from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, frequency_margin_text
-from lobewatch.show.report.report_data import BEARING_VALUE, FREQUENCY_VALUE, ReportData, ValueTrend, make_value_trend
-from lobewatch.show.report.section import (
-    DataTable,
-    Fragment,
-    NumberTable,
-    Paragraph,
-    Section,
-    TableCell,
-    make_figure_section,
-    tabulate_lobes,
-    tabulate_response,
-)
-from lobewatch.show.report.tables import make_events, make_provenance, make_series, make_tap_tests, make_test_cuts
-from lobewatch.show.terminal.output import count_noun, json_fields
-from lobewatch.show.trend import FORECAST_ASSUMPTIONS, forecast_date_rows, no_dates_text, trend_sentence
+from lobewatch.show.report.report_data import SHOWN_VALUES, ReportData, make_value_trend
+from lobewatch.show.report.section import BulletList, DataTable, Fragment, NumberTable, Paragraph, Section, TableCell
+from lobewatch.show.terminal.output import count_noun, pick
+from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
 from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
@@ -36,19 +36,18 @@ from lobewatch.verdicts.speed_pockets import SPEEDS_ONLY_CODE
 
 def make_figures(data: ReportData) -> list[Section]:
     """Make all figures that have data."""
-    lobes = [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data)]
-    return [*lobes, *make_frequency_response(data)]
+    return [*make_value_figures(data), *make_lobe_figure(data), *make_waterfall(data), *make_frequency_response(data)]
 
 
 def make_value_figures(data: ReportData) -> Iterator[Section]:
     """Make a figure over time of each value that is known."""
-    for value in (FREQUENCY_VALUE, BEARING_VALUE):
+    for value in SHOWN_VALUES:
         trend = make_value_trend(data, value)
         if trend is not None:
-            texts = [value.text, *(["Dotted lines: what was done."] if trend.marks.events else [])]
-            texts += ["Hollow: tests that do not count."] if trend.marks.excluded else []
+            texts = [value.text, *(["Dotted lines: what was done."] if trend.events else [])]
+            texts += ["Hollow: tests that do not count."] if trend.drawn_excluded else []
             texts += ["Line: fitted; band: where it goes, 80 %."] if trend.curve else []
-            yield make_figure_section(value.heading, " ".join(texts), trend.figure(), _tabulate_trend(trend))
+            yield Section.with_figure(value.heading, " ".join(texts), plot_trend(trend), _tabulate_trend(trend))
 
 
 def _tabulate_trend(trend: ValueTrend) -> NumberTable:
@@ -84,8 +83,8 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
     if diagram.heard:
         text += f" Rings and crosses: {count_noun(len(diagram.heard), 'test cut')}, as heard."
     heading = "Stability lobes, then and now" if len(diagram.depths) > 1 else "Stability lobes"
-    numbers = tabulate_lobes(diagram.now.speed_rpm, {**diagram.depths, **diagram.edges})
-    return [make_figure_section(heading, text, diagram.figure(), numbers)]
+    numbers = NumberTable.from_lobes(diagram.now.speed_rpm, {**diagram.depths, **diagram.edges})
+    return [Section.with_figure(heading, text, plot_lobes(diagram), numbers)]
 
 
 def make_waterfall(data: ReportData) -> list[Section]:
@@ -95,7 +94,7 @@ def make_waterfall(data: ReportData) -> list[Section]:
         return []
     text = f"Limit of the {course.cut} by zero order after each tap test; bright is deep."
     figure = plot_waterfall(course.speed_rpm, course.times, course.depth)
-    return [make_figure_section("Pockets over time", text, figure)]
+    return [Section.with_figure("Pockets over time", text, figure)]
 
 
 def make_frequency_response(data: ReportData) -> list[Section]:
@@ -105,8 +104,8 @@ def make_frequency_response(data: ReportData) -> list[Section]:
         return []
     band = data.response_band(newest)
     figure = plot_frf(None if first is None else first.frf, newest, band)
-    text, numbers = "Receptance: displacement over force.", tabulate_response(newest.in_band(band))
-    return [make_figure_section("Frequency response", text, figure, numbers)]
+    text, numbers = "Receptance: displacement over force.", NumberTable.from_response(newest.in_band(band))
+    return [Section.with_figure("Frequency response", text, figure, numbers)]
 
 
 def make_lobe_history(data: ReportData) -> list[Section]:
@@ -116,8 +115,8 @@ def make_lobe_history(data: ReportData) -> list[Section]:
     return [Section("", [Fragment("lobe_course.html", {"course": data.lobe_history})], has_plot=True)]
 
 
-SectionMaker = Callable[[ReportData], Sequence[Section]]
-"""Function that makes some sections of the report, none where there is nothing to show."""
+SectionMakers = Sequence[Callable[[ReportData], Sequence[Section]]]
+"""Functions that make sections of the report in the order of the page, none where there is nothing to show."""
 CHANGE_VALUES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
@@ -137,30 +136,23 @@ def make_programs(data: ReportData) -> list[Section]:
     remarks = [remark for program in data.programs for remark in program.verdict.remarks]
     speeds = merge_remarks(remark for remark in remarks if remark.code == SPEEDS_ONLY_CODE)
     lines = [line for program in data.programs for line in advice_lines(program, data.machine)]
-    content = {
-        "programs": [_program_row(program) for program in data.programs],
-        "lines": [*lines, *map(str, speeds)],
-        "doubt": verdicts.verdict_notes(checked, data.machine),
-        "method": checked[0].method if checked else "",
-    }
+    notes, method = verdicts.verdict_notes(checked, data.machine), checked[0].method if checked else ""
+    rows = {"programs": list(map(_program_row, data.programs)), "lines": [*lines, *map(str, speeds)]}
+    content = rows | {"doubt": notes, "method": method}
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
-
-
-PROGRAM_FIELDS = json_fields("name speed_rpm depth_mm")
 
 
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
-    return PROGRAM_FIELDS(verdict.program) | {
-        "limit": verdicts.limit_text(verdict),
-        "band": verdicts.band_text(verdict).replace("..", " to "),
-        "margin": verdicts.margin_text(verdict),
-        "turning": verdicts.chatter_risk_text(verdict),
-        "left": frequency_margin_text(program.advice),
-        "at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value),
-        "now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict)),
-    }
+    return (
+        pick(verdict.program, "name", "speed_rpm", "depth_mm")
+        | {"limit": verdicts.limit_text(verdict), "band": verdicts.band_text(verdict).replace("..", " to ")}
+        | {"margin": verdicts.margin_text(verdict), "turning": verdicts.chatter_risk_text(verdict)}
+        | {"left": frequency_margin_text(program.advice)}
+        | {"at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value)}
+        | {"now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict))}
+    )
 
 
 def _verdict_cell(word: Stability, text: str) -> TableCell:
@@ -172,11 +164,11 @@ def make_forecast(data: ReportData) -> list[Section]:
     """Make the forecast dates; nothing for a single test."""
     if data.series.trend is None or data.series.is_baseline:
         return []
-    course = Paragraph(f"{trend_sentence(data.series)}.")
-    if no_dates_text(data.outlook):
+    course = Paragraph(f"{trends.trend_sentence(data.series)}.")
+    if trends.no_dates_text(data.outlook):
         return [Section("Until when", [course])]
-    dates = DataTable(["what", "becomes doubtful", "is not stable"], forecast_date_rows(data.outlook), "words")
-    return [Section("Until when", [course, dates, Paragraph(FORECAST_ASSUMPTIONS, is_small=True)])]
+    dates = DataTable(["what", "becomes doubtful", "is not stable"], trends.forecast_date_rows(data.outlook), "words")
+    return [Section("Until when", [course, dates, Paragraph(trends.FORECAST_ASSUMPTIONS, is_small=True)])]
 
 
 def make_notes(data: ReportData) -> list[Section]:
@@ -226,23 +218,153 @@ def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
         values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
         if values and np.isfinite(getattr(history.rows[-1], name)):
             start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
-            change = f"{100 * (values[-1] / values[0] - 1):+z.2f} %"
-            yield [f"{label} tip stiffness, model (N/µm)", start, now, change]
+            yield [f"{label} tip stiffness, model (N/µm)", start, now, f"{100 * (values[-1] / values[0] - 1):+z.2f} %"]
 
 
 def make_modes(data: ReportData) -> list[Section]:
     """Make the table of the modes of the newest test."""
-    heads = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"]
-    rows = list[list[str]]()
+    heads, rows = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"], list[list[str]]()
     for frequency, damping, stiffness, _ in data.last.modes:
         shown = "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
         remark = "not a driving point" if stiffness < 0 else ""
         rows.append([f"{frequency:.2f} Hz", f"{damping * 100:.3f}", shown, remark])
-    table = DataTable(heads, rows, if_empty="none was found")
-    return [Section("Modes of the newest test", [table], is_framed=False)]
+    return [Section("Modes of the newest test", [DataTable(heads, rows, if_empty="none was found")], is_framed=False)]
 
 
-SECTIONS: tuple[SectionMaker, ...] = (
+TAP_TABLE_HEADS = (
+    *("time", "tool", "direction", "f_n (Hz)", "zeta (%)", "K (N/um)"),
+    *("bearing stiffness (N/um)", "temperature (degC)"),
+)
+"""Headings of the numbers of tap tests."""
+TAP_VALUE_FORMATS = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
+"""Format and size of the unit of f_n, zeta, K and the bearing stiffness."""
+COUNTING_TEXT = "Those that count, the newest first"
+"""Words for what a list holds."""
+
+
+def make_series(data: ReportData) -> list[Section]:
+    """Make a table of the series, the largest drop first."""
+    heads, rows = ["tool", "direction", "light", "points", "newest", "change", "rate"], list[list[str | TableCell]]()
+    for series in data.outlook.status.series:
+        ordered, trend = sort_by_severity(series.remarks), series.trend
+        worst, early = worst_status(ordered), is_early_alarm(ordered)
+        light = TableCell(status_label(worst, early), status_css_class(worst, early))
+        points = "0" if trend is None else str(len(trend.points))
+        rate = "-" if trend is None else trends.rate_text(trend) or f"from {MIN_FORECAST_POINTS} points on"
+        change = trends.change_since_start_text(series)
+        rows.append([series.tool, series.direction, light, points, f"{series.time:%Y-%m-%d}", change, rate])
+    return [Section("Tools and directions", [DataTable(heads, rows, "words")], is_framed=False)]
+
+
+def make_events(data: ReportData) -> list[Section]:
+    """Make a list of events, acknowledged alarms and excluded tests, oldest first."""
+    files = data.analysis.files
+    reasons = {entry.id: entry.excluded for entry in files.excluded}
+    ends = {True: " (new baseline)", False: ""}
+    lines = [(event.time, f"{event.text}{ends[event.new_baseline]}") for event in files.contents.events]
+    lines += [(word.time, f"{word.alarm_id} {word}") for word in files.contents.acknowledgements]
+    for row in data.excluded_rows:
+        value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
+        lines.append((row.time, f"tap test excluded ({reasons[row.tap_id]}){value}"))
+    bullets = BulletList([f"{time.astimezone():%Y-%m-%d}: {text}" for time, text in sorted(lines)])
+    return [Section("What was done, and tests that do not count", [bullets])] if lines else []
+
+
+def make_test_cuts(data: ReportData) -> list[Section]:
+    """Make the table of test cuts, the newest first."""
+    rows = list[list[str]]()
+    for cut in reversed(data.analysis.cuts):
+        about = [f"{cut.at.astimezone():%Y-%m-%d %H:%M}", cut.program or REFERENCE_CUT, cut.tool]
+        rows.append([*about, f"{cut.speed_rpm:.0f}", f"{1e3 * cut.depth:.4g}", cut_result_text(cut), cut.by])
+    table = DataTable(["when", "cut", "tool", "rpm", "mm", "heard", "by"], rows, "words")
+    note = Paragraph(f"{COUNTING_TEXT}, as they were heard.", is_small=True)
+    return [Section("Test cuts", [note, table])] if rows else []
+
+
+def make_tap_tests(data: ReportData) -> list[Section]:
+    """Make the table of tap tests, the newest first, and their numbers, the oldest first."""
+    history = data.analysis.history.current
+    heads = ["when", "tool", "in", "frequency (Hz)", "damping (%)", "stiffness (N/µm)", "bearings (N/µm)", "said of it"]
+    numbers = NumberTable(TAP_TABLE_HEADS, [_tap_values(row) for row in history])
+    table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers, key="taps")
+    return [Section("Tap tests", [Paragraph(f"{COUNTING_TEXT}.", is_small=True), table], is_framed=False)]
+
+
+def _tap_row(row: HistoryRow) -> list[str]:
+    values = (row.frequency, row.damping_ratio, row.stiffness, row.bearing_stiffness)
+    formats = zip(values, TAP_VALUE_FORMATS, strict=True)
+    cells = [form.format(value.value / scale) if value.is_known else "-" for value, (form, scale) in formats]
+    words = [
+        f"{name} {verdicts.VERDICT_STYLES[ruling.stability].symbol}" for name, ruling in (row.verdicts or {}).items()
+    ]
+    asked = [f"question {question.code}" for question in row.questions]
+    return [f"{row.time.astimezone():%Y-%m-%d %H:%M}", row.tool, row.direction, *cells, "; ".join([*asked, *words])]
+
+
+def _tap_values(row: HistoryRow) -> list[Any]:
+    values = (row.frequency.value, row.damping_ratio.value / 0.01, row.stiffness.value / 1e6)
+    warmth = math.nan if row.conditions.temperature_c is None else float(row.conditions.temperature_c)
+    return [row.time.isoformat(), row.tool, row.direction, *values, row.bearing_stiffness.value / 1e6, warmth]
+
+
+FAILURE_MODE = (
+    "loss of stiffness of bearings, joints and clamping, seen as a fall of the natural frequency that is followed at "
+    "the tool tip, spindle standing"
+)
+"""Failure mode that is monitored."""
+NOT_DETECTED: Sequence[str] = (
+    "damage that leaves the stiffness as it is: pitting, cage, lubrication, seals, unbalance, motor, drawbar below its "
+    "clamping force",
+    "what heat and speed do to the preload while the spindle turns",
+    "what has happened since the newest tap test",
+)
+"""Damage that no tap test detects."""
+TOO_FEW_CLAMPINGS = f"no alarm by scatter below {MIN_MONITORED_POINTS} clampings"
+"""Confidence of the alarm of a short series."""
+ALARM_CONFIDENCE = (
+    "alarm: two clampings running, each with a chance of 1 in 2000 of being scatter alone; of 100 healthy series 5 "
+    "raise one in 60 clampings"
+)
+"""Confidence of the alarm; measured, docs/decay.md."""
+DATE_CONFIDENCE = "dates: 80 % ranges, if the machine is used as before"
+"""Confidence of the forecast."""
+
+
+def make_provenance(data: ReportData) -> list[Section]:
+    """Make the last section: what was measured with what, how sure it is, and room for a signature."""
+    points = 0 if data.series.trend is None else len(data.series.trend.points)
+    confidence = ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else TOO_FEW_CLAMPINGS
+    tap = data.newest
+    rows = [
+        ("machine", data.machine.machine.name),
+        ("folder", data.analysis.folder.path.resolve().name),
+        ("tool, direction", data.series.name),
+        ("newest tap test", f"{data.last.time.astimezone():%Y-%m-%d %H:%M}"),
+        ("hammer held by", tap.circumstances.operator or "not said"),
+        ("device", tap.circumstances.device or "not known: a recorded file"),
+        *map(_sensor_row, tap.hits[0].channels or () if tap.hits else ()),
+        ("failure mode watched", FAILURE_MODE),
+        ("confidence", f"{confidence}; {DATE_CONFIDENCE}"),
+        *(("alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
+        ("name, date, signature", ""),
+    ]
+    unseen = Paragraph("It does not see:"), BulletList(NOT_DETECTED)
+    return [Section("For whoever signs", [DataTable(["what", "is"], rows, "words"), *unseen])]
+
+
+def _alarm_text(alarm: Alarm) -> str:
+    word = alarm.acknowledgement or "not acknowledged"
+    return f"{alarm.about}: {alarm.code}, raised {alarm.triggered_at.astimezone():%Y-%m-%d}, {word}; name: {alarm.id}"
+
+
+def _sensor_row(channel: Channel) -> tuple[str, str]:
+    name, unit = ("hammer", "N") if channel.quantity == "force" else ("accelerometer", "(m/s²)")
+    number = f"serial number {channel.serial_number or 'not known'}"
+    calibrated = f"calibrated {channel.calibration_date}" if channel.calibration_date else "calibration not known"
+    return name, f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
+
+
+SECTIONS: SectionMakers = (
     make_programs,
     make_forecast,
     make_notes,

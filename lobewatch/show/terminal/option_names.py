@@ -4,6 +4,7 @@ The library does not know the command line: its errors and remarks name a field 
 (`Logbook.verdicts`). A person at the terminal, and a program that reads the JSON, needs the option or the command.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -11,56 +12,21 @@ from typing import Any
 OPTION_NAMES: Mapping[str, str] = {
     "accept_questions.codes": "--accept",
     "accept_settings.keys": "--accept",
-    "acknowledge_alarms.until": "--until",
-    "acquire_cut.file": "--file",
-    "acquire_cut.port": "--port",
     "acquisition.measure_rate": "lobewatch sensors",
     "acquisition.scan_ports": "lobewatch ports",
-    "add_event.new_baseline": "--new-baseline",
     "build_power_reading.power_kw": "--power",
-    "calibrate_joints.mode": "--mode",
     "calibrate_joints.tools": "--tool",
-    "choose_cut.cut": "--cut",
-    "choose_cut.program": "--program",
-    "Circumstances.direction": "--direction",
-    "Circumstances.tool": "--tool",
-    "compare_lobes.cut": "--cut",
     "compute_lobe_chart.method": "--method",
-    "Conditions.hours": "--hours",
-    "Conditions.reclamped": "--reclamped",
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
     "CutEntry.has_chatter": "--chatter",
-    "Description.averages": "--averages",
-    "Description.columns": "--columns",
-    "Description.date": "--date",
-    "Description.date_pattern": "--date-pattern",
-    "Description.decimal": "--decimal",
-    "Description.direction": "--direction",
-    "Description.force": "--force",
-    "Description.force_unit": "--force-unit",
-    "Description.full_scale": "--full-scale",
-    "Description.pulses": "--pulses",
-    "Description.quantity": "--quantity",
-    "Description.rate": "--rate",
-    "Description.response": "--response",
-    "Description.sensitivity": "--sensitivity",
-    "Description.sensor": "--sensor",
-    "Description.skip": "--skip",
-    "Description.spacing": "--spacing",
-    "Description.start": "--start",
-    "Description.tacho": "--tacho",
-    "Description.unit": "--unit",
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
     "EmulationSetup.tcp": "--tcp",
     "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",
-    "exclude_entry.reason": "--reason",
     "find_setup_question.name": "--edit",
     "fit_file_modes": "lobewatch modes",
-    "fit_file_modes.accept": "--accept",
-    "fit_file_modes.conjugate": "--conjugate",
     "fit_file_modes.sensor": "--sensor-mass",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_files.make_machine_folder.template": "lobewatch init --example",
@@ -69,7 +35,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "folder_updates.exclude_entry": "lobewatch exclude",
     "folder_updates.store_cut": "observe",
     "folder_updates.store_mode_edits": "lobewatch modes MACHINE TAP",
-    "list_comparison_files.beside": "--beside",
     "LobeChart.source": "--source",
     "lobes.materials_by_name": "lobewatch materials",
     "Logbook.verdicts": "lobewatch check",
@@ -79,9 +44,6 @@ OPTION_NAMES: Mapping[str, str] = {
     "make_machine_folder": "lobewatch init",
     "make_machine_folder.template": "lobewatch init FOLDER --example",
     "modal.synthesize_frf": "lobewatch modes --figure",
-    "ModeEdits.add": "--add",
-    "ModeEdits.drop": "--drop",
-    "ModeEdits.fix": "--fix",
     "MountingVariation.bad_share": "--bad-clampings",
     "MountingVariation.scatter": "--scatter",
     "MountingVariation.temperature_swing": "--temperature",
@@ -93,47 +55,45 @@ OPTION_NAMES: Mapping[str, str] = {
     "pocket_depth.find_pocket_depths": "lobewatch suggest",
     "program_learning.find_next_cut": "lobewatch suggest",
     "ProgramTable.depth_mm": "--depth",
-    "ProgramTable.direction": "--direction",
     "ProgramTable.feed_per_tooth_mm": "--feed-per-tooth",
-    "ProgramTable.material": "--material",
     "ProgramTable.name": "--save",
     "ProgramTable.radial_depth_mm": "--radial",
     "ProgramTable.speed_rpm": "--speed",
-    "ProgramTable.teeth": "--teeth",
-    "ProgramTable.tool": "--tool",
     "ProgramTable.tool_diameter_mm": "--diameter",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
     "record_cut.time_limit": "--seconds",
     "rotate_structure.degrees": "--askew",
-    "rotate_structure.direction": "--direction",
     "screen.ScreenServer": "--screen",
-    "ScreenServer.listen": "--listen",
     "sensor_checks.check_skew": "lobewatch sensors --skew",
-    "SeriesStatus.direction": "--direction",
-    "SeriesStatus.tool": "--tool",
     "session.TapSession": "lobewatch tap",
     "store_recordings.keep_going": "--keep-going",
     "TapSession.run": "lobewatch tap",
-    "Window.hit_at": "--hit-at",
     "Window.start": "--window-start",
     "Window.time_constant": "--window",
-    "Workers.jobs": "--jobs",
-    "Workers.scheduler": "--scheduler",
 }
 """Option or command for each field or function that a message names."""
+OPTION_OWNERS = (
+    *("Circumstances", "Conditions", "Description", "ModeEdits", "ProgramTable", "SeriesStatus", "Workers"),
+    *("ScreenServer", "Window", "acquire_cut", "add_event", "calibrate_joints", "choose_cut", "compare_lobes"),
+    *("acknowledge_alarms", "exclude_entry", "fit_file_modes", "list_comparison_files", "rotate_structure"),
+)
+"""Owners of fields that have the name of their option, such as date_pattern, unless OPTION_NAMES has another."""
 
-_NAMES = re.compile(rf"\b(?:{'|'.join(map(re.escape, sorted(OPTION_NAMES, key=len, reverse=True)))})\b")
+_LISTED = "|".join(map(re.escape, sorted(OPTION_NAMES, key=len, reverse=True)))
+_NAMES = re.compile(rf"\b(?:(?:{'|'.join(OPTION_OWNERS)})\.(\w+)|(?:{_LISTED}))\b")
 
 
 def with_option_names(text: str) -> str:
     """Replace the library fields and functions that a message names by their options and commands."""
-    return _NAMES.sub(lambda match: OPTION_NAMES[match[0]], text)
+    return _NAMES.sub(lambda match: OPTION_NAMES.get(match[0]) or f"--{match[1].replace('_', '-')}", text)
 
 
 def with_option_names_inside(value: Any) -> Any:
-    """Replace the names in all texts of a value made of dicts, lists and texts."""
+    """Replace the names in all texts of a value made of dicts, lists and texts; infinite and NaN become None."""
     if isinstance(value, dict):
         return {key: with_option_names_inside(entry) for key, entry in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [with_option_names_inside(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return with_option_names(value) if type(value) is str else value

@@ -3,18 +3,15 @@
 Names and texts may come from anywhere: no control character of theirs reaches the terminal.
 """
 
-import contextlib
 import json
 import math
 import os
 import re
 import sys
 import webbrowser
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from functools import reduce
+from collections.abc import Container, Iterable, Iterator, Sequence
 from itertools import starmap
-from types import MappingProxyType
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.cells import cell_len
@@ -26,7 +23,7 @@ from rich.text import Text
 
 from acquisition import Remark, merge_remarks
 from acquisition.errors import CONTROL_CHARACTERS
-from lobewatch.show.terminal.option_names import with_option_names
+from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
@@ -34,8 +31,6 @@ JsonObject = dict[str, Any]
 """Object of the JSON output."""
 Texts = list[str | Table]
 """Texts and tables of the output for people."""
-REPLACEMENT_CHARACTER = "\ufffd"
-"""Character shown instead of a control character."""
 
 
 class SafeConsole(Console):
@@ -52,8 +47,7 @@ class SafeTable(Table):
 
     def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
         """Add a row."""
-        safe = (make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells)
-        super().add_row(*safe, **options)
+        super().add_row(*(make_printable(cell, "") if isinstance(cell, str) else cell for cell in cells), **options)
 
     @property
     def min_table_width(self) -> int:
@@ -80,7 +74,7 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     if as_json:
         import msgspec  # only JSON output waits for it
 
-        plain = _json_value(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
+        plain = with_option_names_inside(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
         exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
@@ -130,66 +124,17 @@ def count_noun(count: int, noun: str) -> str:
 
 def make_printable(text: str, kept: str = "\n\t") -> str:
     """Replace control characters except those to keep, and name options instead of library fields."""
-    named = with_option_names(text)
-    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else REPLACEMENT_CHARACTER, named)
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", with_option_names(text))
 
 
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _json_value(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_json_value(entry) for entry in value]
-    if isinstance(value, str):
-        return with_option_names(value)
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def pick(record: Any, *names: str) -> JsonObject:
+    """Return attributes of a record by their names; None for each where there is no record.
 
-
-FIELD_PATTERN = re.compile(r"(\w+)(?:=([\w.-]+))?(?:([*/])([\d.e]+))?")
-"""Key, attribute path, and factor or divisor of a unit."""
-JsonFields = Callable[[Any], JsonObject]
-"""Function that makes the JSON object of a record."""
-
-
-def json_fields(table: str, encoders: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})) -> JsonFields:
-    """Return a function that makes the JSON object of a record, its keys in the order of the table.
-
-    An entry of the table is a key, `key=path.of.attribute`, or either of them with the factor or divisor of its unit;
-    the path `self` is the record, a number in a path an index. The value is None where a part of the path is None. An
-    encoder makes the value of its key from the attribute. Encoder and unit apply to each item of a list or tuple.
-
-    >>> from types import SimpleNamespace
-    >>> pocket = SimpleNamespace(speed_rpm=6000.0, tip=SimpleNamespace(depth=0.002), mode=None)
-    >>> json_fields("speed_rpm depth_mm=tip.depth*1e3 frequency_hz=mode.frequency", {"speed_rpm": round})(pocket)
-    {'speed_rpm': 6000, 'depth_mm': 2.0, 'frequency_hz': None}
+    >>> from fractions import Fraction
+    >>> pick(Fraction(2, 3), "numerator", "denominator")
+    {'numerator': 2, 'denominator': 3}
     """
-    fields = [_read_field(entry, encoders) for entry in table.split()]
-    return lambda record: {key: value(record) for key, value in fields}
-
-
-def _read_field(entry: str, encoders: Mapping[str, Callable[[Any], Any]]) -> tuple[str, Callable[[Any], Any]]:
-    match = FIELD_PATTERN.fullmatch(entry)
-    if match is None:
-        raise ValueError(f"{entry!r} is no key=path.of.attribute*factor")
-    key, path, operator, unit = match.groups()
-    names, size = [] if path == "self" else (path or key).split("."), float(unit or 1)
-    encode = encoders.get(key, lambda value: value)
-
-    def scale(number: Any) -> Any:
-        return number * size if operator == "*" else number / size
-
-    def value(record: Any) -> Any:
-        part = reduce(_follow, names, record)
-        is_list = isinstance(part, (list, tuple)) and not hasattr(part, "_fields")
-        convert = scale if operator else encode
-        return list(map(convert, part)) if is_list else None if part is None else convert(part)
-
-    return key, value
-
-
-def _follow(part: Any, name: str) -> Any:
-    if part is None:
-        return None
-    return part[int(name)] if name.lstrip("-").isdigit() else getattr(part, name)
+    return {name: record if record is None else getattr(record, name) for name in names}
 
 
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
@@ -229,28 +174,6 @@ Listen = Annotated[str, typer.Option(help="Address of this computer at which the
 KNOWN = "What a browser must know"
 Token = Annotated[str | None, typer.Option(help=f"{KNOWN} to see and alter anything; a new one where not given.")]
 WatchToken = Annotated[str | None, typer.Option(help=f"{KNOWN} only to see anything; a new one where not given.")]
-
-
-class ServedScreen(contextlib.AbstractContextManager["ServedScreen"], Protocol):
-    """Server of a screen that answers within its context."""
-
-    @property
-    def url(self) -> str:
-        """Address with full access."""
-        ...
-
-    @property
-    def watch_url(self) -> str:
-        """Address with read-only access."""
-        ...
-
-
-@contextlib.contextmanager
-def serve_screen(server: ServedScreen) -> Iterator[None]:
-    """Run a screen server, and print its address."""
-    with server:
-        show_address(server.url, server.watch_url)
-        yield
 
 
 def show_address(url: str, watch_url: str, as_json: bool = False) -> None:

@@ -8,16 +8,13 @@ STATUS_LABELS = {
     StatusLevel.WARN: "! WARNING",
     StatusLevel.GOOD: "✓ GOOD",
 }
-EARLY_ALARM_LABEL = "✗ EARLY ALARM"
-STATUS_CSS_CLASSES = {StatusLevel.GOOD: "ok", StatusLevel.ALARM: "bad"}
-"""Class of a status in the style sheet, "doubt" for the others."""
 
 
 def status_label(light: StatusLevel, is_early: bool = False) -> str:
     """Return the status with its symbol."""
-    return EARLY_ALARM_LABEL if is_early else STATUS_LABELS[light]
+    return "✗ EARLY ALARM" if is_early else STATUS_LABELS[light]
 
 
 def status_css_class(light: StatusLevel, is_early: bool = False) -> str:
     """Return the class of a status in the style sheet."""
-    return "early" if is_early else STATUS_CSS_CLASSES.get(light, "doubt")
+    return "early" if is_early else {StatusLevel.GOOD: "ok", StatusLevel.ALARM: "bad"}.get(light, "doubt")

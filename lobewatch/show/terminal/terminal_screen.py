@@ -21,8 +21,8 @@ from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import SafeConsole
 from lobewatch.tap.state import ListedHit, Outcome, TapState, TapStep
 
-PRINT_INTERVAL = 0.05
-"""Time between two looks at the test (s)."""
+POLL_INTERVAL = 0.05
+"""Time between two looks at keys and test (s)."""
 
 
 class RunningTest(Protocol):
@@ -66,7 +66,7 @@ class TapPrinter:
         self._thread.join()
 
     def _follow(self) -> None:
-        while not self._ended.wait(PRINT_INTERVAL):
+        while not self._ended.wait(POLL_INTERVAL):
             self.print_new(self._session.state)
         self.print_new(self._session.state)
 
@@ -106,7 +106,7 @@ def hit_markup(hit: ListedHit) -> str:
     return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(with_option_names(hit.reason))}"
 
 
-PAGE_UP_CODES = ("\x1b[5~", "\xe0I", "\0I")
+PAGE_UP_CODES = re.compile(r"\x1b\[5~|[\xe0\0]I")
 """Page Up as terminals and Windows send it, by presenters and foot switches."""
 SPECIAL_KEY_CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
 """Codes of arrows and other special keys."""
@@ -156,17 +156,11 @@ class KeyReader:
 
 def normalize_keys(typed: str) -> str:
     """Return typed keys in lower case, Page Up as "u", without other special keys."""
-    for page_up in PAGE_UP_CODES:
-        typed = typed.replace(page_up, "u")
-    return SPECIAL_KEY_CODES.sub("", typed).lower()
+    return SPECIAL_KEY_CODES.sub("", PAGE_UP_CODES.sub("u", typed)).lower()
 
 
-KEY_POLL_INTERVAL = 0.05
-"""Time between two looks at keys and state (s)."""
 MAX_SHOWN_HITS = 6
 """Largest number of newest hits that are listed."""
-BELL_PAUSE = 0.2
-"""Time between two bells (s)."""
 KEY_REPEAT_TIME = 0.7
 """Longest time between undo keys (s) that is one key held down, which counts once."""
 STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
@@ -199,13 +193,17 @@ class TerminalScreen:
     def __init__(self, session: RunningTest, console: Console | None = None) -> None:
         """Set the console, by default standard error."""
         self._session = session
-        self._console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
+        self._console = console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
         self._keys = KeyReader()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
-        self._live = Live(console=self._console, get_renderable=self._picture, refresh_per_second=10)
+        self._live = Live(
+            console=self._console,
+            get_renderable=lambda: render_state(session.state, self._muted),
+            refresh_per_second=10,
+        )
 
     def __enter__(self) -> Self:
         """Show it, and listen to keys."""
@@ -223,7 +221,7 @@ class TerminalScreen:
 
     def _watch(self) -> None:
         before = self._session.state
-        while not self._ended.wait(KEY_POLL_INTERVAL):
+        while not self._ended.wait(POLL_INTERVAL):
             for key in self._keys.read():
                 self.handle_key(key)
             state = self._session.state
@@ -274,10 +272,7 @@ class TerminalScreen:
             self._ahead_of_hit = not hit
         for _ in range(BELL_COUNTS.get(state.word, 0) if is_due and not self._muted else 0):
             self._console.bell()
-            self._ended.wait(BELL_PAUSE)
-
-    def _picture(self) -> RenderableType:
-        return render_state(self._session.state, self._muted)
+            self._ended.wait(0.2)  # s, to tell bells apart
 
 
 def render_state(state: TapState, muted: bool) -> RenderableType:
@@ -311,9 +306,8 @@ def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
     symbol, style = STATUS_STYLES[outcome.status]
-    early = "EARLY " if outcome.is_early else ""
-    next_step = f"  next: {with_option_names(outcome.next_step)}"
-    yield Text.assemble((f" {symbol} {early}{outcome.status.upper()} ", style), next_step)
+    label = f" {symbol} {'EARLY ' if outcome.is_early else ''}{outcome.status.upper()} "
+    yield Text.assemble((label, style), f"  next: {with_option_names(outcome.next_step)}")
 
 
 def _level_line(state: TapState) -> str:
@@ -323,6 +317,6 @@ def _level_line(state: TapState) -> str:
         force, response = (level and format_rounded(level, digits=2) for level in state.levels)
         texts.append(("" if force is None else f"force {force} N rms, ") + f"response {response} m/s^2 rms")
     if state.mean_change is not None:
-        text = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
-        texts.append(f"{text}; it has settled" if state.settled else text)
+        settled = "; it has settled" if state.settled else ""
+        texts.append(f"the last good hit moved the mean by {100 * state.mean_change:.2g} %{settled}")
     return "   ".join(texts) or " "

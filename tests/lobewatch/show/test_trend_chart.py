@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from lobewatch.monitoring.trend import TapValue, fit_trend
-from lobewatch.show.trend import CHART_LINE, CHART_POINT, CHART_WIDTH, chart_lines
+from lobewatch.show.trend import CHART_WIDTH, chart_lines
 
 START = datetime(2024, 1, 15, 9, tzinfo=UTC)
 
@@ -21,7 +21,7 @@ def test_the_line_runs_through_the_points_of_a_steady_fall_to_the_last() -> None
     rows = [
         line.partition("|")[2].ljust(CHART_WIDTH) for line in chart_lines(fit_trend(taps, taps[-1].time)) if "|" in line
     ]
-    drawn = np.array([[character in (CHART_LINE, CHART_POINT) for character in row] for row in rows])
+    drawn = np.array([[character in (".", "o") for character in row] for row in rows])
     assert np.all(np.any(drawn, axis=0))
     deepest = drawn.shape[0] - 1 - np.argmax(drawn[::-1], axis=0)
     expected = np.linspace(0, len(rows) - 1, CHART_WIDTH)

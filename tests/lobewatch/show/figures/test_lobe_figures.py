@@ -13,6 +13,7 @@ from lobewatch.show.figures.drawing import LabelPlacer, new_axes
 from lobewatch.show.figures.lobe_figures import plot_lobes
 from lobewatch.verdicts import Setting, Stability, Verdict
 from lobewatch.verdicts.monte_carlo import LimitBand
+from tests.lobewatch.show.figures.lobe_diagrams import diagram_of
 
 pytestmark = pytest.mark.quick
 
@@ -25,7 +26,8 @@ def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
         for i, word in enumerate(Stability)
     ]
     band, pocket = LimitBand(speed, 0.5 * depth, 2 * depth), Setting(1500.0, 0.85, (1400.0, 1650.0), 0.3, 0.02)
-    (axes,) = plot_lobes(speed, {"then": 0.9 * depth, "now": depth}, marks, "", band, [pocket]).axes
+    diagram = diagram_of(speed, {"then": 0.9 * depth, "now": depth}, verdicts=marks, band=band, pockets=[pocket])
+    (axes,) = plot_lobes(diagram).axes
     shade, filled = (np.asarray(one.get_paths()[0].vertices)[:, 1] for one in axes.collections)
     assert (filled.min(), filled.max()) == pytest.approx((1.0, 4.0))
     assert shade.min() == pytest.approx(4.0)

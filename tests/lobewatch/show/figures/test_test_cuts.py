@@ -17,6 +17,7 @@ from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
 from lobewatch.show.report.report import render_report
 from lobewatch.tool import compute_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand
+from tests.lobewatch.show.figures.lobe_diagrams import diagram_of
 
 SLOT = Cut(4, 1.0, "down", 1.4e9, 5e8)
 
@@ -49,7 +50,7 @@ def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> Non
         heard("flip", 1700.0, 2e-3),
     ]
     speed = np.linspace(1000.0, 2000.0, 5)
-    figure = plot_lobes(speed, {"now": np.full(5, 0.2e-3)}, heard=cuts)
+    figure = plot_lobes(diagram_of(speed, {"now": np.full(5, 0.2e-3)}, heard=cuts))
     (axes,) = figure.axes
     stable, chatter = axes.lines[-2:]
     assert np.asarray(stable.get_xydata()).tolist() == [[1200.0, 1.0]]
@@ -64,7 +65,7 @@ def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
     speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 1e-3)
     lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
     learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
-    (axes,) = plot_lobes(speed, {"now": 2 * depth}, learnt=learnt).axes
+    (axes,) = plot_lobes(diagram_of(speed, {"now": 2 * depth}, learned=learnt)).axes
     (line,) = [artist for artist in axes.lines if artist.get_label() == "at speed, learnt from 4 test cuts"]
     assert line.get_ydata() == pytest.approx(1.0)
     (band,) = [artist for artist in axes.collections if "left open" in str(artist.get_label())]

@@ -13,32 +13,40 @@ from matplotlib.dates import date2num
 
 from acquisition import Frf
 from lobewatch.machine import LimitsTable, ProgramTable
+from lobewatch.measurement import Estimate
 from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, new_axes, render_svg
 from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
-from lobewatch.show.figures.trend_figures import TrendMarks, plot_frf, plot_trend
+from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, plot_frf, plot_trend
 from lobewatch.verdicts import Setting, Stability, Verdict
+from tests.lobewatch.show.figures.lobe_diagrams import diagram_of
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
 
 
+def trend_of(*values: float) -> ValueTrend:
+    """Return a trend of frequencies with a standard error of 0.5 Hz."""
+    estimates = [(time, Estimate(value, 0.5)) for time, value in zip(TIMES, values, strict=False)]
+    return ValueTrend(SeriesValue("frequency", "f", "Hz", 1.0, ""), estimates)
+
+
 def test_limits_stand_below_the_first_value() -> None:
-    figure = plot_trend(TIMES, np.array([1700.0, 1690.0, 1650.0]), np.full(3, 0.5), "f", LimitsTable())
+    figure = plot_trend(trend_of(1700.0, 1690.0, 1650.0)._replace(limits=LimitsTable()))
     data = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
     levels = [points[0, 1] for points in data if points[0, 0] == 0]
     assert levels == pytest.approx([1700 * 0.95, 1700 * 0.90])
 
 
 def test_bars_are_the_95_percent_interval() -> None:
-    figure = plot_trend(TIMES[:1], np.array([1700.0]), np.array([2.0]), "f")
+    figure = plot_trend(trend_of(1700.0))
     (bars,) = figure.axes[0].collections
     assert isinstance(bars, LineCollection)
     ((low, high),) = [np.asarray(segment)[:, 1] for segment in bars.get_segments()]
-    assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
+    assert (low, high) == pytest.approx((1700 - 0.98, 1700 + 0.98))
 
 
 def test_events_are_lines_with_their_text_and_what_does_not_count_is_hollow() -> None:
-    marks = TrendMarks([(TIMES[1], "bearings greased with the new grease of the maker")], [(TIMES[2], 1600.0)])
-    figure = plot_trend(TIMES, np.full(3, 1700.0), np.full(3, 0.5), "f", None, marks)
+    events = [(TIMES[1], "bearings greased with the new grease of the maker")]
+    figure = plot_trend(trend_of(*3 * [1700.0])._replace(events=events, excluded=[(TIMES[2], 1600.0)]))
     *_, hollow, event = figure.axes[0].lines
     assert hollow.get_markerfacecolor() == "none"
     assert np.asarray(hollow.get_xydata()).tolist() == [[date2num(TIMES[2]), 1600.0]]
@@ -65,7 +73,9 @@ def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a
     crowd = [drawn(f"one of many programs {i}", 12000.0 + 300 * i, 1.5) for i in range(8)]
     programs = [*(drawn(name, *place) for name, place in zip(names, places, strict=True)), *crowd]
     pockets = [Setting(11440.0, 2.5, (11330.0, 11670.0), 0.5, 0.02)]
-    figure = plot_lobes(speed, {"now": np.full(50, 7e-4)}, programs, pockets=pockets, is_small=True)
+    figure = plot_lobes(
+        diagram_of(speed, {"now": np.full(50, 7e-4)}, verdicts=programs, pockets=pockets), is_small=True
+    )
     (axes,) = figure.axes
     shown = [text for text in axes.texts if text.get_text()]
     for text in shown:
@@ -82,7 +92,8 @@ def test_words_of_a_small_picture_do_not_cover_one_another_with_the_letters_of_a
 
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    figure = plot_lobes(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
+    depths = {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}
+    figure = plot_lobes(diagram_of(speed, depths, verdicts=[chattering("A")]))
     now, earlier, mark = figure.axes[0].lines
     assert earlier.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
@@ -107,7 +118,8 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
 @pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
 def test_no_name_is_read_as_a_formula(name: str) -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    picture = render_svg(plot_lobes(speed, {name: np.full(5, 1e-3)}, [chattering(name)], title=name))
+    diagram = diagram_of(speed, {name: np.full(5, 1e-3)}, verdicts=[chattering(name)])
+    picture = render_svg(plot_lobes(diagram, name))
     assert picture.count(f">{name}</text>") == 3
 
 

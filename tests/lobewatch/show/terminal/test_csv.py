@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import format_csv
 
 TEXTS = st.text(st.sampled_from("=+-@\t\r\n,\"'0e. a"), max_size=6) | st.text()
+TEXTS = TEXTS.filter(lambda text: with_option_names(text) == text)
 
 
 @given(st.lists(st.tuples(TEXTS, TEXTS, st.floats(allow_nan=False))))

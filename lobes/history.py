@@ -1,17 +1,15 @@
 """History of the stability-lobe diagrams (SLD) of one machine."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lobes.arrays import Floats
 from lobes.stability_lobes import check_speeds
+from modal.arrays import Floats
 
 Column = Floats | NDArray[np.str_]
 ColumnT = TypeVar("ColumnT", Floats, Column)
@@ -77,16 +75,14 @@ class SldHistory:
         if depth.ndim != 2 or depth.shape[1] != self.speed_rpm.size:
             raise ValueError(f"depth of {name!r} has shape {depth.shape}, not (n, {self.speed_rpm.size})")
         if np.any(depth <= 0):
-            raise ValueError(
-                f"depth of {name!r} has values that are not > 0 m; "
-                "give inf where there is no limit and nan where none was computed"
-            )
+            advice = "give inf where there is no limit and nan where none was computed"
+            raise ValueError(f"depth of {name!r} has values that are not > 0 m; {advice}")
 
     def __len__(self) -> int:
         """Return the number of measurements n."""
         return len(next(iter((*self.columns.values(), *self.depth.values())), ()))
 
-    def append(self, row_columns: Mapping[str, ArrayLike], row_depth: Mapping[str, ArrayLike]) -> SldHistory:
+    def append(self, row_columns: Mapping[str, ArrayLike], row_depth: Mapping[str, ArrayLike]) -> Self:
         """Return a history with one more measurement.
 
         Parameters
@@ -128,15 +124,13 @@ def _check_column(name: str, values: ArrayLike) -> Column:
     if not name.isidentifier():
         raise ValueError(f"column name {name!r} is not made of letters, digits and underscores; rename it")
     column = np.asarray(values)
-    if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if column.dtype.kind == "U" else (1, 2)):
-        raise ValueError(
-            f"column {name!r} is {column.dtype} of shape {column.shape}; give numbers (n,) or (n, k), or text (n,)"
-        )
-    if column.dtype.kind == "U":
-        for text in column:
-            _check_text(text)
-        return column
-    return column.astype(np.float64)
+    is_text = column.dtype.kind == "U"
+    if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if is_text else (1, 2)):
+        given = f"{column.dtype} of shape {column.shape}"
+        raise ValueError(f"column {name!r} is {given}; give numbers (n,) or (n, k), or text (n,)")
+    for text in column if is_text else ():
+        _check_text(text)
+    return column if is_text else column.astype(np.float64)
 
 
 def _check_text(text: str) -> None:

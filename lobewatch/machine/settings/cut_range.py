@@ -11,7 +11,7 @@ from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.drive_power import drive_depth_limit
 from lobewatch.machine.settings.machine_file import Machine
-from lobewatch.machine.settings.plausibility import DEPTH_RATIO_RANGE
+from lobewatch.machine.settings.setting_questions import DEPTH_RATIO_RANGE
 from lobewatch.machine.settings.tool_limits import ToolLimits, find_tool_limits
 
 SPEED_STEP_RPM, DEPTH_STEP_MM = 10.0, 0.05

@@ -8,6 +8,7 @@ import re
 import tomllib
 import typing
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -20,6 +21,19 @@ Positive = Annotated[float, Meta(gt=0, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
 PositiveOrInfinite = Annotated[float, Meta(gt=0)]
 """Positive number; infinite for "rigid" or "no limit"."""
+
+
+class Plausible(NamedTuple):
+    """Plausible range of a number in the unit of its key; 0 and infinity stand for "none" and are not asked about.
+
+    All ranges are chosen: what shops have, with room beside it, and where that can be had less than a factor of 1000
+    wide, so that a slip of 1000 leaves them. docs/plausible.md says which slips are not seen.
+    """
+
+    low: float
+    """Smallest plausible number."""
+    high: float
+    """Largest plausible number."""
 
 
 class TomlTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -93,6 +107,13 @@ def _list_choices(place: str, root: type[TomlTable]) -> list[str]:
 def _find_field_type(table: type[TomlTable], key: str) -> object:
     own = dict(zip(table.__struct_encode_fields__, table.__struct_fields__, strict=True))[key]
     return typing.get_type_hints(table, include_extras=True)[own]
+
+
+@cache
+def find_plausible_ranges(table: type[TomlTable]) -> dict[str, Plausible]:
+    """Return the plausible ranges of a table by key."""
+    hints = typing.get_type_hints(table, include_extras=True).items()
+    return {key: part for key, kind in hints for part in _iterate_types(kind) if isinstance(part, Plausible)}
 
 
 def _iterate_types(kind: object) -> Iterator[object]:

@@ -7,9 +7,8 @@ from operator import is_
 
 from acquisition import Remark
 from acquisition.errors import format_error
-from lobewatch.history.history import History, HistoryRow, keep_unusable_row, make_empty_history
-from lobewatch.history.row_codec import decode_row, encode_row
-from lobewatch.history.row_reuse import ReusableRows, is_row_of
+from lobewatch.history.history import History, HistoryRow, decode_row, encode_row, keep_unusable_row, make_empty_history
+from lobewatch.history.tap_measurements import ReusableRows, is_row_of
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.cut_entry import CutEntry

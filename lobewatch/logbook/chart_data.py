@@ -13,7 +13,7 @@ from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
 from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement.spindle_model import (
     MODEL_FRF_POINTS,
     ModelState,

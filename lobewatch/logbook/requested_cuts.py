@@ -12,7 +12,7 @@ from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 from lobewatch.machine.settings.requested_cut import (
     build_cut_without_setting,
     build_requested_program,

@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import DataError, Remark
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening

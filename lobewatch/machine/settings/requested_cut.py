@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from lobes import Cut
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
-from lobewatch.machine.settings.drive_power import PowerReading, build_power_reading
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, PowerReading, build_power_reading
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.tool_limits import PROGRAM_KEYS_BY_TOOL_FIELD, find_tool_properties
 

@@ -15,12 +15,13 @@ import msgspec
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file, read_regular_file
-from lobewatch.machine.journal import alarm_entries
 from lobewatch.machine.journal import entries as journal_entries
-from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, read_cuts
+from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
+from lobewatch.machine.journal.cut_entry import CUT_LINE_KIND, CutEntry, RecordingFile, parse_cut_line
 from lobewatch.machine.journal.journal import JOURNAL_NAME, JournalReading, format_command, journal_damage_remark
 from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+from modal import ModeEdits
 
 MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
 """Limits of the newest tap files whose SHA-256 is checked at every reading; lobewatch verify checks all."""
@@ -44,9 +45,9 @@ class FolderContents:
     """Number of lines of the journal."""
     cuts: tuple[CutEntry, ...] = ()
     """Test cuts, oldest first, excluded ones included."""
-    acknowledgements: tuple[alarm_entries.Acknowledgement, ...] = ()
+    acknowledgements: tuple[Acknowledgement, ...] = ()
     """Acknowledgements of alarms, oldest first."""
-    fleet_scatters: tuple[alarm_entries.FleetScatter, ...] = ()
+    fleet_scatters: tuple[FleetScatter, ...] = ()
     """Scatter of the other machines of the fleet, oldest first."""
 
     def with_tap(self, entry: TapEntry) -> FolderContents:
@@ -65,7 +66,6 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     """Read the contents that the journal and taps/ prove together."""
     committed = read_committed_taps(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
-    events = journal_entries.read_events(reading.other_entries)
     sizes, given_up, proved = _list_tap_sizes(folder), read_given_up_ids(reading), 0
     for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
         proved += entry.size
@@ -80,36 +80,40 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     if missing:
         remarks.append(missing_journal_remark(folder, len(extra)))
     if reading.damage or missing:
-        doubtful = [(path, read_unverified_tap(path)) for path in extra]
-        whole = [entry for path, entry in doubtful if entry is not None and entry.id == path.stem]
+        whole = [entry for path in extra if (entry := read_unverified_tap(path)) and entry.id == path.stem]
         taps = [*_sort_by_time([*taps, *whole])]
     else:
         cure = f"{format_command('verify', folder)} says what it is and what to do"
-        said = "not in the journal, does not count", cure
-        remarks += [unlisted_file_remark(path, *said) for path in extra[:MAX_LISTED_FILES]]
+        text = "not in the journal, does not count"
+        remarks += [unlisted_file_remark(path, text, cure) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
             text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
-    acknowledged = alarm_entries.read_acknowledgements(reading.other_entries)
-    others = read_committed_cuts(reading), acknowledged, alarm_entries.read_fleet_scatters(reading.other_entries)
-    usable, unusable = tuple(taps), _sort_by_time(lost)
-    return FolderContents(usable, unusable, tuple(remarks), events, len(reading.lines), *others)
+    lines = reading.other_entries
+    acknowledged = tuple(msgspec.convert(line, Acknowledgement) for line in lines if line["kind"] == "ack")
+    scatters = tuple(msgspec.convert(line, FleetScatter) for line in lines if line["kind"] == "scatter")
+    others = len(reading.lines), read_committed_cuts(reading), acknowledged, scatters
+    tests = tuple(taps), _sort_by_time(lost), tuple(remarks)
+    return FolderContents(*tests, journal_entries.read_events(lines), *others)
 
 
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
     """Read the test cuts of the journal, oldest first."""
-    return read_cuts(reading.other_entries, journal_entries.read_exclusion_reasons(reading.other_entries))
+    excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
+    lines = {line["id"]: line for line in reading.other_entries if line["kind"] == CUT_LINE_KIND}
+    cuts = [parse_cut_line(line, excluded.get(name, "")) for name, line in lines.items()]
+    return tuple(sorted(cuts, key=attrgetter("at")))
 
 
 def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
     """Read the tap tests of the journal by identity."""
-    accepted: dict[str, tuple[str, ...]] = {}
-    for line in reading.other_entries:
+    accepted, lines = dict[str, tuple[str, ...]](), reading.other_entries
+    for line in lines:
         if line["kind"] == "accept":
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
-    excluded = journal_entries.read_exclusion_reasons(reading.other_entries)
-    by_hand = journal_entries.read_mode_edits(reading.other_entries)
-    old = (TapEntry.from_line(line) for line in reading.other_entries if line["kind"] == "tap")
+    excluded = journal_entries.read_exclusion_reasons(lines)
+    by_hand = {line["tap"]: msgspec.convert(line, ModeEdits) for line in lines if line["kind"] == "modes"}
+    old = (TapEntry.from_line(line) for line in lines if line["kind"] == "tap")
     entries = {entry.id: entry for entry in (*decode_tap_entries(reading.tap_lines), *old)}
     for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
         later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)

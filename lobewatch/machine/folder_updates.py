@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
+from acquisition import check_name
 from acquisition.file_io import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
@@ -27,8 +28,6 @@ TOOTH_FREQUENCY_TOLERANCE = 0.005
 """Relative distance from a multiple of the tooth passing frequency within which a sound is not chatter; chosen."""
 SAME_SPEED_TOLERANCE, SAME_DEPTH_TOLERANCE = 2e-3, 1e-2
 """Relative differences of speeds and depths within which two cuts count as the same point; chosen."""
-LEADING_PROGRAM_KEYS = ("name", "tool")
-"""First keys of a written [[program]]; the others follow in the order of `ProgramTable`."""
 
 
 def add_event(
@@ -60,19 +59,27 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEve
 def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.ExcludableEntry:
     """Exclude a tap test from its series, or a test cut from learning.
 
-    name: identity, file, or a part of the identity that no other entry has.
+    name: identity, file, or a part of the identity that no other entry has. Raises ValueError if it is excluded, or
+    without a reason.
     """
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_exclusion_line(entry, reason))
+        if entry.excluded:
+            raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
+        if not reason.strip():
+            raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
+        check_name(reason, "reason")
+        folder.journal.append(make_entry("exclude", tap=entry.id, reason=reason))
     return entry
 
 
 def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
-    """Include an excluded tap test or test cut again."""
+    """Include an excluded tap test or test cut again; ValueError if it is not excluded."""
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_inclusion_line(entry))
+        if not entry.excluded:
+            raise ValueError(f"{entry.id}: is not excluded; it counts already")
+        folder.journal.append(make_entry("include", tap=entry.id))
     return entry
 
 
@@ -119,18 +126,14 @@ def _next_cut_id(folder: MachineFolder, reading: JournalReading) -> str:
 
 
 def make_observed_cut(
-    setting: CutSetting,
-    word: Literal["stable", "chatter"],
-    frequency: float | None = None,
-    at: datetime | None = None,
-    now: datetime | None = None,
+    setting: CutSetting, word: Literal["stable", "chatter"], frequency: float | None = None, at: datetime | None = None
 ) -> CutEntry:
     """Make the entry of a test cut that a person has observed; `store_cut` gives it its identity.
 
     frequency: of the chatter (Hz). at: time of the cut, None for now. Raises ValueError for a frequency that cannot be
     chatter, and for a date in the future.
     """
-    when = resolve_cutting_time(at, now or datetime.now(UTC))
+    when = resolve_cutting_time(at, datetime.now(UTC))
     _check_chatter_frequency(setting, word, frequency)
     fields = setting.cut_entry_fields(setting.speed_rpm)
     fields |= {"word": word, "chatter_frequency_hz": frequency, "by": "ear", "software": lobewatch_version()}
@@ -183,22 +186,18 @@ def check_program_name(machine: Machine, name: str) -> None:
 def save_program(folder: MachineFolder, program: ProgramTable) -> None:
     """Add a program to machine.toml, which keeps its comments and order.
 
-    Raises ValueError for a used name, DataError if the file cannot be edited.
+    Name and tool come first, then all values that differ from the defaults. Raises ValueError for a used name,
+    DataError if the file cannot be edited.
     """
     with folder.locked():
         current = MachineFolder(folder.path)
         check_program_name(current.machine, program.name)
         place = TablePath("program", len(current.machine.all_programs))
-        text = edit_toml(current.toml_text, place, _changed_values(program))
+        fields = msgspec.structs.fields(program)
+        values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
+        text = edit_toml(current.toml_text, place, {"name": program.name, "tool": program.tool} | values)
         parse_machine_file(text, str(current.toml))
         write_machine_file(current.path, text)
-
-
-def _changed_values(program: ProgramTable) -> dict[str, Any]:
-    """Return name and tool, then all values that differ from the defaults."""
-    fields = msgspec.structs.fields(program)
-    values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
-    return {key: getattr(program, key) for key in LEADING_PROGRAM_KEYS} | values
 
 
 def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:

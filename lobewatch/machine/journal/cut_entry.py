@@ -1,6 +1,6 @@
 """Journal lines for test cuts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal, get_args
@@ -109,10 +109,3 @@ def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
     for name, kind in (("recording", RecordingFile), ("power", CutPower)):
         fields[name] = kind(**line[name]) if line.get(name) else None
     return CutEntry(**fields | {"excluded": excluded})
-
-
-def read_cuts(entries: Sequence[Mapping[str, Any]], excluded: Mapping[str, str]) -> tuple[CutEntry, ...]:
-    """Read the test cuts of a journal, oldest first; excluded: reasons by identity."""
-    lines = {line["id"]: line for line in entries if line["kind"] == CUT_LINE_KIND}
-    cuts = [parse_cut_line(line, excluded.get(name, "")) for name, line in lines.items()]
-    return tuple(sorted(cuts, key=lambda cut: cut.at))

@@ -1,17 +1,13 @@
-"""Journal lines for events, exclusions and mode edits."""
+"""Journal lines for events and exclusions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-import msgspec
-
 from acquisition import check_name
 from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.journal import make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
-from modal import ModeEdits
 
 
 @dataclass(frozen=True)
@@ -109,23 +105,6 @@ def find_excludable_entry(
     raise ValueError(f"{name!r}: no such tap test in {folder}; MachineFolder.contents {folder} lists all {len(taps)}")
 
 
-def make_exclusion_line(entry: ExcludableEntry, reason: str) -> dict[str, Any]:
-    """Make the line that excludes an entry; ValueError if it is excluded or has no reason."""
-    if entry.excluded:
-        raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
-    if not reason.strip():
-        raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
-    check_name(reason, "reason")
-    return make_entry("exclude", tap=entry.id, reason=reason)
-
-
-def make_inclusion_line(entry: ExcludableEntry) -> dict[str, Any]:
-    """Make the line that includes an entry again; ValueError if it is not excluded."""
-    if not entry.excluded:
-        raise ValueError(f"{entry.id}: is not excluded; it counts already")
-    return make_entry("include", tap=entry.id)
-
-
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """Read the reasons of all exclusions, by identity."""
     reasons: dict[str, str] = {}
@@ -135,8 +114,3 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
         elif line["kind"] == "include":
             reasons.pop(line["tap"], None)
     return reasons
-
-
-def read_mode_edits(entries: Sequence[Mapping[str, Any]]) -> dict[str, ModeEdits]:
-    """Read the mode edits by identity of the tap test; the newest line counts."""
-    return {line["tap"]: msgspec.convert(line, ModeEdits) for line in entries if line["kind"] == "modes"}

@@ -1,24 +1,27 @@
-"""History of a machine: one row per tap test, its stored form, and rows of older versions."""
+"""History of a machine: one row per tap test, its stored form, rows of older versions, and columns for export."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, get_type_hints
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Remark
+from lobes import SldHistory, StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
-from lobewatch.measurement.software import CURRENT_SOFTWARE
+from lobewatch.measurement.share_work import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement
-from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.assembly import Assembly, compute_tip_lobes, speed_grid
 from lobewatch.tool.tap_series import TapPlace
 from lobewatch.verdicts.verdict import StoredVerdict
 from modal import Mode
@@ -235,43 +238,22 @@ def find_older_version_remarks(history: History | None) -> list[Remark]:
     return [remark for row in rows for remark in row.remarks if remark.code == OLDER_VERSION_CODE]
 
 
-class RowRecord(msgspec.Struct, array_like=True, gc=False):
-    """Stored form of a row: times as text with their zone, and each verdict with the hash of its program."""
-
-    number: int
-    tap_id: str
-    time: str
-    tool: str
-    direction: str
-    baseline: str
-    series: str
-    conditions: dict[str, Any]
-    frequency: Estimate
-    damping_ratio: Estimate
-    stiffness: Estimate
-    phase_deg: Estimate
-    bearing_stiffness: Estimate
-    static_tip_stiffness: float
-    modal_tip_stiffness: float
-    modes: tuple[ModeValues, ...]
-    x: tuple[ModeValues, ...]
-    y: tuple[ModeValues, ...]
-    remarks: tuple[Remark, ...]
-    verdicts: dict[str, tuple[str, StoredVerdict]]
-    software: str = ""
-    operator: str = ""
-
-
-CONVERTED_FIELDS = ("number", "time", "baseline", "conditions", "verdicts")
-"""Fields with another form than in a row."""
-SHARED_FIELDS = tuple(name for name in RowRecord.__struct_fields__ if name not in CONVERTED_FIELDS)
-"""Fields with the same form as in a row."""
+RECORD_FIELDS = ["tap_id", "time", "tool", "direction", "baseline", "series", "conditions", *ESTIMATE_UNITS]
+RECORD_FIELDS += [*MODEL_VALUE_UNITS, "modes", "x", "y", "remarks", "verdicts"]
+"""Stored fields of a row in their order; software and operator follow, which the first rows lack."""
+RECORD_TYPES = get_type_hints(HistoryRow) | {"time": str, "baseline": str, "conditions": dict[str, Any]}
+RECORD_TYPES |= {"verdicts": dict[str, tuple[str, StoredVerdict]]}
+"""Types of these fields: times as text with their zone, and each verdict with the hash of its program."""
+_stored: list[Any] = [("number", int), *((name, RECORD_TYPES[name]) for name in RECORD_FIELDS)]
+_stored += [(name, str, "") for name in ("software", "operator")]
+RowRecord = msgspec.defstruct("RowRecord", _stored, array_like=True, gc=False)
+"""Stored form of a row."""
 _encode_record, _decode_record = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(RowRecord).decode
 
 
 def encode_row(number: int, row: HistoryRow, hashes: Mapping[str, str]) -> bytes:
     """Encode a row with its number, -1 for one outside of the history; hashes: of the programs by name."""
-    values: dict[str, Any] = {name: getattr(row, name) for name in SHARED_FIELDS}
+    values: dict[str, Any] = {name: getattr(row, name) for name in RowRecord.__struct_fields__[1:]}
     values |= {"number": number, "time": row.time.isoformat(), "conditions": row.conditions.specified}
     values["baseline"] = row.baseline.isoformat() if row.baseline else ""
     values["verdicts"] = {name: (hashes[name], verdict) for name, verdict in (row.verdicts or {}).items()}
@@ -283,12 +265,95 @@ def decode_row(content: bytes, hashes: Mapping[str, str], software: str = "") ->
 
     software: version of a row that does not state it; empty for this version.
     """
-    record = _decode_record(content)
-    values = {name: getattr(record, name) for name in SHARED_FIELDS}
-    values |= {"time": datetime.fromisoformat(record.time), "software": record.software or software}
-    values["baseline"] = datetime.fromisoformat(record.baseline) if record.baseline else None
-    values["conditions"] = Conditions.from_mapping(record.conditions) if record.conditions else UNKNOWN_CONDITIONS
-    stored = record.verdicts.items()
+    values = msgspec.structs.asdict(_decode_record(content))
+    stored, values["time"] = values["verdicts"].items(), datetime.fromisoformat(values["time"])
+    values["software"] = values["software"] or software
+    values["baseline"] = datetime.fromisoformat(values["baseline"]) if values["baseline"] else None
+    conditions = values["conditions"]
+    values["conditions"] = Conditions.from_mapping(conditions) if conditions else UNKNOWN_CONDITIONS
     verdicts = {name: verdict for name, (made_with, verdict) in stored if hashes.get(name) == made_with}
     values["verdicts"] = verdicts if verdicts or not hashes else None
-    return record.number, HistoryRow(**values)
+    return values.pop("number"), HistoryRow(**values)
+
+
+TEXT_COLUMNS = ("tap_id", "tool", "direction", "series", "operator")
+MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
+CONDITION_UNITS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN", "hours": "h"}
+"""Numeric conditions with their units; NaN if unknown."""
+CONDITION_TEXT_COLUMNS = ("state", "note")
+
+
+def make_export_columns(history: History, machine: Machine, render: Callable[[str], str] = str) -> SldHistory:
+    """Make the columns for `lobes.write_history`; render: translates the names in remarks."""
+    rows, programs = history.rows, [program.name for program in machine.program]
+    columns: dict[str, Any] = {name: _text_column(getattr(row, name) for row in rows) for name in TEXT_COLUMNS}
+    columns["time"] = _text_column(row.time.isoformat() for row in rows)
+    columns["baseline"] = _text_column(row.baseline.isoformat() if row.baseline else "" for row in rows)
+    columns["notes"] = _text_column(render("\n".join(map(str, row.remarks))) for row in rows)
+    remarks = (msgspec.json.encode([asdict(remark) for remark in row.remarks]).decode() for row in rows)
+    columns["remarks"] = _text_column(map(render, remarks))
+    columns |= _condition_columns([row.conditions for row in rows])
+    for name in ESTIMATE_UNITS:
+        columns[name], columns[f"{name}_std"] = _number_column([getattr(row, name) for row in rows], 2).T
+    for name in MODEL_VALUE_UNITS:
+        columns[name] = _number_column([getattr(row, name) for row in rows])
+    table = np.full((len(rows), MAX_STORED_MODES, len(MODE_COLUMNS)), np.nan)
+    for i, row in enumerate(rows):
+        table[i, : len(row.modes)] = np.reshape(row.modes, (-1, len(MODE_COLUMNS)))
+    columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
+    if programs:
+        limits = [_program_limits(row.verdicts, programs) for row in rows]
+        columns["program_limit"] = _number_column(limits, len(programs))
+        columns["program_verdict"] = _text_column(_program_verdicts(row.verdicts, programs) for row in rows)
+    speeds = speed_grid(machine)
+    depth = _lobe_depths(rows, machine, speeds)
+    units = ESTIMATE_UNITS | {f"{name}_std": unit for name, unit in ESTIMATE_UNITS.items()} | MODEL_VALUE_UNITS
+    units |= MODE_COLUMNS | CONDITION_UNITS
+    units = {name: unit for name, unit in (units | {"program_limit": "m"}).items() if unit and name in columns}
+    return SldHistory(history.settings_hash, history.software, speeds, columns, depth, units)
+
+
+def compute_row_lobes(
+    row: HistoryRow, machine: Machine, names: Collection[str] | None = None
+) -> dict[str, StabilityLobes]:
+    """Compute the lobes of a row as of its time; names: selected cuts."""
+    return compute_tip_lobes(row.tool, _to_modes(row.x), _to_modes(row.y), machine, names)
+
+
+def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
+    return [Mode(frequency, damping, stiffness, phase_deg=phase) for frequency, damping, stiffness, phase in values]
+
+
+def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -> dict[str, Floats]:
+    """Return the limits of each row over speeds (m) by name of the cut; NaN without lobes."""
+    nowhere = np.full(speeds.size, np.nan)
+    diagrams = [compute_row_lobes(row, machine) for row in rows]
+    return {
+        name: _number_column([lobes[name].depth if name in lobes else nowhere for lobes in diagrams], speeds.size)
+        for name in machine.cut_tables
+    }
+
+
+def _condition_columns(conditions: Sequence[Conditions]) -> dict[str, NDArray[Any]]:
+    stated = [under.specified for under in conditions]
+    numbers = {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
+    texts = {name: _text_column(under.get(name, "") for under in stated) for name in CONDITION_TEXT_COLUMNS}
+    return {**numbers, **texts, "reclamped": _number_column([under.reclamped for under in conditions])}
+
+
+def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:
+    """Return the limit of each program (m); NaN without a stored verdict."""
+    return [rulings[name].limit if rulings and name in rulings else np.nan for name in programs]
+
+
+def _program_verdicts(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> str:
+    """Return the verdict on each program, one per line; empty without stored verdicts."""
+    return "\n".join(rulings[name].stability if name in rulings else "" for name in programs) if rulings else ""
+
+
+def _text_column(values: Any) -> NDArray[np.str_]:
+    return np.array(list(values), dtype=np.str_)
+
+
+def _number_column(values: Sequence[Any], *width: int) -> Floats:
+    return np.array(values, dtype=np.float64).reshape(len(values), *width)

@@ -11,7 +11,7 @@ from lobewatch.history.history import History, HistoryRow, decode_row, encode_ro
 from lobewatch.history.tap_measurements import ReusableRows, is_row_of
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.tool.tap_series import TapPlace

@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 from acquisition import DataError, Remark
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
-from lobewatch.machine.folder_contents import FolderContents
+from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.tool.tap_series import TapOrder, TapPlace

@@ -10,7 +10,7 @@ from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import NotTappedError, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly

@@ -15,7 +15,7 @@ from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
-from lobewatch.machine.journal.cut_entry import CUT_LINE_KIND, CutEntry, RecordingFile
+from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import JournalReading, make_entry
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file

@@ -1,13 +1,121 @@
-"""Journal lines for events and exclusions."""
+"""Journal lines for test cuts, events and exclusions, and the tests and cuts that all lines give."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
-from typing import Any
+from operator import attrgetter
+from typing import Any, Literal, get_args
+
+import msgspec
 
 from acquisition import check_name
-from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.tap_entry import TapEntry
+from lobes import Cut
+from lobewatch.machine.journal.journal import JournalReading
+from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
+from lobewatch.machine.settings.drive_power import CutPower
+from modal import ModeEdits
+
+CutVerdict = Literal["stable", "chatter", "flip", "cannot tell"]
+"""Result of a test cut; flip: chatter with the period of two teeth."""
+CUT_LINE_KIND = "cut"
+"""Kind of its journal line."""
+
+
+@dataclass(frozen=True)
+class RecordingFile:
+    """File of a recorded cut, as committed to the journal."""
+
+    id: str
+    """Identity of the cut."""
+    sha256: str
+    """SHA-256 of the file."""
+    size: int
+    """Size of the file (bytes)."""
+
+    @property
+    def file(self) -> str:
+        """Path of the file in the machine folder."""
+        return f"cuts/{self.id}.h5"
+
+
+@dataclass(frozen=True)
+class CutEntry:
+    """Test cut with its result; the settings are those at the time of the cut."""
+
+    id: str
+    """Identity in the journal, "c1" on."""
+    at: datetime
+    """Time of the cut (UTC)."""
+    program: str | None
+    """Name of the program; None for the reference cut."""
+    tool: str
+    """Tool in the spindle."""
+    cut: Cut
+    """Teeth, pitch, immersion, direction and cutting coefficients."""
+    coefficients: str
+    """Material of the coefficients; empty if machine.toml gave the numbers."""
+    feed: str
+    """Axis of the feed, "x" or "y"; "both" if unknown."""
+    feed_per_tooth: float | None
+    """Feed per tooth (m); None if unknown."""
+    commanded_rpm: float
+    """Commanded spindle speed (rpm)."""
+    speed_rpm: float
+    """Detected spindle speed (rpm); the commanded one without a recording."""
+    depth: float
+    """Axial depth of cut ap (m)."""
+    word: CutVerdict
+    """Result of the cut."""
+    chatter_frequency_hz: float | None
+    """Chatter frequency (Hz); None without chatter or if unknown."""
+    by: Literal["ear", "accelerometer", "microphone"]
+    """Ear or instrument that detected the result."""
+    software: str
+    """Version of lobewatch that wrote the line."""
+    chatter_frequency_std_hz: float | None = None
+    """Standard error of the chatter frequency (Hz); None if unknown."""
+    reason: str = ""
+    """Code of the reason of "cannot tell"; empty otherwise."""
+    recording: RecordingFile | None = None
+    """Recording of the cut; None without one."""
+    power: CutPower | None = None
+    """Power of the cut; None if nobody has read it."""
+    excluded: str = ""
+    """Reason of its exclusion, from other lines; empty if included."""
+
+    def __post_init__(self) -> None:
+        if self.word not in get_args(CutVerdict):
+            raise ValueError(f"word={self.word!r} is none of {', '.join(get_args(CutVerdict))}")
+
+    @property
+    def is_usable(self) -> bool:
+        """True if the cut counts for learning."""
+        return not self.excluded and self.word != "cannot tell"
+
+    @property
+    def has_chatter(self) -> bool:
+        """True if chatter of any kind was detected."""
+        return self.word in ("chatter", "flip")
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Journal line."""
+        fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
+
+
+def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
+    """Return the properties that cuts with the same cutter and immersion share."""
+    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch
+
+
+def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
+    """Read a test cut from its journal line."""
+    fields = {name: line[name] for name in CutEntry.__dataclass_fields__ if name in line}
+    fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
+    for name, kind in (("recording", RecordingFile), ("power", CutPower)):
+        fields[name] = kind(**line[name]) if line.get(name) else None
+    return CutEntry(**fields | {"excluded": excluded})
 
 
 @dataclass(frozen=True)
@@ -114,3 +222,33 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
         elif line["kind"] == "include":
             reasons.pop(line["tap"], None)
     return reasons
+
+
+def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
+    """Read the test cuts of the journal, oldest first."""
+    excluded = read_exclusion_reasons(reading.other_entries)
+    lines = {line["id"]: line for line in reading.other_entries if line["kind"] == CUT_LINE_KIND}
+    cuts = [parse_cut_line(line, excluded.get(name, "")) for name, line in lines.items()]
+    return tuple(sorted(cuts, key=attrgetter("at")))
+
+
+def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
+    """Read the tap tests of the journal by identity."""
+    accepted, lines = dict[str, tuple[str, ...]](), reading.other_entries
+    for line in lines:
+        if line["kind"] == "accept":
+            accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
+    excluded = read_exclusion_reasons(lines)
+    by_hand = {line["tap"]: msgspec.convert(line, ModeEdits) for line in lines if line["kind"] == "modes"}
+    old = (TapEntry.from_line(line) for line in lines if line["kind"] == "tap")
+    entries = {entry.id: entry for entry in (*decode_tap_entries(reading.lines), *old)}
+    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
+        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+        changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
+        entries[name] = msgspec.structs.replace(entries[name], **changes)
+    return entries
+
+
+def read_given_up_ids(reading: JournalReading) -> set[str]:
+    """Return the identities of lost tap tests and recordings."""
+    return {line["tap"] for line in reading.other_entries if line["kind"] == "lost"}

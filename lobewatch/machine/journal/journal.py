@@ -140,13 +140,8 @@ class JournalReading:
         return _decode_lines(self.lines)
 
     @cached_property
-    def tap_lines(self) -> list[bytes]:
-        """Lines for `decode_tap_entries`."""
-        return [line for line in self.lines if line.startswith(TAP_LINE_PREFIX)]
-
-    @cached_property
     def other_entries(self) -> list[JournalEntry]:
-        """All other lines as JSON objects."""
+        """Lines of other kinds as JSON objects, with tap tests of older versions."""
         return _decode_lines(line for line in self.lines if not line.startswith(TAP_LINE_PREFIX))
 
 

@@ -13,10 +13,10 @@ from lobes import StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
-from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import Analysis
 from lobewatch.machine import Machine
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.show.figures.lobe_figures import pick_evenly, plot_lobes, select_test_cuts

@@ -76,7 +76,7 @@ def find_cut_setting(
     speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
     if speed is None or depth is None:
-        missing = _missing_setting_field(speed)
+        missing = f"ProgramTable.{'speed_rpm' if speed is None else 'depth_mm'}"
         raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
@@ -97,13 +97,9 @@ def choose_cut(
         both = f"{'both' if cut else 'neither'} of choose_cut.program and choose_cut.cut"
         raise ValueError(f"{both}: say which cut it is; there are {names}")
     if cut and (speed is None or depth is None):
-        cure = "give speed and depth, or choose_cut.program with those of its own"
-        raise ValueError(f"choose_cut.cut {cut}: {_missing_setting_field(speed)} is missing; {cure}")
+        key, cure = "speed_rpm" if speed is None else "depth_mm", "choose_cut.program with those of its own"
+        raise ValueError(f"choose_cut.cut {cut}: ProgramTable.{key} is missing; give speed and depth, or {cure}")
     return find_cut_setting(machine, program or cut, speed, depth, power_kw)
-
-
-def _missing_setting_field(speed: float | None) -> str:
-    return "ProgramTable.speed_rpm" if speed is None else "ProgramTable.depth_mm"
 
 
 def _is_positive(value: float) -> bool:

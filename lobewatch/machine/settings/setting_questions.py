@@ -87,8 +87,8 @@ class ImplausibleSetting(NamedTuple):
 
 def find_program_questions(machine: Machine, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
     """Return the open questions for the verdict on a program; on_model: whether the verdict uses [spindle]."""
-    model = _check_model(machine, program) if on_model else ()
-    return _remove_accepted(machine, [*_check_program(machine, program), *model])
+    questions = [*_check_program(machine, program), *(_check_model(machine, program) if on_model else ())]
+    return _remove_accepted(machine, questions)
 
 
 def find_all_questions(machine: Machine) -> list[ImplausibleSetting]:
@@ -156,9 +156,9 @@ def _check_program(machine: Machine, program: ProgramTable) -> Iterator[Implausi
     yield from _check_cut_and_material(machine, program, place)
     if program in machine.program:  # a requested cut takes its geometry from these programs
         yield from _check_same_tool(machine, program, place)
-    for tool in machine.tool:
-        if tool.name == program.tool:
-            yield from _check_program_tool(program, tool, place)
+    tool = machine.find_tool(program)
+    if tool is not None:
+        yield from _check_program_tool(program, tool, place)
     if program.tool == machine.tap.tool and machine.tap.stick_out_mm is not None:
         limits, diameter = STICK_OUT_RATIO_RANGE, program.tool_diameter_mm
         unit = f"{limits.unit} of {diameter:g} mm"
@@ -227,33 +227,28 @@ def _check_program_tool(program: ProgramTable, tool: ToolTable, place: str) -> I
 def _check_model(machine: Machine, program: ProgramTable) -> Iterator[ImplausibleSetting]:
     if machine.spindle is not None:
         yield from _check_spindle(machine.spindle)
-    for tool in machine.tool:
-        if tool.name == program.tool:
-            yield from _check_tool_shape(tool)
+    tool = machine.find_tool(program)
+    if tool is not None:
+        yield from _check_tool_shape(tool)
 
 
 def _check_spindle(spindle: SpindleTable) -> Iterator[ImplausibleSetting]:
     yield from _check_ranges(spindle, "[spindle]")
-    yield from _check_parts("[spindle] segment", spindle.segments)
-    yield from _check_parts("[spindle] bearing", spindle.bearings)
-    yield from _check_parts("[spindle] joint", spindle.joints)
-    yield from _check_parts("[spindle] mass", spindle.masses)
+    parts = {"segment": spindle.segments, "bearing": spindle.bearings, "joint": spindle.joints, "mass": spindle.masses}
+    for name, listed in parts.items():
+        yield from _check_parts(f"[spindle] {name}", listed)
 
 
 def _check_parts(place: str, parts: Sequence[TomlTable]) -> Iterator[ImplausibleSetting]:
     for i, part in enumerate(parts, 1):
         yield from _check_ranges(part, f"{place} {i}")
-        if isinstance(part, MassTable):
-            yield from _check_gyration_radius(part, f"{place} {i}")
-
-
-def _check_gyration_radius(mass: MassTable, place: str) -> Iterator[ImplausibleSetting]:
-    for key in ("diametral_inertia_kg_mm2", "polar_inertia_kg_mm2"):
-        if (inertia := getattr(mass, key)) and mass.mass_kg:
-            radius, limits = math.sqrt(inertia / mass.mass_kg), GYRATION_RADIUS_RANGE
-            if not limits.holds(radius):
-                why = f"with {mass.mass_kg:g} kg lies at {radius:.3g} {limits.unit}"
-                yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, key, f"{inertia:g}", why)
+        mass = part.mass_kg if isinstance(part, MassTable) else 0.0
+        for key in ("diametral_inertia_kg_mm2", "polar_inertia_kg_mm2") if mass else ():
+            inertia = getattr(part, key)
+            radius = math.sqrt(inertia / mass)
+            if inertia and not GYRATION_RADIUS_RANGE.holds(radius):
+                why = f"with {mass:g} kg lies at {radius:.3g} {GYRATION_RADIUS_RANGE.unit}"
+                yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, f"{place} {i}", key, f"{inertia:g}", why)
 
 
 def _check_tool_shape(tool: ToolTable) -> Iterator[ImplausibleSetting]:

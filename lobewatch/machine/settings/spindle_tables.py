@@ -1,6 +1,5 @@
 """Tables of machine.toml on the spindle model and the tools."""
 
-import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,7 +10,14 @@ from msgspec import Meta
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
-from lobewatch.machine.settings.toml import NotNegative, Plausible, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import (
+    NotNegative,
+    Plausible,
+    Positive,
+    PositiveOrInfinite,
+    TomlTable,
+    suggest_spelling,
+)
 
 SHAFT_LENGTHS, SHAFT_POSITIONS = Plausible(0.6, 599), Plausible(1, 999)
 """Plausible lengths and diameters of a segment, and positions on the shaft (mm)."""
@@ -30,15 +36,11 @@ class SegmentTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         _check_wall(self.bore_mm, self.outer_mm, "bore_mm", "outer_mm")
-        if self.end_outer_mm is not None or self.end_bore_mm is not None:
-            outer = self.outer_mm if self.end_outer_mm is None else self.end_outer_mm
-            bore = self.bore_mm if self.end_bore_mm is None else self.end_bore_mm
-            _check_wall(bore, outer, "end_bore_mm", "end_outer_mm")
-        if self.mass_outer_mm is not None:
-            _check_wall(self.bore_mm, self.mass_outer_mm, "bore_mm", "mass_outer_mm")
+        bore = self.bore_mm if self.end_bore_mm is None else self.end_bore_mm
+        _check_wall(bore, self.end_outer_mm or self.outer_mm, "end_bore_mm", "end_outer_mm")
+        _check_wall(self.bore_mm, self.mass_outer_mm or math.inf, "bore_mm", "mass_outer_mm")
         if self.material and self.material not in MATERIALS:
-            near = difflib.get_close_matches(self.material, MATERIALS, n=1)
-            hint = f"; is {near[0]!r} meant?" if near else ""
+            hint = suggest_spelling(self.material, MATERIALS)
             raise ValueError(f"material={self.material!r} is none of {', '.join(MATERIALS)}{hint}")
 
     def build(self) -> Segment:

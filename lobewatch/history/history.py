@@ -144,12 +144,6 @@ class History:
         return [row for row in since if row.series == newest[row.tool]]
 
     @property
-    def newest_calibrated(self) -> HistoryRow | None:
-        """Newest row with a calibrated bearing stiffness and without open questions."""
-        rows = reversed(self.current)
-        return next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
-
-    @property
     def questions(self) -> dict[str, tuple[str, ...]]:
         """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
@@ -292,7 +286,10 @@ def make_export_columns(history: History, machine: Machine, render: Callable[[st
     columns["notes"] = _text_column(render("\n".join(map(str, row.remarks))) for row in rows)
     remarks = (msgspec.json.encode([asdict(remark) for remark in row.remarks]).decode() for row in rows)
     columns["remarks"] = _text_column(map(render, remarks))
-    columns |= _condition_columns([row.conditions for row in rows])
+    stated = [row.conditions.specified for row in rows]
+    columns |= {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
+    columns |= {name: _text_column(under.get(name, "") for under in stated) for name in CONDITION_TEXT_COLUMNS}
+    columns["reclamped"] = _number_column([row.conditions.reclamped for row in rows])
     for name in ESTIMATE_UNITS:
         columns[name], columns[f"{name}_std"] = _number_column([getattr(row, name) for row in rows], 2).T
     for name in MODEL_VALUE_UNITS:
@@ -332,13 +329,6 @@ def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -
         name: _number_column([lobes[name].depth if name in lobes else nowhere for lobes in diagrams], speeds.size)
         for name in machine.cut_tables
     }
-
-
-def _condition_columns(conditions: Sequence[Conditions]) -> dict[str, NDArray[Any]]:
-    stated = [under.specified for under in conditions]
-    numbers = {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
-    texts = {name: _text_column(under.get(name, "") for under in stated) for name in CONDITION_TEXT_COLUMNS}
-    return {**numbers, **texts, "reclamped": _number_column([under.reclamped for under in conditions])}
 
 
 def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:

@@ -136,11 +136,11 @@ class HistoryCache:
 
 def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
     """Return the hash of all that decides the verdict on each program, test cuts of its tool included."""
-    taught = {
-        program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
-        for program in machine.program
-    }
-    return {name: text + taught[name] for name, text in hash_programs(machine).items()}
+    hashes = hash_programs(machine)
+    for program in machine.program:
+        taught = (f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
+        hashes[program.name] += "".join(taught)
+    return hashes
 
 
 def _cache_header(history: History) -> bytes:

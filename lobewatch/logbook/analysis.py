@@ -109,7 +109,8 @@ class Analysis:
     @property
     def calibrated_measurement(self) -> Measurement | None:
         """Newest measurement with calibrated bearings, or None."""
-        newest = self.history.newest_calibrated
+        rows = (row for row in reversed(self.history.current) if not row.questions and row.bearing_stiffness.is_known)
+        newest = next(rows, None)
         return None if newest is None else self.measurement(newest.tap_id)
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:

@@ -98,16 +98,12 @@ class FolderLock:
         deadline = time.monotonic() + patience
         while not lock_descriptor(handle, blocking=False):
             if time.monotonic() >= deadline:
-                holder = self._read_holder() or "another lobewatch"
+                holder: object = "another lobewatch"
+                with contextlib.suppress(OSError, msgspec.MsgspecError):  # it has not written its name yet
+                    content = read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE)
+                    holder = msgspec.json.decode(content, type=LockHolder)
                 raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
             time.sleep(LOCK_POLL_INTERVAL)
-
-    def _read_holder(self) -> LockHolder | None:
-        """Return the program that holds the lock; None until it has written its name."""
-        try:
-            return msgspec.json.decode(read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE), type=LockHolder)
-        except (OSError, msgspec.MsgspecError):
-            return None
 
 
 RESERVE_BYTES = 50_000_000

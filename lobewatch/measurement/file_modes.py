@@ -8,17 +8,7 @@ import numpy as np
 
 import acquisition
 import modal
-from acquisition import (
-    DataError,
-    Description,
-    Fact,
-    Frf,
-    Hit,
-    HitFlags,
-    Remark,
-    correct_windowed_receptance,
-    remove_sensor_mass,
-)
+from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -28,9 +18,8 @@ from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
 
-ACCEPTABLE_FLAGS = (
-    HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
-)
+ACCEPTABLE_FLAGS = HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD
+ACCEPTABLE_FLAGS |= HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 """Faults of hits that can be accepted; hits with others have no single pulse, or lost scans."""
 
 
@@ -243,7 +232,7 @@ def fit_file_modes(
     delay, tau = 0.0, file_frf.time_constant
     if window is not None:
         delay, tau = window.delay(file_frf.hits), window.time_constant
-        frf = correct_windowed_receptance(frf, tau)
+        frf = acquisition.correct_windowed_receptance(frf, tau)
     edits = by_hand if tau is None else by_hand.with_window(tau)
 
     def fit(bare: Frf) -> FrfFit:
@@ -252,7 +241,7 @@ def fit_file_modes(
 
     extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
-    frf = remove_sensor_mass(frf, mass)
+    frf = acquisition.remove_sensor_mass(frf, mass)
     if window is not None:
         record = 1 / float(np.mean(np.diff(frf.frequency)))
         fitted, windowed = windows.remove_recorded_window(modes, window.time_constant, delay, record)

@@ -262,7 +262,8 @@ def calibrate_model(
         stiffness = dsm.calibrate(spindle, frequency[0], std, number, name)
     else:
         named = frequency_std or None, mode or None, group or None
-        stiffness = dsm.fit_stiffness(spindle, frequency, *named, tolerance=machine.drawing_tolerance)
+        tolerance = machine.spindle.tolerance if machine.spindle else 0.0
+        stiffness = dsm.fit_stiffness(spindle, frequency, *named, tolerance=tolerance)
         number = int(stiffness.mode[0])
     dampers = None
     if damping_ratio is not None:

@@ -184,7 +184,6 @@ def assemble(
     calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
     direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
     followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
-    open_questions = [(tap.tap_id, question) for tap in taps for question in find_open_questions(tap.remarks)]
     assembly = _make_assembly(newest.tool, newest.time, newest.tap_id, modes, calibration)
     return replace(
         assembly,
@@ -195,7 +194,7 @@ def assemble(
         series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
-        questions=tuple(label_question(*question) for question in open_questions),
+        questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
     )
 
 

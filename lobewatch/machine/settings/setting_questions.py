@@ -234,9 +234,10 @@ def _check_model(machine: Machine, program: ProgramTable) -> Iterator[Implausibl
 
 def _check_spindle(spindle: SpindleTable) -> Iterator[ImplausibleSetting]:
     yield from _check_ranges(spindle, "[spindle]")
-    parts = {"segment": spindle.segments, "bearing": spindle.bearings, "joint": spindle.joints, "mass": spindle.masses}
-    for name, listed in parts.items():
-        yield from _check_parts(f"[spindle] {name}", listed)
+    yield from _check_parts("[spindle] segment", spindle.segments)
+    yield from _check_parts("[spindle] bearing", spindle.bearings)
+    yield from _check_parts("[spindle] joint", spindle.joints)
+    yield from _check_parts("[spindle] mass", spindle.masses)
 
 
 def _check_parts(place: str, parts: Sequence[TomlTable]) -> Iterator[ImplausibleSetting]:

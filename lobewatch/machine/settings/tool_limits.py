@@ -138,11 +138,6 @@ class ToolLimits:
         return self.low_rpm > self.high_rpm
 
     @property
-    def is_capped(self) -> bool:
-        """True if max_speed_rpm of the [[tool]] sets the highest speed."""
-        return self.high_rpm == self.tool.max_speed_rpm
-
-    @property
     def is_guessed(self) -> bool:
         """True if the speeds are only those of the spindle or of the fastest tool."""
         speed = self.cutting_speed_m_min

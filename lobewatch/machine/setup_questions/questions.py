@@ -6,6 +6,7 @@ from typing import Any, get_args
 
 from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
+from lobewatch.machine.settings.setting_questions import TEMPLATE_COEFFICIENTS
 from lobewatch.machine.settings.setup_tables import SensorMounting
 from lobewatch.machine.settings.toml import TomlValue
 from lobewatch.machine.setup_questions import draft as setup
@@ -138,12 +139,8 @@ def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
-DEFAULT_PROGRAM_NAME = "first cut"
-"""Name of the first program if the answer has none."""
 SETUP_COEFFICIENT_KEYS = ("tangential_n_per_mm2", "radial_n_per_mm2")
 """Keys of the coefficients that replace a material."""
-SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
-"""Values of these keys in a new machine.toml."""
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
@@ -192,7 +189,7 @@ def _current_material(draft: MachineDraft) -> str:
     if "material" in cut:
         return str(cut["material"])
     pair = tuple(cut[key] for key in SETUP_COEFFICIENT_KEYS if key in cut)
-    return setup.OPEN_ANSWER if pair in (SETUP_TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
+    return setup.OPEN_ANSWER if pair in (TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
 
 
 def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
@@ -228,7 +225,7 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
-    name = name.strip() if colon else DEFAULT_PROGRAM_NAME
+    name = name.strip() if colon else "first cut"
     setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
     setting["feed_per_tooth_mm"] = feed[0] if feed else None
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)

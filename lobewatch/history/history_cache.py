@@ -8,7 +8,7 @@ from operator import is_
 from acquisition import Remark
 from acquisition.errors import format_error
 from lobewatch.history.history import History, HistoryRow, decode_row, encode_row, keep_unusable_row, make_empty_history
-from lobewatch.history.tap_measurements import ReusableRows, is_row_of
+from lobewatch.history.tap_measurements import NO_REUSABLE_ROWS, ReusableRows, is_row_of
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.entries import CutEntry
@@ -38,8 +38,8 @@ class HistoryCache:
         """Rows of other settings or versions by tap test."""
         self.remarks: list[Remark] = []
         """Reasons why something was not written."""
-        self.reusable: ReusableRows | None = None
-        """Rows that were read behind those that `read` gave; None where there are none."""
+        self.reusable = NO_REUSABLE_ROWS
+        """Rows that were read behind those that `read` gave."""
 
     def read(self, files: UsableTaps) -> History:
         """Read the oldest rows that are valid for these settings and this version.
@@ -55,7 +55,7 @@ class HistoryCache:
         kept = tuple(keep_unusable_row(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
         valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
-        self.reusable = ReusableRows(self._rows, files.by_id, files.contents.baselines) if changed else None
+        self.reusable = ReusableRows(self._rows, files.by_id, files.contents.baselines) if changed else NO_REUSABLE_ROWS
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def _count_fitting(self, places: Sequence[TapPlace]) -> int:

@@ -128,6 +128,8 @@ def _encode_content(row: HistoryRow) -> bytes:
     return encode_row(0, replace(row, verdicts=None), {})
 
 
+NO_REUSABLE_ROWS = ReusableRows((), {}, ())
+"""No stored rows of a former order."""
 MAX_MEASUREMENTS_IN_MEMORY = 500
 """Largest number of measurements in memory, those used last."""
 
@@ -198,7 +200,7 @@ class TapMeasurements:
             raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
 
     def all_rows(
-        self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows | None = None
+        self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows
     ) -> tuple[HistoryRow, ...]:
         """Return these rows and those of all later tap tests.
 
@@ -207,11 +209,10 @@ class TapMeasurements:
         """
         rows = list(rows)
         for place in self._places[len(rows) :]:
-            row = behind.find(place, self._places, rows) if behind is not None else None
+            row = behind.find(place, self._places, rows)
             if row is None:
                 row = self._row(place, rows, older_rows)
-                if behind is not None:
-                    behind.note(row)
+                behind.note(row)
             rows.append(row)
         return tuple(rows)
 

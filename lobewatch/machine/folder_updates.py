@@ -17,6 +17,7 @@ from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
 from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import JournalReading, make_entry
+from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import CutSetting
@@ -35,15 +36,45 @@ def add_event(
 ) -> lines.MaintenanceEvent:
     """Write a maintenance event to the journal.
 
-    date: None for now; local time without a zone. Raises ValueError for an invalid event, BusyError if another program
-    writes.
+    date: None for now, local time without a zone, the whole day at midnight. Raises ValueError for an empty text, a
+    date in the future, a duplicate, and a new baseline on a whole day with tap tests, whose order is then unknown;
+    BusyError if another program writes.
     """
     with folder.locked():
         now, entries = datetime.now(UTC), folder.journal.read().entries
-        event = lines.make_event(entries, folder.taps(), text, date, new_baseline, now)
+        if not text.strip():
+            raise ValueError('the event has no text; say what was done, such as "bearings replaced"')
+        check_name(text, "event")
+        time = now if date is None else _to_utc(date)
+        if time - now > timedelta(days=1):
+            raise ValueError(f"MaintenanceEvent.time {date}: lies in the future; give the day on which it was done")
+        same = [event.id for event in lines.read_events(entries) if (event.time, event.text) == (time, text)]
+        if same:
+            listing = "MachineFolder.contents lists all events"
+            raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; {listing}")
+        if new_baseline and date is not None and date.time() == datetime.min.time():
+            _refuse_tapped_day(folder.taps(), time)
+        number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
+        event = lines.MaintenanceEvent(f"e{number}", time, text, new_baseline)
         fields = {"id": event.id, "date": event.time.isoformat(), "text": text, "new_baseline": new_baseline}
         folder.journal.append(make_entry("event", now, **fields))
     return event
+
+
+def _to_utc(date: datetime) -> datetime:
+    try:
+        return date.astimezone(UTC)
+    except (OverflowError, ValueError) as error:
+        raise ValueError(f"MaintenanceEvent.time {date}: is out of range; give a date after 1970-01-01") from error
+
+
+def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
+    tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
+    if tapped:
+        clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
+        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
+        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
+        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
 
 
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:

@@ -1,6 +1,6 @@
 """Tables of machine.toml on the machine, its tap test, its sensors and its DAQ."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from math import hypot, isfinite
 from typing import Annotated, Literal, Self
@@ -196,15 +196,9 @@ class ChannelTable(TomlTable, frozen=True):
             sensitivity = self.sensitivity_mv_per_n / 1e3
         else:
             sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
-        channel = Channel(
-            self.quantity,
-            sensitivity * self.gain,
-            self.range_v,
-            direction=self.direction,
-            serial_number=self.serial_number,
-            calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
-            skew=self.skew_us / 1e6,
-        )
+        date = self.calibration_date.isoformat() if self.calibration_date else ""
+        channel = Channel(self.quantity, sensitivity * self.gain, self.range_v, skew=self.skew_us / 1e6)
+        channel = replace(channel, direction=self.direction, serial_number=self.serial_number, calibration_date=date)
         return SensorInput(self.input, channel, self.iepe)
 
 

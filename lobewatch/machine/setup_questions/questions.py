@@ -80,6 +80,10 @@ def _current_sensor(quantity: str, draft: MachineDraft) -> str:
 
 
 def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft:
+    if quantity == "force":
+        if answer.strip().casefold() == NO_HAMMER_ANSWER:
+            return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
+        draft = draft.set("tap", hammer=None)
     names = ("input of the DAQ", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
     number, sensitivity, reach = setup.parse_numbers(answer, names)
     if not number.is_integer():
@@ -88,10 +92,9 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
     return draft.set("daq.channel", _channel_number(quantity, draft), **values, range_v=reach)
 
 
-def _set_hammer(draft: MachineDraft, answer: str) -> MachineDraft:
-    if answer.strip().casefold() == NO_HAMMER_ANSWER:
-        return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
-    return _set_sensor("force", draft.set("tap", hammer=None), answer)
+def _sensor_question(name: str, quantity: str, text: str, example: str) -> SetupQuestion:
+    current, apply = partial(_current_sensor, quantity), partial(_set_sensor, quantity)
+    return SetupQuestion(name, text, example, current, apply, partial(_described_by_daq, quantity))
 
 
 def _current_mounting(draft: MachineDraft) -> str:
@@ -114,6 +117,14 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
 _DAQ_EXAMPLE = "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200"
 _FIXING_TEXT = f"Accelerometer on the tool: its mass (g), and fixed by {', '.join(MOUNTINGS[:-1])} or hand?"
 DAQ_QUESTION = SetupQuestion("daq", "On which port is the DAQ?", _DAQ_EXAMPLE, _current_port, _set_port)
+
+
+def _current_name(draft: MachineDraft) -> str:
+    return str(draft.table("machine")["name"])
+
+
+def _set_name(draft: MachineDraft, answer: str) -> MachineDraft:
+    return draft.set("machine", name=answer.strip())
 
 
 def _current_speeds(draft: MachineDraft) -> str:
@@ -235,35 +246,16 @@ _TOOL_TEXT = "The tool that is tapped: teeth, diameter (mm), helix (deg), length
 _MATERIAL_TEXT = "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)"
 _MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
 _PROGRAM_TEXT = "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?"
+_SENSOR_TEXT = "{}: input of the DAQ, sensitivity (mV/{}, on its calibration sheet), range (V)?"
 _DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor?"
 _EXAMPLE_TOOL = "4 20 30 80 coated carbide"
 SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
-    SetupQuestion(
-        "name",
-        "What is the machine called?",
-        "mill-3",
-        lambda draft: str(draft.table("machine")["name"]),
-        lambda draft, answer: draft.set("machine", name=answer.strip()),
-    ),
+    SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name),
     SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds),
     SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     DAQ_QUESTION,
-    SetupQuestion(
-        "hammer",
-        "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)? Or none: no force sensor.",
-        "0 2.25 5",
-        partial(_current_sensor, "force"),
-        _set_hammer,
-        partial(_described_by_daq, "force"),
-    ),
-    SetupQuestion(
-        "accelerometer",
-        "Accelerometer: input of the DAQ, sensitivity (mV/g, on its calibration sheet), range (V)?",
-        "1 10 5",
-        partial(_current_sensor, "acceleration"),
-        partial(_set_sensor, "acceleration"),
-        partial(_described_by_daq, "acceleration"),
-    ),
+    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('Hammer', 'N')} Or none: no force sensor.", "0 2.25 5"),
+    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("Accelerometer", "g"), "1 10 5"),
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
     SetupQuestion("tool", f"{_TOOL_TEXT} {_TOOL_MATERIALS_TEXT}?", _EXAMPLE_TOOL, _current_tool, _set_tool),
     SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),

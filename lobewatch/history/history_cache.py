@@ -8,8 +8,7 @@ from operator import is_
 from acquisition import Remark
 from acquisition.errors import format_error
 from lobewatch.history.history import History, HistoryRow, decode_row, encode_row, keep_unusable_row, make_empty_history
-from lobewatch.history.tap_measurements import NO_REUSABLE_ROWS, ReusableRows, is_row_of
-from lobewatch.history.usable_taps import UsableTaps
+from lobewatch.history.tap_measurements import NO_REUSABLE_ROWS, ReusableRows, UsableTaps, is_row_of
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows

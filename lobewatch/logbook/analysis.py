@@ -7,8 +7,7 @@ from datetime import UTC, datetime
 from lobewatch.cuts.learning.verdict_at_speed import evaluate_at_speed
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
-from lobewatch.history.tap_measurements import TapMeasurements
-from lobewatch.history.usable_taps import NotTappedError, UsableTaps
+from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement

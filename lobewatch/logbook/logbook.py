@@ -12,8 +12,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, Remark, TapTest
 from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
-from lobewatch.history.tap_measurements import TapMeasurements
-from lobewatch.history.usable_taps import UsableTaps
+from lobewatch.history.tap_measurements import TapMeasurements, UsableTaps
 from lobewatch.logbook import recordings
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry

@@ -20,8 +20,6 @@ CuttingPressure = Annotated[Positive, Plausible(200, 6000)]
 """Tangential cutting coefficient Kt, or specific cutting force (N/mm2)."""
 ToolWear = Literal["new", "used", "worn"]
 """Wear of the cutting edges."""
-IsoMaterialGroup = Literal["P", "M", "K", "N", "S", "H"]
-"""Group of materials by ISO 513."""
 
 
 def convert_pitch(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
@@ -205,7 +203,8 @@ class MaterialTable(TomlTable, frozen=True):
     tangential_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
     radial_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
     source: str = "machine.toml"
-    iso_group: IsoMaterialGroup | None = None
+    iso_group: Literal["P", "M", "K", "N", "S", "H"] | None = None
+    """Group of materials by ISO 513."""
 
     def __post_init__(self) -> None:
         first, second = ("tangential_n_per_mm2", "radial_n_per_mm2"), ("specific_force_n_per_mm2", "force_angle_deg")

@@ -135,15 +135,10 @@ def _check_machine(machine: Machine) -> Iterator[ImplausibleSetting]:
         yield from _check_ranges(getattr(machine, name), f"[{name}]")
     for i, channel in enumerate(machine.daq.channel, 1):
         yield from _check_ranges(channel, f"[[daq.channel]] {i}")
-    yield from _check_drive(machine)
-
-
-def _check_drive(machine: Machine) -> Iterator[ImplausibleSetting]:
-    """Yield a power that the drive reaches only outside the speed range."""
+    yield from _check_ranges(machine.drive, "[drive]")
     drive = machine.drive
-    yield from _check_ranges(drive, "[drive]")
     if math.isfinite(drive.power_kw) and math.isfinite(drive.torque_nm):
-        corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi
+        corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi  # speed with full power and full torque
         if not 50 <= corner <= 2 * machine.speed.high_rpm:
             meeting = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm"
             why = f"{meeting}, where [speed] ends at {machine.speed.high_rpm:g}"

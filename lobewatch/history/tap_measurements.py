@@ -184,11 +184,10 @@ class FollowedModeIndex:
                 self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
         self._rows = max(self._rows, len(rows))
         numbers = self._numbers.get(place.series, {})
-        earlier = {
-            direction: modes[: bisect_left(numbers[direction], place.number)]
-            for direction, modes in self._modes.get(place.series, {}).items()
-        }
-        return {"x": [], "y": [], **earlier}
+        earlier: dict[str, list[FollowedMode]] = {"x": [], "y": []}
+        for direction, modes in self._modes.get(place.series, {}).items():
+            earlier[direction] = modes[: bisect_left(numbers[direction], place.number)]
+        return earlier
 
 
 def is_row_of(row: HistoryRow, place: TapPlace) -> bool:

@@ -197,13 +197,10 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
 
 def find_contradicting_cuts(cut: CutEntry, earlier: Sequence[CutEntry]) -> list[CutEntry]:
     """Return the earlier usable cuts at the same point with the opposite result."""
-    return [old for old in earlier if old.is_usable and _is_same_point(old, cut) and old.has_chatter != cut.has_chatter]
-
-
-def _is_same_point(old: CutEntry, new: CutEntry) -> bool:
-    is_same_cut = (old.tool, old.cut, old.feed) == (new.tool, new.cut, new.feed)
-    is_same_speed = abs(old.speed_rpm - new.speed_rpm) <= SAME_SPEED_TOLERANCE * new.speed_rpm
-    return is_same_cut and is_same_speed and abs(old.depth - new.depth) <= SAME_DEPTH_TOLERANCE * new.depth
+    opposite = [old for old in earlier if old.is_usable and old.has_chatter != cut.has_chatter]
+    same = [old for old in opposite if (old.tool, old.cut, old.feed) == (cut.tool, cut.cut, cut.feed)]
+    same = [old for old in same if abs(old.speed_rpm - cut.speed_rpm) <= SAME_SPEED_TOLERANCE * cut.speed_rpm]
+    return [old for old in same if abs(old.depth - cut.depth) <= SAME_DEPTH_TOLERANCE * cut.depth]
 
 
 def check_program_name(machine: Machine, name: str) -> None:

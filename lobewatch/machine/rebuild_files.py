@@ -23,10 +23,9 @@ from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
-LOST_ENTRIES_HINT = (
-    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
-    "(folder_updates.add_event, exclude_entry, MachineFolder.accept, folder_updates.store_cut)"
-)
+LOST_ENTRIES_HINT = "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: "
+LOST_ENTRIES_HINT += "enter them again (folder_updates.add_event, exclude_entry, MachineFolder.accept, "
+LOST_ENTRIES_HINT += "folder_updates.store_cut)"
 """Advice on entries that no copy of the journal has."""
 
 

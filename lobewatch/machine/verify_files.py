@@ -80,16 +80,10 @@ def verify(path: Path) -> Verification:
     reading = folder.journal.read()
     committed = journal_entries.read_committed_taps(reading)
     faults = {name: fault for name, entry in committed.items() if (fault := contents.find_file_fault(path, entry))}
-    remarks = [
-        *reading.damage,
-        *_verify_taps(path, reading, committed, faults),
-        *verify_cut_recordings(path, reading),
-        *_verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults]),
-        *_verify_history(folder),
-        *_verify_devices(folder),
-        *_verify_spool(path, committed.keys() - faults.keys()),
-        *_verify_names(path),
-    ]
+    remarks = [*reading.damage, *_verify_taps(path, reading, committed, faults), *verify_cut_recordings(path, reading)]
+    remarks += _verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults])
+    remarks += [*_verify_history(folder), *_verify_devices(folder)]
+    remarks += [*_verify_spool(path, committed.keys() - faults.keys()), *_verify_names(path)]
     return Verification(tuple(remarks), tuple(entered), len(committed) - len(faults))
 
 

@@ -175,18 +175,13 @@ def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
 def _follow_mode(
     trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
-    """Return the credible mode that continues the last one, or the predominant one."""
-    mode = modal.predominant_mode(trusted.modes)
-    if mode is None:
+    """Return the credible mode that continues the last one; without a last one, or far off, the predominant one."""
+    now = modal.predominant_mode(trusted.modes)
+    if now is None:
         remarks.append(questions.no_mode_remark(modes, machine))
-    elif last is not None:
-        mode = _continue_mode(last, mode, trusted.modes, remarks)
-    return mode
-
-
-def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
-    """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
-    next_mode = modal.follow_mode(last, candidates)
+    if now is None or last is None:
+        return now
+    next_mode = modal.follow_mode(last, trusted.modes)
     jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)

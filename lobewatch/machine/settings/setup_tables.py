@@ -192,10 +192,8 @@ class ChannelTable(TomlTable, frozen=True):
 
     def build(self) -> SensorInput:
         """Build the sensor input in SI units: volts per N or per m/s^2."""
-        if self.sensitivity_mv_per_n is not None:
-            sensitivity = self.sensitivity_mv_per_n / 1e3
-        else:
-            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
+        per_newton, per_g = self.sensitivity_mv_per_n, self.sensitivity_mv_per_g or 0.0
+        sensitivity = per_g / 1e3 / acquisition.STANDARD_GRAVITY if per_newton is None else per_newton / 1e3
         date = self.calibration_date.isoformat() if self.calibration_date else ""
         channel = Channel(self.quantity, sensitivity * self.gain, self.range_v, skew=self.skew_us / 1e6)
         channel = replace(channel, direction=self.direction, serial_number=self.serial_number, calibration_date=date)

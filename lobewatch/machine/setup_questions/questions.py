@@ -53,12 +53,6 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft
 
 
-def _channel_number(quantity: str, draft: MachineDraft) -> int:
-    """Return the index of a sensor in [[daq.channel]], or of a new one."""
-    quantities = [channel.get("quantity") for channel in draft.table("daq").get("channel", ())]
-    return quantities.index(quantity) if quantity in quantities else len(quantities)
-
-
 def _described_by_daq(quantity: str, draft: MachineDraft) -> str:
     if draft.needs_sensors or (quantity == "force" and _lacks_hammer(draft)):
         return ""
@@ -73,7 +67,7 @@ def _lacks_hammer(draft: MachineDraft) -> bool:
 def _current_sensor(quantity: str, draft: MachineDraft) -> str:
     if quantity == "force" and (draft.has_no_force_sensor or _lacks_hammer(draft)):
         return NO_HAMMER_ANSWER
-    channel = draft.table("daq.channel", _channel_number(quantity, draft))
+    channel = draft.table("daq.channel", draft.find_number("daq.channel", "quantity", quantity))
     if not channel:
         return ""
     return setup.format_answer(*(channel[key] for key in ("input", SENSITIVITY_KEYS[quantity], "range_v")))
@@ -89,7 +83,8 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
     values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
-    return draft.set("daq.channel", _channel_number(quantity, draft), **values, range_v=reach)
+    place = draft.find_number("daq.channel", "quantity", quantity)
+    return draft.set("daq.channel", place, **values, range_v=reach)
 
 
 def _sensor_question(name: str, quantity: str, text: str, example: str) -> SetupQuestion:
@@ -158,7 +153,7 @@ _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]
 def _current_tool(draft: MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    made_of = draft.table("tool", _tool_number(draft)).get("tool_material")
+    made_of = draft.table("tool", draft.find_number("tool", "name", draft.table("tap")["tool"])).get("tool_material")
     numbers = setup.format_answer(*values, *([stick_out] if stick_out else []))
     return f"{numbers} {made_of}" if made_of else numbers
 
@@ -173,7 +168,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
     tool: dict[str, TomlValue] = {"teeth": int(teeth), "tool_diameter_mm": diameter, "helix_deg": helix}
     draft = _set_in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
-    number = _tool_number(draft)
+    number = draft.find_number("tool", "name", draft.table("tap")["tool"])
     if made_of is None and not draft.table("tool", number):
         return draft
     return draft.set("tool", number, name=draft.table("tap")["tool"], tool_material=made_of)
@@ -185,14 +180,6 @@ def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
         if answer.strip().casefold().endswith(f" {material.casefold()}"):
             return answer.strip()[: -len(material)], material
     return answer, None
-
-
-def _tool_number(draft: MachineDraft) -> int:
-    """Return the index of the [[tool]] of the tapped tool, or of a new one."""
-    number = 0
-    while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
-        number += 1
-    return number
 
 
 def _current_material(draft: MachineDraft) -> str:

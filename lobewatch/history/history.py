@@ -107,11 +107,6 @@ class HistoryRow:
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
 
     @property
-    def watched(self) -> Sequence[tuple[float, float]]:
-        """Monitored values with their standard errors."""
-        return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
-
-    @property
     def mode(self) -> Mode | None:
         """Followed mode without its errors; None without one."""
         if not self.frequency.is_known:
@@ -274,7 +269,6 @@ TEXT_COLUMNS = ("tap_id", "tool", "direction", "series", "operator")
 MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
 CONDITION_UNITS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN", "hours": "h"}
 """Numeric conditions with their units; NaN if unknown."""
-CONDITION_TEXT_COLUMNS = ("state", "note")
 
 
 def make_export_columns(history: History, machine: Machine, render: Callable[[str], str] = str) -> SldHistory:
@@ -288,7 +282,7 @@ def make_export_columns(history: History, machine: Machine, render: Callable[[st
     columns["remarks"] = _text_column(map(render, remarks))
     stated = [row.conditions.specified for row in rows]
     columns |= {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
-    columns |= {name: _text_column(under.get(name, "") for under in stated) for name in CONDITION_TEXT_COLUMNS}
+    columns |= {name: _text_column(under.get(name, "") for under in stated) for name in ("state", "note")}
     columns["reclamped"] = _number_column([row.conditions.reclamped for row in rows])
     for name in ESTIMATE_UNITS:
         columns[name], columns[f"{name}_std"] = _number_column([getattr(row, name) for row in rows], 2).T
@@ -303,7 +297,11 @@ def make_export_columns(history: History, machine: Machine, render: Callable[[st
         columns["program_limit"] = _number_column(limits, len(programs))
         columns["program_verdict"] = _text_column(_program_verdicts(row.verdicts, programs) for row in rows)
     speeds = speed_grid(machine)
-    depth = _lobe_depths(rows, machine, speeds)
+    nowhere, diagrams = np.full(speeds.size, np.nan), [compute_row_lobes(row, machine) for row in rows]
+    depth = {}
+    for name in machine.cut_tables:
+        depths = [lobes[name].depth if name in lobes else nowhere for lobes in diagrams]
+        depth[name] = _number_column(depths, speeds.size)
     units = ESTIMATE_UNITS | {f"{name}_std": unit for name, unit in ESTIMATE_UNITS.items()} | MODEL_VALUE_UNITS
     units |= MODE_COLUMNS | CONDITION_UNITS
     units = {name: unit for name, unit in (units | {"program_limit": "m"}).items() if unit and name in columns}
@@ -319,16 +317,6 @@ def compute_row_lobes(
 
 def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
     return [Mode(frequency, damping, stiffness, phase_deg=phase) for frequency, damping, stiffness, phase in values]
-
-
-def _lobe_depths(rows: Sequence[HistoryRow], machine: Machine, speeds: Floats) -> dict[str, Floats]:
-    """Return the limits of each row over speeds (m) by name of the cut; NaN without lobes."""
-    nowhere = np.full(speeds.size, np.nan)
-    diagrams = [compute_row_lobes(row, machine) for row in rows]
-    return {
-        name: _number_column([lobes[name].depth if name in lobes else nowhere for lobes in diagrams], speeds.size)
-        for name in machine.cut_tables
-    }
 
 
 def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:

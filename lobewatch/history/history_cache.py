@@ -17,8 +17,6 @@ from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
 """Size of obsolete rows, besides that of the valid ones, above which the file is rewritten."""
-UNPLACED_ROW_NUMBER = -1
-"""Number of rows outside of the history."""
 
 
 class HistoryCache:
@@ -121,7 +119,7 @@ class HistoryCache:
         contents = self._contents[:same] + later
         pairs = zip_longest(later, self._contents[same : len(contents)])
         fresh = [content for content, stored in pairs if content is not stored and content != stored]
-        aside = [encode_row(UNPLACED_ROW_NUMBER, row, hashes) for row in history.kept]
+        aside = [encode_row(-1, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MAX_OBSOLETE_BYTES
         grows = contents[len(self._contents) - 1 :] and self._size + sum(map(len, fresh)) < most
         if self._size and aside == self._aside and path.exists() and grows:

@@ -70,10 +70,8 @@ def _check_phase(path: Path, description: Description) -> str:
     try:
         if frf is not None:
             pick_peaks(frf)
-    except ConjugateError as error:
-        return f"; {error}"
-    except ValueError:
-        return ""
+    except ValueError as error:
+        return f"; {error}" if isinstance(error, ConjugateError) else ""
     return ""
 
 

@@ -164,7 +164,6 @@ def _wait_for_result(client: Any, address: str, future: Future[Any]) -> Any:
 
 TASKS_PER_WORKER = 3
 """Largest number of waiting tasks per worker, which limits memory; chosen."""
-
 TASK_ERRORS: tuple[type[Exception], ...] = (ArithmeticError, AssertionError, AttributeError, EOFError, LookupError)
 TASK_ERRORS += (MemoryError, PickleError, RuntimeError, TypeError, ValueError)
 """Errors of a task itself, not of its transport."""

@@ -156,8 +156,7 @@ def find_excludable_entry(name: str, taps: Sequence[TapEntry], cuts: Sequence[Cu
         if cut.id == name:
             return cut
     part = name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
-    exact = [tap for tap in taps if tap.id == part]
-    matches = exact or [tap for tap in taps if part and part in tap.id]
+    matches = [tap for tap in taps if tap.id == part] or [tap for tap in taps if part and part in tap.id]
     if len(matches) == 1:
         return matches[0]
     if matches:

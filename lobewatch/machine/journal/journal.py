@@ -194,11 +194,10 @@ class Journal:
         with contextlib.suppress(OSError):  # it is committed; the copy is brought up at the next line
             _append_lines(self.copy_path, lines)
 
-    def refuse_damage(self, reading: JournalReading | None = None) -> None:
+    def refuse_damage(self, reading: JournalReading) -> None:
         """Raise DataError if the journal is damaged."""
-        damage = (reading or self.read()).damage
-        if damage:
-            raise DataError(f"{self.path.parent}: {'; '.join(map(str, damage))}; nothing is written before")
+        if reading.damage:
+            raise DataError(f"{self.path.parent}: {'; '.join(map(str, reading.damage))}; nothing is written before")
 
     def rewrite(self, entries: list[JournalEntry]) -> None:
         """Write both files with these entries in a new chain, and keep the old files."""

@@ -155,9 +155,9 @@ def _check_program(machine: Machine, program: ProgramTable) -> Iterator[Implausi
     if tool is not None:
         yield from _check_program_tool(program, tool, place)
     if program.tool == machine.tap.tool and machine.tap.stick_out_mm is not None:
-        limits, diameter = STICK_OUT_RATIO_RANGE, program.tool_diameter_mm
-        unit = f"{limits.unit} of {diameter:g} mm"
-        yield from _check_ratio("[tap]", "stick_out_mm", machine.tap.stick_out_mm, diameter, limits, unit)
+        diameter = program.tool_diameter_mm
+        limits = STICK_OUT_RATIO_RANGE._replace(unit=f"diameters of {diameter:g} mm")
+        yield from _check_ratio("[tap]", "stick_out_mm", machine.tap.stick_out_mm, diameter, limits)
 
 
 def _check_cut_and_material(machine: Machine, cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
@@ -271,10 +271,8 @@ def _check_ranges(table: TomlTable, place: str) -> Iterator[ImplausibleSetting]:
                 yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, key, f"{number:g}", why)
 
 
-def _check_ratio(
-    place: str, key: str, value: float, over: float, limits: RatioRange, unit: str = ""
-) -> Iterator[ImplausibleSetting]:
+def _check_ratio(place: str, key: str, value: float, over: float, limits: RatioRange) -> Iterator[ImplausibleSetting]:
     """Yield a number whose ratio to another one is outside its plausible range."""
     if value and not limits.holds(value / over):
-        why = f"is {value / over:.3g} {unit or limits.unit}, not {limits.low:g} to {limits.high:g}"
+        why = f"is {value / over:.3g} {limits.unit}, not {limits.low:g} to {limits.high:g}"
         yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, key, f"{value:g}", why)

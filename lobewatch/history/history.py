@@ -19,7 +19,7 @@ from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
-from lobewatch.measurement.share_work import CURRENT_SOFTWARE
+from lobewatch.measurement.software import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes, speed_grid
 from lobewatch.tool.tap_series import TapPlace

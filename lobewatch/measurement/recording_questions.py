@@ -153,8 +153,7 @@ def check_question_codes(codes: Iterable[str]) -> list[str]:
     """Return each code once; ValueError for an unknown one."""
     distinct = list(dict.fromkeys(codes))
     for code in [code for code in distinct if code not in RECORDING_QUESTIONS]:
-        questions = ", ".join(RECORDING_QUESTIONS)
-        raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
+        raise ValueError(f"accept_questions.codes {code}: no such question; there are {', '.join(RECORDING_QUESTIONS)}")
     return distinct
 
 

@@ -3,7 +3,6 @@
 import asyncio
 import ipaddress
 import logging
-import platform
 import socket
 import threading
 import time
@@ -13,32 +12,12 @@ from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future,
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from multiprocessing import get_context
 from pickle import PickleError
 from typing import Any, NamedTuple, TypeVar, cast
 
 from acquisition import DataError, Remark
-
-
-class SoftwareVersions(NamedTuple):
-    """Versions of this program and of its numerical libraries."""
-
-    lobewatch: str
-    numpy: str
-    scipy: str
-    processor: str
-    """Architecture of the processor."""
-
-    @property
-    def text(self) -> str:
-        """Versions in words."""
-        return f"lobewatch {self.lobewatch}, numpy {self.numpy}, scipy {self.scipy} on {self.processor}"
-
-
-CURRENT_SOFTWARE = SoftwareVersions(version("lobewatch"), version("numpy"), version("scipy"), platform.machine())
-"""Software of this process."""
-
+from lobewatch.measurement.software import CURRENT_SOFTWARE, SoftwareVersions
 
 _log = logging.getLogger(__name__)
 Task = TypeVar("Task")

@@ -253,8 +253,7 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
 
 def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
-    for question in SETUP_QUESTIONS:
-        if question.name == name:
-            return question
-    names = ", ".join(question.name for question in SETUP_QUESTIONS)
-    raise ValueError(f"find_setup_question.name {name}: no such question; there are {names}")
+    by_name = {question.name: question for question in SETUP_QUESTIONS}
+    if name not in by_name:
+        raise ValueError(f"find_setup_question.name {name}: no such question; there are {', '.join(by_name)}")
+    return by_name[name]

@@ -16,7 +16,7 @@ from acquisition import TapTest
 from lobewatch.cli import app
 from lobewatch.history import History
 from lobewatch.measurement import Measurement, measure
-from lobewatch.measurement.share_work import CURRENT_SOFTWARE
+from lobewatch.measurement.software import CURRENT_SOFTWARE
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""

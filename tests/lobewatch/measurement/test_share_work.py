@@ -21,7 +21,8 @@ from acquisition import DataError, Description
 from lobewatch import Logbook
 from lobewatch.cli import app
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.measurement.share_work import CURRENT_SOFTWARE, Workers, scheduler_remarks, share_work
+from lobewatch.measurement.share_work import Workers, scheduler_remarks, share_work
+from lobewatch.measurement.software import CURRENT_SOFTWARE
 from tests.lobewatch.authority import certify
 from tests.lobewatch.logbook.recordings.test_store_recordings import text_files, values
 

@@ -1,7 +1,5 @@
 """Machine folder: machine.toml, taps/, journal.jsonl, spool/ and history.rows, and what journal and taps/ prove."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os
@@ -13,6 +11,7 @@ from datetime import datetime
 from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
+from typing import Self
 
 import msgspec
 
@@ -56,7 +55,7 @@ class FolderContents:
     fleet_scatters: tuple[FleetScatter, ...] = ()
     """Scatter of the other machines of the fleet, oldest first."""
 
-    def with_tap(self, entry: TapEntry) -> FolderContents:
+    def with_tap(self, entry: TapEntry) -> Self:
         """Return the contents with a newly committed tap test."""
         is_newest = not self.taps or self.taps[-1].created <= entry.created
         taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])

@@ -37,7 +37,7 @@ def history(
     logbook = Logbook.open(machine)
     if hdf5 is not None:
         from lobes import write_history
-        from lobewatch.history.export_columns import make_export_columns
+        from lobewatch.history.history import make_export_columns
         from lobewatch.show.terminal.option_names import with_option_names
 
         write_history(hdf5, make_export_columns(logbook.history, logbook.machine, with_option_names))

@@ -66,7 +66,7 @@ def rebuild(
 
 def _find_machine_folders(path: Path) -> list[Path]:
     """Find the machine folders in a folder that is not a machine folder itself."""
-    from lobewatch.machine.folder_contents import list_tap_files
+    from lobewatch.machine.folder import list_tap_files
 
     if (path / "machine.toml").is_file() or list_tap_files(path):
         return []

@@ -26,8 +26,7 @@ from lobewatch.fleet.machine_summary import (
     read_last_summary,
     write_summary,
 )
-from lobewatch.history.history import History
-from lobewatch.history.row_codec import encode_row
+from lobewatch.history.history import History, encode_row
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import BusyError

@@ -1,23 +1,27 @@
-"""History of a machine: one row per tap test, with rows of older versions."""
+"""History of a machine: one row per tap test, its stored form, rows of older versions, and columns for export."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from typing import Any
+from typing import Any, get_type_hints
 
+import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Remark
+from lobes import SldHistory, StabilityLobes
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement
-from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.assembly import Assembly, compute_tip_lobes, speed_grid
 from lobewatch.tool.tap_series import TapPlace
 from lobewatch.verdicts.verdict import StoredVerdict
 from modal import Mode
@@ -103,11 +107,6 @@ class HistoryRow:
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
 
     @property
-    def watched(self) -> Sequence[tuple[float, float]]:
-        """Monitored values with their standard errors."""
-        return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
-
-    @property
     def mode(self) -> Mode | None:
         """Followed mode without its errors; None without one."""
         if not self.frequency.is_known:
@@ -138,12 +137,6 @@ class History:
         since = [row for row in self.rows if row.baseline == self.baseline]
         newest = {row.tool: row.series for row in since}
         return [row for row in since if row.series == newest[row.tool]]
-
-    @property
-    def newest_calibrated(self) -> HistoryRow | None:
-        """Newest row with a calibrated bearing stiffness and without open questions."""
-        rows = reversed(self.current)
-        return next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
 
     @property
     def questions(self) -> dict[str, tuple[str, ...]]:
@@ -232,3 +225,113 @@ def find_older_version_remarks(history: History | None) -> list[Remark]:
     """Return the remarks on rows of older versions that count."""
     rows = [] if history is None else [row for row in history.rows if row.software]
     return [remark for row in rows for remark in row.remarks if remark.code == OLDER_VERSION_CODE]
+
+
+RECORD_FIELDS = ["tap_id", "time", "tool", "direction", "baseline", "series", "conditions", *ESTIMATE_UNITS]
+RECORD_FIELDS += [*MODEL_VALUE_UNITS, "modes", "x", "y", "remarks", "verdicts"]
+"""Stored fields of a row in their order; software and operator follow, which the first rows lack."""
+RECORD_TYPES = get_type_hints(HistoryRow) | {"time": str, "baseline": str, "conditions": dict[str, Any]}
+RECORD_TYPES |= {"verdicts": dict[str, tuple[str, StoredVerdict]]}
+"""Types of these fields: times as text with their zone, and each verdict with the hash of its program."""
+_stored: list[Any] = [("number", int), *((name, RECORD_TYPES[name]) for name in RECORD_FIELDS)]
+_stored += [(name, str, "") for name in ("software", "operator")]
+RowRecord = msgspec.defstruct("RowRecord", _stored, array_like=True, gc=False)
+"""Stored form of a row."""
+_encode_record, _decode_record = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(RowRecord).decode
+
+
+def encode_row(number: int, row: HistoryRow, hashes: Mapping[str, str]) -> bytes:
+    """Encode a row with its number, -1 for one outside of the history; hashes: of the programs by name."""
+    values: dict[str, Any] = {name: getattr(row, name) for name in RowRecord.__struct_fields__[1:]}
+    values |= {"number": number, "time": row.time.isoformat(), "conditions": row.conditions.specified}
+    values["baseline"] = row.baseline.isoformat() if row.baseline else ""
+    values["verdicts"] = {name: (hashes[name], verdict) for name, verdict in (row.verdicts or {}).items()}
+    return _encode_record(RowRecord(**values))
+
+
+def decode_row(content: bytes, hashes: Mapping[str, str], software: str = "") -> tuple[int, HistoryRow]:
+    """Decode number and row, without verdicts on changed programs; ValueError for invalid bytes.
+
+    software: version of a row that does not state it; empty for this version.
+    """
+    values = msgspec.structs.asdict(_decode_record(content))
+    stored, values["time"] = values["verdicts"].items(), datetime.fromisoformat(values["time"])
+    values["software"] = values["software"] or software
+    values["baseline"] = datetime.fromisoformat(values["baseline"]) if values["baseline"] else None
+    conditions = values["conditions"]
+    values["conditions"] = Conditions.from_mapping(conditions) if conditions else UNKNOWN_CONDITIONS
+    verdicts = {name: verdict for name, (made_with, verdict) in stored if hashes.get(name) == made_with}
+    values["verdicts"] = verdicts if verdicts or not hashes else None
+    return values.pop("number"), HistoryRow(**values)
+
+
+TEXT_COLUMNS = ("tap_id", "tool", "direction", "series", "operator")
+MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
+CONDITION_UNITS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN", "hours": "h"}
+"""Numeric conditions with their units; NaN if unknown."""
+
+
+def make_export_columns(history: History, machine: Machine, render: Callable[[str], str] = str) -> SldHistory:
+    """Make the columns for `lobes.write_history`; render: translates the names in remarks."""
+    rows, programs = history.rows, [program.name for program in machine.program]
+    columns: dict[str, Any] = {name: _text_column(getattr(row, name) for row in rows) for name in TEXT_COLUMNS}
+    columns["time"] = _text_column(row.time.isoformat() for row in rows)
+    columns["baseline"] = _text_column(row.baseline.isoformat() if row.baseline else "" for row in rows)
+    columns["notes"] = _text_column(render("\n".join(map(str, row.remarks))) for row in rows)
+    remarks = (msgspec.json.encode([asdict(remark) for remark in row.remarks]).decode() for row in rows)
+    columns["remarks"] = _text_column(map(render, remarks))
+    stated = [row.conditions.specified for row in rows]
+    columns |= {name: _number_column([under.get(name, np.nan) for under in stated]) for name in CONDITION_UNITS}
+    columns |= {name: _text_column(under.get(name, "") for under in stated) for name in ("state", "note")}
+    columns["reclamped"] = _number_column([row.conditions.reclamped for row in rows])
+    for name in ESTIMATE_UNITS:
+        columns[name], columns[f"{name}_std"] = _number_column([getattr(row, name) for row in rows], 2).T
+    for name in MODEL_VALUE_UNITS:
+        columns[name] = _number_column([getattr(row, name) for row in rows])
+    table = np.full((len(rows), MAX_STORED_MODES, len(MODE_COLUMNS)), np.nan)
+    for i, row in enumerate(rows):
+        table[i, : len(row.modes)] = np.reshape(row.modes, (-1, len(MODE_COLUMNS)))
+    columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
+    if programs:
+        limits = [_program_limits(row.verdicts, programs) for row in rows]
+        columns["program_limit"] = _number_column(limits, len(programs))
+        columns["program_verdict"] = _text_column(_program_verdicts(row.verdicts, programs) for row in rows)
+    speeds = speed_grid(machine)
+    nowhere, diagrams = np.full(speeds.size, np.nan), [compute_row_lobes(row, machine) for row in rows]
+    depth = {}
+    for name in machine.cut_tables:
+        depths = [lobes[name].depth if name in lobes else nowhere for lobes in diagrams]
+        depth[name] = _number_column(depths, speeds.size)
+    units = ESTIMATE_UNITS | {f"{name}_std": unit for name, unit in ESTIMATE_UNITS.items()} | MODEL_VALUE_UNITS
+    units |= MODE_COLUMNS | CONDITION_UNITS
+    units = {name: unit for name, unit in (units | {"program_limit": "m"}).items() if unit and name in columns}
+    return SldHistory(history.settings_hash, history.software, speeds, columns, depth, units)
+
+
+def compute_row_lobes(
+    row: HistoryRow, machine: Machine, names: Collection[str] | None = None
+) -> dict[str, StabilityLobes]:
+    """Compute the lobes of a row as of its time; names: selected cuts."""
+    return compute_tip_lobes(row.tool, _to_modes(row.x), _to_modes(row.y), machine, names)
+
+
+def _to_modes(values: Sequence[ModeValues]) -> list[Mode]:
+    return [Mode(frequency, damping, stiffness, phase_deg=phase) for frequency, damping, stiffness, phase in values]
+
+
+def _program_limits(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> list[float]:
+    """Return the limit of each program (m); NaN without a stored verdict."""
+    return [rulings[name].limit if rulings and name in rulings else np.nan for name in programs]
+
+
+def _program_verdicts(rulings: Mapping[str, StoredVerdict] | None, programs: Sequence[str]) -> str:
+    """Return the verdict on each program, one per line; empty without stored verdicts."""
+    return "\n".join(rulings[name].stability if name in rulings else "" for name in programs) if rulings else ""
+
+
+def _text_column(values: Any) -> NDArray[np.str_]:
+    return np.array(list(values), dtype=np.str_)
+
+
+def _number_column(values: Sequence[Any], *width: int) -> Floats:
+    return np.array(values, dtype=np.float64).reshape(len(values), *width)

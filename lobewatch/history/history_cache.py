@@ -7,20 +7,16 @@ from operator import is_
 
 from acquisition import Remark
 from acquisition.errors import format_error
-from lobewatch.history.history import History, HistoryRow, keep_unusable_row, make_empty_history
-from lobewatch.history.row_codec import decode_row, encode_row
-from lobewatch.history.row_reuse import ReusableRows, is_row_of
-from lobewatch.history.usable_taps import UsableTaps
+from lobewatch.history.history import History, HistoryRow, decode_row, encode_row, keep_unusable_row, make_empty_history
+from lobewatch.history.tap_measurements import NO_REUSABLE_ROWS, ReusableRows, UsableTaps, is_row_of
 from lobewatch.machine import BusyError, Machine, MachineFolder
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
 """Size of obsolete rows, besides that of the valid ones, above which the file is rewritten."""
-UNPLACED_ROW_NUMBER = -1
-"""Number of rows outside of the history."""
 
 
 class HistoryCache:
@@ -39,8 +35,8 @@ class HistoryCache:
         """Rows of other settings or versions by tap test."""
         self.remarks: list[Remark] = []
         """Reasons why something was not written."""
-        self.reusable: ReusableRows | None = None
-        """Rows that were read behind those that `read` gave; None where there are none."""
+        self.reusable = NO_REUSABLE_ROWS
+        """Rows that were read behind those that `read` gave."""
 
     def read(self, files: UsableTaps) -> History:
         """Read the oldest rows that are valid for these settings and this version.
@@ -56,7 +52,7 @@ class HistoryCache:
         kept = tuple(keep_unusable_row(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
         valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
-        self.reusable = ReusableRows(self._rows, files.by_id, files.contents.baselines) if changed else None
+        self.reusable = ReusableRows(self._rows, files.by_id, files.contents.baselines) if changed else NO_REUSABLE_ROWS
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def _count_fitting(self, places: Sequence[TapPlace]) -> int:
@@ -123,7 +119,7 @@ class HistoryCache:
         contents = self._contents[:same] + later
         pairs = zip_longest(later, self._contents[same : len(contents)])
         fresh = [content for content, stored in pairs if content is not stored and content != stored]
-        aside = [encode_row(UNPLACED_ROW_NUMBER, row, hashes) for row in history.kept]
+        aside = [encode_row(-1, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MAX_OBSOLETE_BYTES
         grows = contents[len(self._contents) - 1 :] and self._size + sum(map(len, fresh)) < most
         if self._size and aside == self._aside and path.exists() and grows:
@@ -137,11 +133,11 @@ class HistoryCache:
 
 def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
     """Return the hash of all that decides the verdict on each program, test cuts of its tool included."""
-    taught = {
-        program.name: "".join(f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
-        for program in machine.program
-    }
-    return {name: text + taught[name] for name, text in hash_programs(machine).items()}
+    hashes = hash_programs(machine)
+    for program in machine.program:
+        taught = (f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool)
+        hashes[program.name] += "".join(taught)
+    return hashes
 
 
 def _cache_header(history: History) -> bytes:

@@ -1,18 +1,281 @@
-"""Measurements and history rows of all tap tests of a machine."""
+"""Usable tap tests of a machine, their measurements and history rows, and stored rows that stay valid after a change.
 
+A result depends on its own file, on the followed mode before it, and in the other direction on the test that it is
+taken from. So after an old tap test is added or excluded, only its neighbours are analysed again.
+"""
+
+import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import UTC, datetime
 
-from acquisition import CROSS_TAP, DataError
-from lobewatch.history.history import HistoryRow, keep_older_row, make_row
-from lobewatch.history.row_reuse import FollowedModeIndex, ReusableRows
-from lobewatch.history.usable_taps import NotTappedError
+from acquisition import CROSS_TAP, DataError, Remark
+from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
+from lobewatch.machine.folder import FolderContents
+from lobewatch.machine.journal.alarm_entries import FleetScatter
+from lobewatch.machine.journal.journal import format_command
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
-from lobewatch.tool.assembly import Assembly, assemble, predict_assembly
-from lobewatch.tool.tap_series import FollowedMode, TapPlace, iterate_earlier
+from lobewatch.tool.assembly import MAX_DIRECTION_AGE, Assembly, assemble, predict_assembly
+from lobewatch.tool.tap_series import FollowedMode, TapOrder, TapPlace, iterate_earlier
 
+EARLIEST_TIME = datetime.min.replace(tzinfo=UTC)
+"""Time before all tap tests."""
+
+
+class NotTappedError(DataError):
+    """Raised when a tool was neither tapped nor can be predicted."""
+
+
+class UsableTaps:
+    """Contents of a machine folder, read once."""
+
+    def __init__(self, folder: MachineFolder) -> None:
+        self._folder = folder
+        self._contents: FolderContents | None = None
+        self._order: TapOrder | None = None
+        self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
+
+    @property
+    def contents(self) -> FolderContents:
+        """Contents of the folder: tap tests, events, test cuts and acknowledgements."""
+        if self._contents is None:
+            self._contents = self._folder.contents()
+        return self._contents
+
+    @property
+    def places(self) -> Sequence[TapPlace]:
+        """Usable tap tests, oldest first; newer ones are added to the same sequence."""
+        if self._order is None:
+            usable = [tap for tap in self.contents.taps if tap.id not in self._left_out and not tap.excluded]
+            self._order = TapOrder(self.contents.baselines, usable)
+        return self._order.places
+
+    def place(self, tap_id: str) -> TapPlace:
+        """Return the place of a tap test; KeyError for an unknown one."""
+        for place in reversed(self.places):
+            if place.entry.id == tap_id:
+                return place
+        raise KeyError(tap_id)
+
+    def refuse_excluded(self, tap_id: str) -> None:
+        """Raise DataError for an excluded tap test."""
+        for tap in self.excluded:
+            if tap.id == tap_id:
+                cure = f"{format_command('include', self._folder.path)} {tap_id} takes it back"
+                raise DataError(f"{tap_id}: stored already, but excluded, for {tap.excluded!r}; {cure}")
+
+    def list_until(self, tap_id: str | None) -> list[TapPlace]:
+        """Return the tap tests up to one of them since its baseline; None: up to now."""
+        last = None if tap_id is None else self.place(tap_id)
+        baseline = self.baseline if last is None else last.baseline
+        places = self.places if last is None else self.places[: last.number + 1]
+        return [place for place in places if place.baseline == baseline]
+
+    def list_series(self, tap_id: str) -> list[TapEntry]:
+        """Return the tap tests of the same series; empty for a prediction."""
+        series = {place.entry.id: place.series for place in self.places}
+        return [place.entry for place in self.places if place.series == series.get(tap_id)]
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """Damage that is known so far."""
+        of_files = () if self._contents is None else self._contents.remarks
+        return [*of_files, *(remark for _, remark in self._left_out.values())]
+
+    @property
+    def fleet_scatter(self) -> FleetScatter | None:
+        """First scatter of the fleet since the baseline; None without one."""
+        baseline, scatters = self.baseline, self.contents.fleet_scatters
+        return next((scatter for scatter in scatters if baseline is None or scatter.time >= baseline), None)
+
+    @property
+    def excluded(self) -> Sequence[TapEntry]:
+        """Excluded tap tests, oldest first."""
+        return [tap for tap in self.contents.taps if tap.excluded]
+
+    @property
+    def lost(self) -> Sequence[TapEntry]:
+        """Tap tests with unusable files, excluded ones not included."""
+        lost = [*self.contents.lost, *(entry for entry, _ in self._left_out.values())]
+        return [entry for entry in lost if not entry.excluded]
+
+    @property
+    def by_id(self) -> dict[str, TapEntry]:
+        """All tap tests of the journal by identity."""
+        return {entry.id: entry for entry in (*self.contents.taps, *self.contents.lost)}
+
+    @property
+    def baseline(self) -> datetime | None:
+        """Newest baseline."""
+        return max(self.contents.baselines, default=None)
+
+    def newest(self, tool: str | None) -> TapEntry:
+        """Return the newest tap test since the baseline, of a tool if named; NotTappedError without one."""
+        current = [place.entry for place in self.places if place.baseline == self.baseline]
+        fitting = [tap for tap in current if tool in (None, tap.tool)]
+        if fitting:
+            return fitting[-1]
+        tool_text = "" if tool is None else f" with tool {tool!r}"
+        damaged = [str(remark) for remark in self.remarks]
+        if damaged:
+            raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} that can be used: {'; '.join(damaged)}")
+        cure = "take one with session.TapSession, or replay a recorded file"
+        since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
+        if self.excluded:
+            since += f", but {len(self.excluded)} excluded"
+            cure += f"; {format_command('include', self._folder.path)} TAP takes one back"
+        raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}; {cure}")
+
+    def newest_damaged_remarks(self, tool: str = "") -> tuple[Remark, ...]:
+        """Return remarks on damaged tap tests that are newer than all usable ones of their series."""
+        if not self.lost:
+            return ()
+        usable = {(place.entry.tool, place.entry.direction): place.entry.created for place in self.places}
+        since = self.baseline or EARLIEST_TIME
+        lost = [entry for entry in self.lost if entry.created >= since and tool in ("", entry.tool)]
+        newer = [entry for entry in lost if entry.created > usable.get((entry.tool, entry.direction), EARLIEST_TIME)]
+        text = "newer than all of its tool and direction that can be used, but its file is damaged"
+        return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
+
+    def add(self, entry: TapEntry) -> bool:
+        """Add a newly committed tap test, and tell whether it is the newest and all others are unchanged.
+
+        After a change by another program everything is read again.
+        """
+        if self._contents is None or self._folder.journal.line_count != self._contents.line_count + 1:
+            self.forget()
+            return False
+        self._contents = self._contents.with_tap(entry)
+        if self._order is None or self._contents.taps[-1] is not entry:
+            self._order = None
+            return False
+        self._order.add(entry)
+        return True
+
+    def forget(self) -> None:
+        """Read the folder again at the next use."""
+        self._contents = self._order = None
+
+    def leave_out(self, error: DamagedTapError) -> None:
+        """Leave out a tap test with a damaged file; the error again if it was left out before."""
+        if error.entry.id in self._left_out:
+            raise error
+        self._left_out[error.entry.id] = error.entry, error.remark
+        self._order = None
+
+
+class FollowedModeIndex:
+    """Index of the followed modes of rows, each row read once."""
+
+    def __init__(self) -> None:
+        self._modes: dict[str, dict[str, list[FollowedMode]]] = {}
+        self._numbers: dict[str, dict[str, list[int]]] = {}
+        self._rows = 0
+
+    def before(self, place: TapPlace, rows: Sequence[HistoryRow]) -> dict[str, list[FollowedMode]]:
+        """Return the earlier modes of the series of a tap test by direction; rows: at least the history before it."""
+        for number, row in enumerate(rows[self._rows :], self._rows):
+            if math.isfinite(row.frequency.value) and not row.questions:
+                mode = FollowedMode(row.time, *row.followed)
+                self._modes.setdefault(row.series, {}).setdefault(row.direction, []).append(mode)
+                self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
+        self._rows = max(self._rows, len(rows))
+        numbers = self._numbers.get(place.series, {})
+        earlier: dict[str, list[FollowedMode]] = {"x": [], "y": []}
+        for direction, modes in self._modes.get(place.series, {}).items():
+            earlier[direction] = modes[: bisect_left(numbers[direction], place.number)]
+        return earlier
+
+
+def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
+    """Tell whether a row is of this tap test with the same baseline, answers and mode edits."""
+    tap = place.entry
+    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand
+    return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted), str(tap.by_hand))
+
+
+_RowBasis = tuple[str, str, ModeValues | None, tuple[Remark, ...], tuple[FollowedMode, ...]]
+"""Inputs of a result besides its own file: tap test of the other direction and cross FRF (empty without one), followed
+mode before it, remarks on its mounting, and modes that shift an older direction."""
+
+
+class _RowArchive:
+    """Ordered tap tests with their rows."""
+
+    def __init__(self, ordered: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> None:
+        self.places, self.rows = ordered, rows
+        self._followed = FollowedModeIndex()
+
+    def basis_of(self, place: TapPlace) -> _RowBasis:
+        before = (self.rows[number] for number in iterate_earlier(place, self.places))
+        last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
+        cross = "" if place.cross is None else self.places[place.cross].entry.id
+        if place.other_direction is None:
+            return "", cross, last, place.remarks, ()
+        other = self.places[place.other_direction].entry
+        if place.entry.created - other.created <= MAX_DIRECTION_AGE:
+            return other.id, cross, last, place.remarks, ()
+        points = self._followed.before(place, self.rows)[place.entry.direction]
+        behind = bisect_right(points, other.created, key=lambda point: point.time)
+        near = (*points[max(behind - 1, 0) : behind + 1], *points[-1:])
+        return other.id, cross, last, place.remarks, near
+
+
+class ReusableRows:
+    """Stored rows of a former order, queried in order of time."""
+
+    def __init__(self, rows: Sequence[HistoryRow], taps: Mapping[str, TapEntry], baselines: Sequence[datetime]) -> None:
+        entries = [taps[row.tap_id] for row in rows if row.tap_id in taps]
+        then = TapOrder(baselines, entries).places if len(entries) == len(rows) else []
+        pairs = zip(rows, then, strict=True) if then else ()
+        known = then and all((row.baseline, row.series) == (place.baseline, place.series) for row, place in pairs)
+        self._then = _RowArchive(then, rows)
+        self._numbers = {row.tap_id: number for number, row in enumerate(rows)} if known else {}
+        self._alike: set[str] = set()
+        self._now: _RowArchive | None = None
+
+    def find(self, place: TapPlace, ordered: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> HistoryRow | None:
+        """Return the row of a tap test if it stays valid, without verdicts, which depend on all rows before it.
+
+        rows: of the tap tests before it, all passed to `note` if new.
+        """
+        number = self._numbers.get(place.entry.id)
+        if number is None:
+            return None
+        if self._now is None or self._now.rows is not rows:
+            self._now = _RowArchive(ordered, rows)
+        row, then = self._then.rows[number], self._then.places[number]
+        if row.software or not is_row_of(row, place):
+            return None
+        basis = self._now.basis_of(place)
+        if basis != self._then.basis_of(then) or (basis[0] and not self._is_alike(basis[0], rows, place)):
+            return None
+        self._alike.add(row.tap_id)
+        return replace(row, verdicts=None)
+
+    def note(self, row: HistoryRow) -> None:
+        """Note the row of a tap test that was analysed again."""
+        number = self._numbers.get(row.tap_id)
+        if number is not None and _encode_content(row) == _encode_content(self._then.rows[number]):
+            self._alike.add(row.tap_id)
+
+    def _is_alike(self, tap_id: str, rows: Sequence[HistoryRow], place: TapPlace) -> bool:
+        """Tell whether the row of an earlier tap test is unchanged."""
+        if tap_id in self._alike:
+            return True
+        number, other = self._numbers.get(tap_id), place.other_direction
+        return number is not None and other is not None and rows[other] is self._then.rows[number]
+
+
+def _encode_content(row: HistoryRow) -> bytes:
+    return encode_row(0, replace(row, verdicts=None), {})
+
+
+NO_REUSABLE_ROWS = ReusableRows((), {}, ())
+"""No stored rows of a former order."""
 MAX_MEASUREMENTS_IN_MEMORY = 500
 """Largest number of measurements in memory, those used last."""
 
@@ -83,7 +346,7 @@ class TapMeasurements:
             raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
 
     def all_rows(
-        self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows | None = None
+        self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows
     ) -> tuple[HistoryRow, ...]:
         """Return these rows and those of all later tap tests.
 
@@ -92,11 +355,10 @@ class TapMeasurements:
         """
         rows = list(rows)
         for place in self._places[len(rows) :]:
-            row = behind.find(place, self._places, rows) if behind is not None else None
+            row = behind.find(place, self._places, rows)
             if row is None:
                 row = self._row(place, rows, older_rows)
-                if behind is not None:
-                    behind.note(row)
+                behind.note(row)
             rows.append(row)
         return tuple(rows)
 

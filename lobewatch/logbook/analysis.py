@@ -7,10 +7,9 @@ from datetime import UTC, datetime
 from lobewatch.cuts.learning.verdict_at_speed import evaluate_at_speed
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
-from lobewatch.history.tap_measurements import TapMeasurements
-from lobewatch.history.usable_taps import NotTappedError, UsableTaps
+from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
@@ -109,7 +108,8 @@ class Analysis:
     @property
     def calibrated_measurement(self) -> Measurement | None:
         """Newest measurement with calibrated bearings, or None."""
-        newest = self.history.newest_calibrated
+        rows = (row for row in reversed(self.history.current) if not row.questions and row.bearing_stiffness.is_known)
+        newest = next(rows, None)
         return None if newest is None else self.measurement(newest.tap_id)
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:

@@ -10,10 +10,10 @@ from acquisition import DataError, Frf, Remark
 from dsm import Modes, Spindle, WhirlMap, mode_shapes, natural_frequencies, stiffness_curve, whirl_map
 from lobes import PocketShift, match_pockets
 from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
-from lobewatch.history.usable_taps import NotTappedError
+from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement.spindle_model import (
     MODEL_FRF_POINTS,
     ModelState,

@@ -16,7 +16,7 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import lobewatch_version, resolve_cutting_time, store_cut
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.settings.drive_power import CutPower
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tool.assembly import Assembly

@@ -12,13 +12,12 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, Remark, TapTest
 from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
-from lobewatch.history.tap_measurements import TapMeasurements
-from lobewatch.history.usable_taps import UsableTaps
+from lobewatch.history.tap_measurements import TapMeasurements, UsableTaps
 from lobewatch.logbook import recordings
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
 from lobewatch.machine.folder_updates import store_mode_edits
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.verify_files import enter_orphaned_taps
 from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap

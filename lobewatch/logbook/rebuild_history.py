@@ -11,7 +11,7 @@ from acquisition import DataError, read_tap
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine, ProgramTable, TapEntry
-from lobewatch.machine.folder_contents import find_file_fault
+from lobewatch.machine.folder import find_file_fault
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of

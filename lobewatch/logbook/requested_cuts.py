@@ -12,7 +12,7 @@ from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 from lobewatch.machine.settings.requested_cut import (
     build_cut_without_setting,
     build_requested_program,
@@ -89,7 +89,7 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
     by_name = {table.name: table for table in machine.all_programs}
     chosen = [find_by_name(by_name, name).name for name in names] or list(by_name)
     logbook.newest_tap()
-    incomplete = [table for table in machine.incomplete_programs if table.name in chosen]
+    incomplete = [table for table in machine.all_programs if table.is_incomplete and table.name in chosen]
     has_complete = any(table.name in chosen for table in machine.program)
     verdicts = logbook.verdicts(names=chosen if names else None) if has_complete else []
     return RequestedVerdicts(verdicts, [_recommend_for_program(logbook, table) for table in incomplete])

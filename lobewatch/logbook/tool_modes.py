@@ -124,7 +124,7 @@ def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> Tapped
         measurement.followed,
         tuple(mode for mode in select_credible_modes(in_band).modes if mode is not measurement.followed),
         scatter.frequency / HALF_WIDTH_95_PER_STD,
-        machine.drawing_tolerance,
+        machine.spindle.tolerance if machine.spindle else 0.0,
     )
 
 

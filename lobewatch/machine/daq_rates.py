@@ -85,8 +85,8 @@ def check_device_rate(
 
 def _measure_rate(device: Device, seconds: float, clock: Callable[[], float]) -> MeasuredRate:
     """Measure until a rate is certain, and return the most certain one."""
-    tries = [acquisition.measure_rate(device, seconds, clock)]
-    while not tries[-1].is_accurate and len(tries) < MAX_RATE_MEASUREMENTS:
+    tries = list[MeasuredRate]()
+    while not (tries and tries[-1].is_accurate) and len(tries) < MAX_RATE_MEASUREMENTS:
         tries.append(acquisition.measure_rate(device, seconds, clock))
     return min(tries, key=lambda measured: measured.std / measured.rate)
 
@@ -177,13 +177,13 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
     path = folder.path / "daq.json"
     try:
         entries = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=list[StoredDevice])
+        if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
+            raise ValueError("altered since it was written")
+        return entries
     except FileNotFoundError:
         return []
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
-    if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
-        raise DataError(f"{path}: altered since it was written; delete this file, the DAQ's rate is then measured anew")
-    return entries
 
 
 def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:

@@ -1,23 +1,186 @@
-"""Machine folder: machine.toml, taps/, journal.jsonl, spool/ and history.rows."""
+"""Machine folder: machine.toml, taps/, journal.jsonl, spool/ and history.rows, and what journal and taps/ prove."""
 
+import errno
+import hashlib
+import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
+from typing import Self
 
 import msgspec
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
-from acquisition.file_io import make_folder, sync_folder
-from lobewatch.machine import folder_contents
+from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
-from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, make_entry
+from lobewatch.machine.journal import entries as journal_entries
+from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
+from lobewatch.machine.journal.entries import CutEntry, RecordingFile
+from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, journal_damage_remark, make_entry
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
+from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
 from lobewatch.machine.settings.toml import read_toml_text
+
+MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
+"""Limits of the newest tap files whose SHA-256 is checked at every reading; lobewatch verify checks all."""
+MAX_LISTED_FILES = 20
+"""Largest number of unlisted files that are listed one by one; chosen."""
+
+
+@dataclass(frozen=True)
+class FolderContents:
+    """Tap tests, test cuts and events of a machine folder."""
+
+    taps: tuple[TapEntry, ...]
+    """Usable tap tests, oldest first."""
+    lost: tuple[TapEntry, ...]
+    """Committed tap tests with damaged files, oldest first."""
+    remarks: tuple[Remark, ...]
+    """Remarks on damage."""
+    events: tuple[journal_entries.MaintenanceEvent, ...] = ()
+    """Maintenance of the machine, oldest first."""
+    line_count: int = 0
+    """Number of lines of the journal."""
+    cuts: tuple[CutEntry, ...] = ()
+    """Test cuts, oldest first, excluded ones included."""
+    acknowledgements: tuple[Acknowledgement, ...] = ()
+    """Acknowledgements of alarms, oldest first."""
+    fleet_scatters: tuple[FleetScatter, ...] = ()
+    """Scatter of the other machines of the fleet, oldest first."""
+
+    def with_tap(self, entry: TapEntry) -> Self:
+        """Return the contents with a newly committed tap test."""
+        is_newest = not self.taps or self.taps[-1].created <= entry.created
+        taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
+        return replace(self, taps=taps, line_count=self.line_count + 1)
+
+    @property
+    def baselines(self) -> list[datetime]:
+        """Times of new baselines, oldest first."""
+        return [event.time for event in self.events if event.new_baseline]
+
+
+def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContents:
+    """Read the contents that the journal and taps/ prove together."""
+    committed = journal_entries.read_committed_taps(reading)
+    remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
+    sizes, given_up, proved = _list_tap_sizes(folder), journal_entries.read_given_up_ids(reading), 0
+    for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
+        proved += entry.size
+        is_old = proved > MAX_HASHED_BYTES or count >= MAX_HASHED_FILES
+        fault = "" if is_old and sizes.get(entry.id) == entry.size else find_file_fault(folder, entry)
+        (lost if fault else taps).append(entry)
+        if fault:
+            remarks.append(tap_damage_remark(folder, entry, fault, entry.id in given_up))
+    taps.reverse()
+    extra = [folder / "taps" / f"{name}.h5" for name in sorted(sizes.keys() - committed.keys())]
+    missing = not reading.lines and not reading.damage and any(_lacks_known_origin(folder, path) for path in extra)
+    if missing:
+        remarks.append(missing_journal_remark(folder, len(extra)))
+    if reading.damage or missing:
+        whole = [tap for path in extra if (tap := read_unverified_tap(path)) and tap.id == path.stem]
+        taps = [*_sort_by_time([*taps, *whole])]
+    else:
+        cure = f"{format_command('verify', folder)} says what it is and what to do"
+        text = "not in the journal, does not count"
+        remarks += [unlisted_file_remark(path, text, cure) for path in extra[:MAX_LISTED_FILES]]
+        if extra[MAX_LISTED_FILES:]:
+            text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
+            remarks.append(Remark("tap-unlisted", "taps", text, cure))
+    lines = reading.other_entries
+    acknowledged = tuple(msgspec.convert(line, Acknowledgement) for line in lines if line["kind"] == "ack")
+    scatters = tuple(msgspec.convert(line, FleetScatter) for line in lines if line["kind"] == "scatter")
+    cuts, events = journal_entries.read_committed_cuts(reading), journal_entries.read_events(lines)
+    tests = tuple(taps), _sort_by_time(lost), tuple(remarks)
+    return FolderContents(*tests, events, len(reading.lines), cuts, acknowledged, scatters)
+
+
+def _list_tap_sizes(folder: Path) -> dict[str, int]:
+    """Return the sizes (bytes) of the files in taps/ by identity."""
+    if not (folder / "taps").is_dir():
+        return {}
+    with os.scandir(folder / "taps") as listing:
+        files = [file for file in listing if file.name.endswith(".h5") and not file.name.startswith(".")]
+        return {file.name[:-3]: file.stat().st_size for file in files}
+
+
+def list_tap_files(folder: Path) -> Mapping[str, Path]:
+    """Return the tap files in taps/ by identity."""
+    taps = folder / "taps"
+    files = sorted(taps.glob("*.h5")) if taps.is_dir() else []
+    return {path.stem: path for path in files if not path.name.startswith(".")}
+
+
+def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
+    """Return the fault of a committed file; empty if it has the committed content.
+
+    Raises OSError if this program can open no more files.
+    """
+    try:
+        with open_regular_file(f"{folder}/{entry.file}") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size != entry.size:
+                return f"{size} bytes, not {entry.size} as when it was written"
+            digest = hashlib.sha256(file.read()).hexdigest()
+        if digest != entry.sha256:
+            return "altered since it was written (SHA-256 differs)"
+    except FileNotFoundError:
+        return "named in the journal but missing"
+    except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE):  # nothing is said of this file
+            raise
+        return f"cannot be read ({error.strerror})"
+    return ""
+
+
+def hash_file(path: Path) -> str:
+    """Return the SHA-256 of a file; empty if it cannot be read."""
+    try:
+        return hashlib.sha256(read_regular_file(path)).hexdigest()
+    except OSError:
+        return ""
+
+
+def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
+    """Return the remark on a tap test with a damaged file."""
+    text = f"{fault}; results are those of the other tap tests"
+    if is_given_up:
+        return Remark("tap-lost", entry.file, text)
+    cure = f"put it back from a backup; without one, {format_command('rebuild', folder)} goes on without it"
+    return Remark("tap-damaged", entry.file, text, cure)
+
+
+def missing_journal_remark(folder: Path, count: int) -> Remark:
+    """Return the remark on tap files without a journal."""
+    return journal_damage_remark(Journal(folder).path, f"is missing beside {count} tap file{'s' if count > 1 else ''}")
+
+
+def has_known_origin(folder: Path, entry: TapEntry) -> bool:
+    """Tell whether a tap file without a line comes from an interrupted program whose hits or recording exist."""
+    return bool(entry.source_sha256) or (folder / "spool" / entry.id).is_dir()
+
+
+def _lacks_known_origin(folder: Path, path: Path) -> bool:
+    if (folder / "spool" / path.stem).is_dir():
+        return False
+    entry = read_unverified_tap(path)
+    return entry is None or not has_known_origin(folder, entry)
+
+
+def unlisted_file_remark(path: Path, text: str, cure: str) -> Remark:
+    """Return the remark on a file in taps/ without a line."""
+    return Remark("tap-unlisted", f"taps/{path.name}", text, cure)
+
+
+def _sort_by_time(entries: Iterable[TapEntry]) -> tuple[TapEntry, ...]:
+    return tuple(sorted(entries, key=attrgetter("created")))
 
 
 class MachineFolder:
@@ -46,7 +209,7 @@ class MachineFolder:
         """Folder of the hits of tests in progress."""
         if format_path(path) != str(path):
             raise DataError(f"{format_path(path)}: the name of the folder is no UTF-8; rename it")
-        if not self.toml.exists() and folder_contents.list_tap_files(self.path):
+        if not self.toml.exists() and list_tap_files(self.path):
             mend = f"{format_command('rebuild', self.path)} takes the copy in the newest of them"
             raise DataError(f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, {mend}")
         if not self.toml.exists():
@@ -94,9 +257,9 @@ class MachineFolder:
         """
         return self._lock.hold(patience)
 
-    def contents(self) -> folder_contents.FolderContents:
+    def contents(self) -> FolderContents:
         """Read the committed tap tests and the state of their files."""
-        return folder_contents.read_folder_contents(self.path, self.journal.read())
+        return read_folder_contents(self.path, self.journal.read())
 
     def taps(self) -> list[TapEntry]:
         """Return the usable tap tests, oldest first."""
@@ -105,14 +268,14 @@ class MachineFolder:
     @property
     def committed_ids(self) -> set[str]:
         """Identities of all tap tests in the journal."""
-        return set(folder_contents.read_committed_taps(self.journal.read()))
+        return set(journal_entries.read_committed_taps(self.journal.read()))
 
     def refuse_damage(self) -> JournalReading:
         """Read the journal; DataError if it must be repaired before writing."""
         reading = self.journal.read()
         self.journal.refuse_damage(reading)
         if not reading.lines and any(remark.code == "journal-damaged" for remark in self.contents().remarks):
-            missing = folder_contents.missing_journal_remark(self.path, len(folder_contents.list_tap_files(self.path)))
+            missing = missing_journal_remark(self.path, len(list_tap_files(self.path)))
             self.journal.refuse_damage(replace(reading, damage=(missing,)))
         return reading
 
@@ -129,9 +292,9 @@ class MachineFolder:
         DamagedTapError
             If the file is not the committed one.
         """
-        fault = folder_contents.find_file_fault(self.path, entry)
+        fault = find_file_fault(self.path, entry)
         if fault:
-            raise DamagedTapError(folder_contents.tap_damage_remark(self.path, entry, fault), entry, self.path)
+            raise DamagedTapError(tap_damage_remark(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
             return read_tap(path)

@@ -26,11 +26,6 @@ LOCK_TIMEOUT = 5.0
 LOCK_POLL_INTERVAL = 0.01
 """Time between two attempts (s)."""
 
-READ_ONLY_HINT = "it can be read, not written; copy it to where you may write"
-NO_LOCKS_HINT = (
-    "it can be read, but not locked for writing; mount that drive with locks, or copy the folder to another one"
-)
-
 
 class BusyError(DataError):
     """Raised when another program writes to the folder."""
@@ -94,23 +89,21 @@ class FolderLock:
         except (FileNotFoundError, NotADirectoryError) as error:
             raise type(error)(error.errno, error.strerror, str(self._folder)) from error
         except OSError as error:
-            cure = READ_ONLY_HINT if error.errno in PERMISSION_ERRNOS else NO_LOCKS_HINT
-            raise OSError(error.errno, f"{error.strerror}: {cure}", str(self._folder)) from error
+            cure = "not written; copy it to where you may write"
+            if error.errno not in PERMISSION_ERRNOS:
+                cure = "but not locked for writing; mount that drive with locks, or copy the folder to another one"
+            raise OSError(error.errno, f"{error.strerror}: it can be read, {cure}", str(self._folder)) from error
 
     def _wait(self, handle: int, patience: float) -> None:
         deadline = time.monotonic() + patience
         while not lock_descriptor(handle, blocking=False):
             if time.monotonic() >= deadline:
-                holder = self._read_holder() or "another lobewatch"
+                holder: object = "another lobewatch"
+                with contextlib.suppress(OSError, msgspec.MsgspecError):  # it has not written its name yet
+                    content = read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE)
+                    holder = msgspec.json.decode(content, type=LockHolder)
                 raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
             time.sleep(LOCK_POLL_INTERVAL)
-
-    def _read_holder(self) -> LockHolder | None:
-        """Return the program that holds the lock; None until it has written its name."""
-        try:
-            return msgspec.json.decode(read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE), type=LockHolder)
-        except (OSError, msgspec.MsgspecError):
-            return None
 
 
 RESERVE_BYTES = 50_000_000

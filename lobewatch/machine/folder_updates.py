@@ -5,17 +5,19 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
+from acquisition import check_name
 from acquisition.file_io import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
-from lobewatch.machine.journal.cut_entry import CUT_LINE_KIND, CutEntry, RecordingFile
+from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import JournalReading, make_entry
+from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import CutSetting
@@ -27,8 +29,6 @@ TOOTH_FREQUENCY_TOLERANCE = 0.005
 """Relative distance from a multiple of the tooth passing frequency within which a sound is not chatter; chosen."""
 SAME_SPEED_TOLERANCE, SAME_DEPTH_TOLERANCE = 2e-3, 1e-2
 """Relative differences of speeds and depths within which two cuts count as the same point; chosen."""
-LEADING_PROGRAM_KEYS = ("name", "tool")
-"""First keys of a written [[program]]; the others follow in the order of `ProgramTable`."""
 
 
 def add_event(
@@ -36,15 +36,45 @@ def add_event(
 ) -> lines.MaintenanceEvent:
     """Write a maintenance event to the journal.
 
-    date: None for now; local time without a zone. Raises ValueError for an invalid event, BusyError if another program
-    writes.
+    date: None for now, local time without a zone, the whole day at midnight. Raises ValueError for an empty text, a
+    date in the future, a duplicate, and a new baseline on a whole day with tap tests, whose order is then unknown;
+    BusyError if another program writes.
     """
     with folder.locked():
         now, entries = datetime.now(UTC), folder.journal.read().entries
-        event = lines.make_event(entries, folder.taps(), text, date, new_baseline, now)
+        if not text.strip():
+            raise ValueError('the event has no text; say what was done, such as "bearings replaced"')
+        check_name(text, "event")
+        time = now if date is None else _to_utc(date)
+        if time - now > timedelta(days=1):
+            raise ValueError(f"MaintenanceEvent.time {date}: lies in the future; give the day on which it was done")
+        same = [event.id for event in lines.read_events(entries) if (event.time, event.text) == (time, text)]
+        if same:
+            listing = "MachineFolder.contents lists all events"
+            raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; {listing}")
+        if new_baseline and date is not None and date.time() == datetime.min.time():
+            _refuse_tapped_day(folder.taps(), time)
+        number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
+        event = lines.MaintenanceEvent(f"e{number}", time, text, new_baseline)
         fields = {"id": event.id, "date": event.time.isoformat(), "text": text, "new_baseline": new_baseline}
         folder.journal.append(make_entry("event", now, **fields))
     return event
+
+
+def _to_utc(date: datetime) -> datetime:
+    try:
+        return date.astimezone(UTC)
+    except (OverflowError, ValueError) as error:
+        raise ValueError(f"MaintenanceEvent.time {date}: is out of range; give a date after 1970-01-01") from error
+
+
+def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
+    tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
+    if tapped:
+        clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
+        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
+        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
+        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
 
 
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:
@@ -60,19 +90,27 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEve
 def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.ExcludableEntry:
     """Exclude a tap test from its series, or a test cut from learning.
 
-    name: identity, file, or a part of the identity that no other entry has.
+    name: identity, file, or a part of the identity that no other entry has. Raises ValueError if it is excluded, or
+    without a reason.
     """
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_exclusion_line(entry, reason))
+        if entry.excluded:
+            raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
+        if not reason.strip():
+            raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
+        check_name(reason, "reason")
+        folder.journal.append(make_entry("exclude", tap=entry.id, reason=reason))
     return entry
 
 
 def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
-    """Include an excluded tap test or test cut again."""
+    """Include an excluded tap test or test cut again; ValueError if it is not excluded."""
     with folder.locked():
         entry = _find_entry(folder, name)
-        folder.journal.append(lines.make_inclusion_line(entry))
+        if not entry.excluded:
+            raise ValueError(f"{entry.id}: is not excluded; it counts already")
+        folder.journal.append(make_entry("include", tap=entry.id))
     return entry
 
 
@@ -119,18 +157,14 @@ def _next_cut_id(folder: MachineFolder, reading: JournalReading) -> str:
 
 
 def make_observed_cut(
-    setting: CutSetting,
-    word: Literal["stable", "chatter"],
-    frequency: float | None = None,
-    at: datetime | None = None,
-    now: datetime | None = None,
+    setting: CutSetting, word: Literal["stable", "chatter"], frequency: float | None = None, at: datetime | None = None
 ) -> CutEntry:
     """Make the entry of a test cut that a person has observed; `store_cut` gives it its identity.
 
     frequency: of the chatter (Hz). at: time of the cut, None for now. Raises ValueError for a frequency that cannot be
     chatter, and for a date in the future.
     """
-    when = resolve_cutting_time(at, now or datetime.now(UTC))
+    when = resolve_cutting_time(at, datetime.now(UTC))
     _check_chatter_frequency(setting, word, frequency)
     fields = setting.cut_entry_fields(setting.speed_rpm)
     fields |= {"word": word, "chatter_frequency_hz": frequency, "by": "ear", "software": lobewatch_version()}
@@ -163,13 +197,10 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
 
 def find_contradicting_cuts(cut: CutEntry, earlier: Sequence[CutEntry]) -> list[CutEntry]:
     """Return the earlier usable cuts at the same point with the opposite result."""
-    return [old for old in earlier if old.is_usable and _is_same_point(old, cut) and old.has_chatter != cut.has_chatter]
-
-
-def _is_same_point(old: CutEntry, new: CutEntry) -> bool:
-    is_same_cut = (old.tool, old.cut, old.feed) == (new.tool, new.cut, new.feed)
-    is_same_speed = abs(old.speed_rpm - new.speed_rpm) <= SAME_SPEED_TOLERANCE * new.speed_rpm
-    return is_same_cut and is_same_speed and abs(old.depth - new.depth) <= SAME_DEPTH_TOLERANCE * new.depth
+    opposite = [old for old in earlier if old.is_usable and old.has_chatter != cut.has_chatter]
+    same = [old for old in opposite if (old.tool, old.cut, old.feed) == (cut.tool, cut.cut, cut.feed)]
+    same = [old for old in same if abs(old.speed_rpm - cut.speed_rpm) <= SAME_SPEED_TOLERANCE * cut.speed_rpm]
+    return [old for old in same if abs(old.depth - cut.depth) <= SAME_DEPTH_TOLERANCE * cut.depth]
 
 
 def check_program_name(machine: Machine, name: str) -> None:
@@ -183,22 +214,18 @@ def check_program_name(machine: Machine, name: str) -> None:
 def save_program(folder: MachineFolder, program: ProgramTable) -> None:
     """Add a program to machine.toml, which keeps its comments and order.
 
-    Raises ValueError for a used name, DataError if the file cannot be edited.
+    Name and tool come first, then all values that differ from the defaults. Raises ValueError for a used name,
+    DataError if the file cannot be edited.
     """
     with folder.locked():
         current = MachineFolder(folder.path)
         check_program_name(current.machine, program.name)
         place = TablePath("program", len(current.machine.all_programs))
-        text = edit_toml(current.toml_text, place, _changed_values(program))
+        fields = msgspec.structs.fields(program)
+        values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
+        text = edit_toml(current.toml_text, place, {"name": program.name, "tool": program.tool} | values)
         parse_machine_file(text, str(current.toml))
         write_machine_file(current.path, text)
-
-
-def _changed_values(program: ProgramTable) -> dict[str, Any]:
-    """Return name and tool, then all values that differ from the defaults."""
-    fields = msgspec.structs.fields(program)
-    values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
-    return {key: getattr(program, key) for key in LEADING_PROGRAM_KEYS} | values
 
 
 def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:

@@ -11,38 +11,35 @@ from typing import Any
 from acquisition import DataError, Remark, read_tap
 from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
 from acquisition.files.cut_file import read_cut_signal
-from lobewatch.machine import folder_contents as contents
+from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
-from lobewatch.machine.journal.cut_entry import CutEntry, RecordingFile, parse_cut_line
+from lobewatch.machine.journal import entries as journal_entries
+from lobewatch.machine.journal.entries import CutEntry, RecordingFile, parse_cut_line
 from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
-LOST_ENTRIES_HINT = (
-    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
-    "(folder_updates.add_event, exclude_entry, MachineFolder.accept, folder_updates.store_cut)"
-)
+LOST_ENTRIES_HINT = "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: "
+LOST_ENTRIES_HINT += "enter them again (folder_updates.add_event, exclude_entry, MachineFolder.accept, "
+LOST_ENTRIES_HINT += "folder_updates.store_cut)"
 """Advice on entries that no copy of the journal has."""
 
 
 def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Remark]:
     """Yield remarks on recordings that are altered, missing or unlisted."""
-    cuts, given_up = contents.read_committed_cuts(reading), contents.read_given_up_ids(reading)
+    cuts, given_up = journal_entries.read_committed_cuts(reading), journal_entries.read_given_up_ids(reading)
     mend = format_command("rebuild", folder)
-    for cut in cuts:
-        fault = "" if cut.recording is None else contents.find_file_fault(folder, cut.recording)
-        if not fault or cut.recording is None:
-            continue
+    for recording, fault in _find_damaged_recordings(folder, cuts):
         text = f"{fault}; what was heard in it counts"
-        if cut.id in given_up:
-            yield Remark("cut-lost", cut.recording.file, text)
+        if recording.id in given_up:
+            yield Remark("cut-lost", recording.file, text)
         else:
             cure = f"put it back from a backup; without one, {mend} goes on without it"
-            yield Remark("cut-damaged", cut.recording.file, text, cure)
+            yield Remark("cut-damaged", recording.file, text, cure)
     for path in _list_unlisted_cuts(folder, cuts):
         yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal, does not count", f"{mend} looks into it")
 
@@ -52,9 +49,9 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
 
     The result of a lost recording is in its journal line and stays valid.
     """
-    for path in _list_unlisted_cuts(folder, contents.read_committed_cuts(journal.read())):
+    for path in _list_unlisted_cuts(folder, journal_entries.read_committed_cuts(journal.read())):
         cut = _read_unlisted_cut(path)
-        if cut is None or cut.id in {entered.id for entered in contents.read_committed_cuts(journal.read())}:
+        if cut is None or cut.id in {entered.id for entered in journal_entries.read_committed_cuts(journal.read())}:
             yield _set_aside(folder, path)
             continue
         content = read_regular_file(path)
@@ -62,13 +59,18 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
         journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
         yield f"cuts/{path.name}: entered in the journal"
     reading = journal.read()
-    recordings = [cut.recording for cut in contents.read_committed_cuts(reading) if cut.recording is not None]
-    for lost in [recording for recording in recordings if contents.find_file_fault(folder, recording)]:
+    for lost, _ in _find_damaged_recordings(folder, journal_entries.read_committed_cuts(reading)):
         if (folder / lost.file).exists():
             _move_to_damaged(folder, folder / lost.file)
-        if lost.id not in contents.read_given_up_ids(reading):
+        if lost.id not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=lost.id))
             yield f"{lost.file}: lost; what was heard in it goes on to count"
+
+
+def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[tuple[RecordingFile, str]]:
+    """Return the damaged recordings of test cuts with their faults."""
+    recordings = [cut.recording for cut in cuts if cut.recording is not None]
+    return [(file, fault) for file in recordings if (fault := contents.find_file_fault(folder, file))]
 
 
 def _list_unlisted_cuts(folder: Path, cuts: Sequence[CutEntry]) -> list[Path]:
@@ -99,7 +101,7 @@ def rebuild_files(path: Path) -> list[str]:
     with FolderLock(path).hold(LOCK_TIMEOUT):
         journal = Journal(path)
         reading = journal.read()
-        committed = contents.read_committed_taps(reading)
+        committed = journal_entries.read_committed_taps(reading)
         report = [*_restore_misplaced(path, committed)]
         fresh = _enter_unlisted_taps(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
@@ -165,12 +167,12 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
 def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
     """Write to the journal which tap tests are lost."""
     reading = journal.read()
-    for name, entry in contents.read_committed_taps(reading).items():
+    for name, entry in journal_entries.read_committed_taps(reading).items():
         if not contents.find_file_fault(folder, entry):
             continue
         if (folder / entry.file).exists() and not _is_temporarily_unreadable(folder / entry.file):
             _move_to_damaged(folder, folder / entry.file)
-        if name not in contents.read_given_up_ids(reading):
+        if name not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=name))
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
@@ -189,7 +191,7 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     toml = folder / "machine.toml"
     if toml.exists():
         return
-    committed = contents.read_committed_taps(Journal(folder).read()).values()
+    committed = journal_entries.read_committed_taps(Journal(folder).read()).values()
     sound = [entry for entry in committed if not contents.find_file_fault(folder, entry)]
     for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml

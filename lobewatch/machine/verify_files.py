@@ -3,7 +3,6 @@
 import contextlib
 import difflib
 import json
-import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +11,13 @@ from acquisition import DataError, Remark, Trigger
 from acquisition.errors import format_error
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from acquisition.files.hdf5_file import has_valid_checksum
-from lobewatch.machine import folder_contents as contents
+from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
-from lobewatch.machine.journal.journal import JOURNAL_COPY_NAME, JOURNAL_NAME, Journal, JournalReading, format_command
+from lobewatch.machine.journal import entries as journal_entries
+from lobewatch.machine.journal import journal
+from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.rebuild_files import verify_cut_recordings
@@ -24,11 +25,10 @@ from lobewatch.machine.row_file import read_rows
 
 DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
 """Codes of remarks on damage; all others are information."""
-DERIVED_FILES = ("history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "report.html")
-"""Files that are made again if they are deleted."""
-LOBEWATCH_FILES = {JOURNAL_NAME, JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml", *DERIVED_FILES}
-LOBEWATCH_FILES |= {"taps", "cuts", "spool"}
-"""Files and folders in a machine folder that lobewatch writes."""
+LOBEWATCH_FILES = {journal.JOURNAL_NAME, journal.JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml"}
+LOBEWATCH_FILES |= {"history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "taps", "cuts", "spool"}
+"""Files and folders in a machine folder that are verified, or made again if they are deleted."""
+DELETION_ADVICE = "delete it when you do not need it"
 ALTERED_TEXT = "altered or cut short since it was written"
 """Fault of a file with a wrong checksum."""
 
@@ -73,23 +73,17 @@ def verify(path: Path) -> Verification:
     if not (path / "machine.toml").is_file() and contents.list_tap_files(path):
         mend = format_command("rebuild", path)
         cure = f"put it back from a backup; without one, {mend} takes the copy in the newest tap test"
-        missing = _damaged_file_remark("machine.toml", "is missing beside tap tests", cure)
+        missing = Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure)
         return Verification((missing,), (), 0)
     folder = MachineFolder(path)
     entered = enter_orphaned_taps(folder)
     reading = folder.journal.read()
-    committed = contents.read_committed_taps(reading)
+    committed = journal_entries.read_committed_taps(reading)
     faults = {name: fault for name, entry in committed.items() if (fault := contents.find_file_fault(path, entry))}
-    remarks = [
-        *reading.damage,
-        *_verify_taps(path, reading, committed, faults),
-        *verify_cut_recordings(path, reading),
-        *_verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults]),
-        *_verify_history(folder),
-        *_verify_devices(folder),
-        *_verify_spool(path, committed.keys() - faults.keys()),
-        *_verify_names(path),
-    ]
+    remarks = [*reading.damage, *_verify_taps(path, reading, committed, faults), *verify_cut_recordings(path, reading)]
+    remarks += _verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults])
+    remarks += [*_verify_history(folder), *_verify_devices(folder)]
+    remarks += [*_verify_spool(path, committed.keys() - faults.keys()), *_verify_names(path)]
     return Verification(tuple(remarks), tuple(entered), len(committed) - len(faults))
 
 
@@ -98,13 +92,13 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
 
     Nothing happens if another program writes, the journal is damaged, or the folder cannot be written.
     """
-    journal, entered = folder.journal, list[str]()
+    entered = list[str]()
     with contextlib.suppress(DataError, OSError), folder.locked(patience=0):
-        committed = set(contents.read_committed_taps(journal.read()))
+        committed = folder.committed_ids
         for name, path in contents.list_tap_files(folder.path).items():
             entry = read_unverified_tap(path) if name not in committed else None
             if entry is not None and entry.id == name and contents.has_known_origin(folder.path, entry):
-                journal.append(entry.line)
+                folder.journal.append(entry.line)
                 entered.append(entry.file)
     return entered
 
@@ -112,9 +106,9 @@ def enter_orphaned_taps(folder: MachineFolder) -> list[str]:
 def _verify_taps(
     folder: Path, reading: JournalReading, committed: dict[str, TapEntry], faults: dict[str, str]
 ) -> Iterator[Remark]:
-    by_content, given_up = {entry.sha256: entry for entry in committed.values()}, contents.read_given_up_ids(reading)
-    files = contents.list_tap_files(folder)
-    late = contents.read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
+    by_content = {entry.sha256: entry for entry in committed.values()}
+    given_up, files = journal_entries.read_given_up_ids(reading), contents.list_tap_files(folder)
+    late = journal_entries.read_committed_taps(Journal(folder).read())  # what another program has committed meanwhile
     extra = [path for name, path in files.items() if name not in committed and name not in late]
     if not reading.lines and not reading.damage and extra:
         yield contents.missing_journal_remark(folder, len(extra))
@@ -156,7 +150,7 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
     except (ValueError, OSError) as error:
         mend = "rebuild_files.rebuild_files then takes the copy in the newest tap test"
         cure = f"correct it; without a way to, move it away: {mend}"
-        yield _damaged_file_remark("machine.toml", format_error(error), cure)
+        yield Remark("file-damaged", "machine.toml", format_error(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
     copy = ""
@@ -180,37 +174,28 @@ def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
         fault = format_error(error).removeprefix(f"{folder.history_path}: ")
     if fault:
         cure = f"{format_command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield _damaged_file_remark(folder.history_path.name, fault, cure)
+        yield Remark("file-damaged", folder.history_path.name, fault, cure)
 
 
 def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_stored_devices(folder)
     except (DataError, OSError) as error:
-        yield _damaged_file_remark("daq.json", format_error(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+        yield Remark("file-damaged", "daq.json", format_error(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
+    known = {"report.html": ("a report is not verified", f"{format_command('report', folder)} writes it anew")}
+    known["history.h5"] = "no cache any more, or an export", DELETION_ADVICE
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield Remark("set-aside", path.name, "left over or set aside", "delete it when you do not need it")
-        elif path.name == "report.html":
-            cure = f"{format_command('report', folder)} writes it anew"
-            yield Remark("not-verified", path.name, "a report is not verified", cure)
-        elif path.name == "history.h5":
-            yield Remark(
-                "not-verified", path.name, "no cache any more, or an export", "delete it when you do not need it"
-            )
+            yield Remark("set-aside", path.name, "left over or set aside", DELETION_ADVICE)
         elif path.name not in LOBEWATCH_FILES:
-            yield Remark("not-verified", path.name, "no file of lobewatch")
+            yield Remark("not-verified", path.name, *known.get(path.name, ("no file of lobewatch",)))
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
             yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
-
-
-def _damaged_file_remark(about: str, text: str, cure: str = "") -> Remark:
-    return Remark("file-damaged", about, text, cure)
 
 
 def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
@@ -228,7 +213,7 @@ def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
             continue
         except OSError as error:
             about = path.relative_to(folder).as_posix()
-            yield _damaged_file_remark(about, format_error(error).removeprefix(f"{path}: "))
+            yield Remark("file-damaged", about, format_error(error).removeprefix(f"{path}: "))
 
 
 def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
@@ -236,18 +221,17 @@ def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
     if path.is_dir():
         cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
-        yield from (_damaged_file_remark(f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
+        yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
     elif path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
         cure = f"{tap} sets it aside and goes on with the others{_deletion_hint(path.parent)}"
-        yield _damaged_file_remark(about, ALTERED_TEXT, cure)
+        yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_deletion_hint(path.parent)}"
-        yield _damaged_file_remark(about, ALTERED_TEXT, cure)
+        yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.suffix == ".tmp":
         yield Remark("set-aside", about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
-        cure = "delete it when you do not need it"
-        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
+        yield Remark("set-aside", about, "a damaged file of an interrupted test", DELETION_ADVICE)
 
 
 def _deletion_hint(test: Path) -> str:
@@ -258,7 +242,7 @@ def _is_valid_setup(path: Path) -> bool:
     try:
         settings = json.loads(read_regular_file(path, MAX_SETTINGS_FILE_SIZE))
         crc = settings.pop("crc", None)
-        return bool(Trigger(**settings)) and crc in (None, zlib.crc32(json.dumps(settings, sort_keys=True).encode()))
+        return bool(Trigger(**settings)) and crc in (None, journal.compute_crc(settings))
     except (ValueError, TypeError, AttributeError, RecursionError):
         return False
 

@@ -14,11 +14,10 @@ FIRST_RELEASE = datetime(2026, 1, 1, tzinfo=UTC)
 """Day before the first release of lobewatch; no test is older."""
 MAX_TIME_AHEAD = timedelta(days=1)
 """Largest time ahead that a time zone explains."""
-CLOCK_BEHIND, CLOCK_BEFORE_RELEASE, CLOCK_AHEAD = "clock-behind", "clock-before-release", "clock-ahead"
 CLOCK_QUESTIONS = {
-    CLOCK_BEHIND: "before the newest test that was there",
-    CLOCK_BEFORE_RELEASE: f"before the first release of this program, {FIRST_RELEASE:%Y-%m-%d}",
-    CLOCK_AHEAD: "more than a day in the future",
+    "clock-behind": "before the newest test that was there",
+    "clock-before-release": f"before the first release of this program, {FIRST_RELEASE:%Y-%m-%d}",
+    "clock-ahead": "more than a day in the future",
 }
 """Reason of each question about the time of a test, by its code in the journal."""
 

@@ -74,9 +74,8 @@ class Window:
             seconds = "the seconds from the record's start (the pre-trigger), 0 where the window begins at the hit"
             cure = f"add Window.hit_at with {seconds}"
             raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
-        hit_at = (
-            float(np.mean([acquisition.find_hit_time(hit) for hit in hits])) if self.hit_at is None else self.hit_at
-        )
+        times = [acquisition.find_hit_time(hit) for hit in hits] if self.hit_at is None else [self.hit_at]
+        hit_at = float(np.mean(times))
         if not hit_at >= self.start:
             problem = f"the window begins after the hit at {hit_at:.4g} s; both count from the record's start"
             raise ValueError(f"Window.start {self.start:g}: {problem}")

@@ -83,8 +83,7 @@ def check_frequency_jump(last: Mode, now: Mode) -> Remark | None:
     change = now.frequency / last.frequency - 1
     if abs(change) <= FREQUENCY_JUMP.limit:
         return None
-    about = f"{now.frequency:.0f} Hz"
-    return FREQUENCY_JUMP.ask(about, now=now.frequency, percent=100 * change, last=last.frequency)
+    return FREQUENCY_JUMP.ask(f"{now.frequency:.0f} Hz", now=now.frequency, percent=100 * change, last=last.frequency)
 
 
 def check_stiffness_jump(last: Mode, now: Mode) -> Remark | None:
@@ -154,8 +153,7 @@ def check_question_codes(codes: Iterable[str]) -> list[str]:
     """Return each code once; ValueError for an unknown one."""
     distinct = list(dict.fromkeys(codes))
     for code in [code for code in distinct if code not in RECORDING_QUESTIONS]:
-        questions = ", ".join(RECORDING_QUESTIONS)
-        raise ValueError(f"accept_questions.codes {code}: no such question; there are {questions}")
+        raise ValueError(f"accept_questions.codes {code}: no such question; there are {', '.join(RECORDING_QUESTIONS)}")
     return distinct
 
 
@@ -193,27 +191,22 @@ def question_remarks(
 
     asked: open questions by tap test of the whole machine; path: machine folder; of: selected tap tests, None for all.
     """
-    same: dict[Remark, list[str]] = {}
+    same, taps = dict[Remark, list[str]](), Path(path) / "taps"
     for tap_id in asked if of is None else of:
         for question in asked[tap_id]:
             same.setdefault(replace(question, about=""), []).append(tap_id)
     counts = Counter(question.code for questions in asked.values() for question in questions)
     for question, tap_ids in same.items():
-        answer = _answer_command(path, tap_ids, question.code, all_of_them=len(tap_ids) == counts[question.code])
+        files, test = [taps / f"{tap_id}.h5" for tap_id in tap_ids], "this test is"
         about, rest = f"tap test {tap_ids[0]}", "it sets no reference until you say that it is"
         if len(tap_ids) > 1:
+            files, test = [taps] if len(tap_ids) == counts[question.code] else files, "these tests are"
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
             rest = "they set no reference until you say that they are"
-        test = "this test is" if len(tap_ids) == 1 else "these tests are"
+        answer = shlex.join(["lobewatch", "replay", str(path), *map(str, files)])
+        answer += f" accept_questions.codes {question.code}"
         cure = f"Tap again; if {test} right, say so: {answer}"
         yield Remark(question.code, about, f"{question.text}; {rest} right: {answer}", cure)
-
-
-def _answer_command(path: Path | str, tap_ids: Sequence[str], code: str, *, all_of_them: bool) -> str:
-    """Return the command that accepts a question; all_of_them: no other tap test asks it."""
-    taps = Path(path) / "taps"
-    files = [taps] if all_of_them and len(tap_ids) > 1 else [taps / f"{tap_id}.h5" for tap_id in tap_ids]
-    return f"{shlex.join(['lobewatch', 'replay', str(path), *map(str, files)])} accept_questions.codes {code}"
 
 
 def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:
@@ -221,9 +214,6 @@ def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable
     if now is None:
         return ()
     newest = max((tap.created for tap in taps if not tap.excluded), default=None)
-    is_asked = {
-        clock.CLOCK_BEHIND: newest is not None and (now < newest or created < newest - MAX_RESUME_AGE),
-        clock.CLOCK_BEFORE_RELEASE: created < clock.FIRST_RELEASE,
-        clock.CLOCK_AHEAD: clock.is_in_future(created, now),
-    }
-    return tuple(code for code, asked in is_asked.items() if asked)
+    is_behind = newest is not None and (now < newest or created < newest - MAX_RESUME_AGE)
+    asked = is_behind, created < clock.FIRST_RELEASE, clock.is_in_future(created, now)
+    return tuple(code for code, is_asked in zip(clock.CLOCK_QUESTIONS, asked, strict=True) if is_asked)

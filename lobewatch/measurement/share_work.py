@@ -60,11 +60,11 @@ def _parse_scheduler_address(address: str) -> tuple[str, str]:
     """Return scheme and host of an address; DataError for an invalid one, and without Dask."""
     try:
         from distributed.comm import get_address_host_port, parse_address
+
+        return parse_address(address)[0], get_address_host_port(address)[0]
     except ImportError as error:
         cure = 'install it: pip install "lobewatch[fleet]"'
         raise DataError(f"Workers.scheduler {address}: needs Dask; {cure}") from error
-    try:
-        return parse_address(address)[0], get_address_host_port(address)[0]
     except ValueError as error:
         allowed = "give tls://HOST:PORT, or tcp://HOST:PORT"
         raise DataError(f"Workers.scheduler {address}: is no address of a scheduler ({error}); {allowed}") from error
@@ -143,11 +143,8 @@ def _wait_for_result(client: Any, address: str, future: Future[Any]) -> Any:
 
 TASKS_PER_WORKER = 3
 """Largest number of waiting tasks per worker, which limits memory; chosen."""
-
-TASK_ERRORS = (
-    *(ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError),
-    *(PickleError, RuntimeError, TypeError, ValueError),
-)
+TASK_ERRORS: tuple[type[Exception], ...] = (ArithmeticError, AssertionError, AttributeError, EOFError, LookupError)
+TASK_ERRORS += (MemoryError, PickleError, RuntimeError, TypeError, ValueError)
 """Errors of a task itself, not of its transport."""
 
 
@@ -191,7 +188,7 @@ def share_work(
         yield from map(work, tasks)
         return
     waiting, refused = deque[tuple[Task, Future[Any]]](), list[str]()
-    with _open_pool(workers) as team:
+    with connect_cluster(workers.scheduler) if workers.scheduler else _start_processes(workers.jobs) as team:
 
         def take() -> Result:
             task, future = waiting.popleft()
@@ -213,16 +210,13 @@ def share_work(
 
 
 @contextmanager
-def _open_pool(workers: Workers) -> Iterator[WorkerPool]:
-    if workers.scheduler:
-        with connect_cluster(workers.scheduler) as pool:
-            yield pool
-        return
+def _start_processes(count: int) -> Iterator[WorkerPool]:
+    """Start processes of this computer; DataError if one is killed."""
     try:
-        with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as pool:
-            yield WorkerPool(pool, workers.jobs, lambda future: future.result())
+        with ProcessPoolExecutor(count, get_context("spawn")) as executor:
+            yield WorkerPool(executor, count, lambda future: future.result())
     except BrokenProcessPool as error:
-        text = f"one of the {workers.jobs} processes was ended from outside; nothing is stored"
+        text = f"one of the {count} processes was ended from outside; nothing is stored"
         raise DataError(f"{text}; try again with fewer Workers.jobs") from error
 
 

@@ -188,10 +188,8 @@ def summarize_model(state: ModelState, count: int) -> ModelSummary:
     frequency, stiffness = dsm.modes_at(state.spindle, count)
     shares = dsm.energy_shares(state.spindle, count)
     parts = shares.bearings + shares.housings, shares.segments, shares.joints
-    modes = tuple(
-        ModelMode(float(frequency[n]), float(stiffness[n]), *(float(np.sum(part[n])) for part in parts))
-        for n in range(count)
-    )
+    tip = enumerate(zip(frequency.tolist(), stiffness.tolist(), strict=True))
+    modes = tuple(ModelMode(*values, *(float(np.sum(part[n])) for part in parts)) for n, values in tip)
     rigid = float(dsm.natural_frequencies(state.spindle, 1, rigid_bearings=True)[0])
     return ModelSummary(state, modes, dsm.static_stiffness(state.spindle), first_critical_speed(state.spindle), rigid)
 
@@ -262,7 +260,8 @@ def calibrate_model(
         stiffness = dsm.calibrate(spindle, frequency[0], std, number, name)
     else:
         named = frequency_std or None, mode or None, group or None
-        stiffness = dsm.fit_stiffness(spindle, frequency, *named, tolerance=machine.drawing_tolerance)
+        tolerance = machine.spindle.tolerance if machine.spindle else 0.0
+        stiffness = dsm.fit_stiffness(spindle, frequency, *named, tolerance=tolerance)
         number = int(stiffness.mode[0])
     dampers = None
     if damping_ratio is not None:

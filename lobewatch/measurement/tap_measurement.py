@@ -175,18 +175,13 @@ def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
 def _follow_mode(
     trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
-    """Return the credible mode that continues the last one, or the predominant one."""
-    mode = modal.predominant_mode(trusted.modes)
-    if mode is None:
+    """Return the credible mode that continues the last one; without a last one, or far off, the predominant one."""
+    now = modal.predominant_mode(trusted.modes)
+    if now is None:
         remarks.append(questions.no_mode_remark(modes, machine))
-    elif last is not None:
-        mode = _continue_mode(last, mode, trusted.modes, remarks)
-    return mode
-
-
-def _continue_mode(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
-    """Return the candidate that continues the last mode, or with a question the predominant mode far off."""
-    next_mode = modal.follow_mode(last, candidates)
+    if now is None or last is None:
+        return now
+    next_mode = modal.follow_mode(last, trusted.modes)
     jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
         remarks.append(jump)
@@ -258,20 +253,10 @@ def _transfer_to_tip(
 
 
 def is_fit_of(answer: object, entry: TapEntry) -> bool:
-    """Tell whether a worker's answer is a plausible fit of a tap test."""
-    return (
-        isinstance(answer, TapFit)
-        and (answer.tap_id, answer.time.isoformat()) == (entry.id, entry.time)
-        and (answer.tool, answer.direction) == (entry.tool, entry.direction)
-        and isinstance(answer.failed, bool)
-        and all(isinstance(remark, Remark) for remark in answer.remarks)
-        and all(isinstance(mode, Mode) and _is_valid_mode(mode) for mode in answer.modes)
-    )
-
-
-def _is_valid_mode(mode: Mode) -> bool:
-    try:
-        replace(mode)  # what has come from elsewhere was never checked
-    except (TypeError, ValueError):
+    """Tell whether a worker's answer is a plausible fit of a tap test; TypeError or ValueError for an invalid mode."""
+    if not isinstance(answer, TapFit) or not isinstance(answer.failed, bool):
         return False
-    return True
+    labels = answer.tap_id, answer.time.isoformat(), answer.tool, answer.direction
+    is_own = labels == (entry.id, entry.time, entry.tool, entry.direction)
+    modes_are_valid = all(isinstance(mode, Mode) and replace(mode) for mode in answer.modes)  # checked anew
+    return is_own and modes_are_valid and all(isinstance(remark, Remark) for remark in answer.remarks)

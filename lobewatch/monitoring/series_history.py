@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from itertools import chain, compress
+from operator import attrgetter
 
 import numpy as np
 
@@ -178,7 +179,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHistory]:
-    flat = chain.from_iterable(chain.from_iterable([row.watched for row in rows]))
+    flat = chain.from_iterable(chain.from_iterable(map(attrgetter(*WATCHED_VALUES), rows)))
     numbers = np.fromiter(flat, np.float64, 2 * len(WATCHED_VALUES) * len(rows)).reshape(-1, len(WATCHED_VALUES), 2)
     is_asked = np.array([bool(row.questions) for row in rows], dtype=np.bool_)
     return {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED_VALUES)}

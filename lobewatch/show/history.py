@@ -13,8 +13,7 @@ from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
-from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.entries import MaintenanceEvent
+from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick

@@ -18,12 +18,8 @@ from lobewatch.measurement.recording_questions import find_open_questions, label
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
 from lobewatch.measurement.spindle_model import build_model_state
 from lobewatch.measurement.tap_measurement import Measurement
-from lobewatch.tool.principal_directions import (
-    PrincipalDirections,
-    TipModes,
-    find_principal_directions,
-    lowest_zero_order_lobes,
-)
+from lobewatch.tool import principal_directions as principal
+from lobewatch.tool.principal_directions import PrincipalDirections, TipModes
 from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, interpolate_frequency
 from modal import Mode
 
@@ -143,7 +139,7 @@ class Assembly:
     @property
     def principal_directions(self) -> PrincipalDirections:
         """Principal directions of the modes of x, then of y, with their uncertainty."""
-        return find_principal_directions(self.x or (), self.y or (), self.cross)
+        return principal.find_principal_directions(self.x or (), self.y or (), self.cross)
 
     def check(self) -> Assembly:
         """Return itself; DataError without modes at the tip."""
@@ -184,7 +180,6 @@ def assemble(
     calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
     direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
     followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
-    open_questions = [(tap.tap_id, question) for tap in taps for question in find_open_questions(tap.remarks)]
     assembly = _make_assembly(newest.tool, newest.time, newest.tap_id, modes, calibration)
     return replace(
         assembly,
@@ -195,7 +190,7 @@ def assemble(
         series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
-        questions=tuple(label_question(*question) for question in open_questions),
+        questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
     )
 
 
@@ -339,5 +334,5 @@ def compute_tip_lobes(
     wanted = {name: cuts for name, cuts in machine.cuts(tool).items() if names is None or name in names}
     for cuts in wanted.values():
         if cuts not in diagrams:
-            diagrams[cuts] = lowest_zero_order_lobes(x, y, cuts, speeds, cross)
+            diagrams[cuts] = principal.lowest_zero_order_lobes(x, y, cuts, speeds, cross)
     return {name: diagrams[cuts] for name, cuts in wanted.items()}

@@ -90,20 +90,16 @@ def compute_lobe_chart(
     >>> (lobes.depth * 1e3).round(2).tolist()  # mm
     [1.28, 18.77]
     """
-    return lower_envelope([_compute_cut_lobes(method, x, y, cut, speed_rpm) for cut in cuts])
-
-
-def _compute_cut_lobes(
-    method: LobeMethod, x: TipData | None, y: TipData | None, cut: Cut, speed_rpm: Floats
-) -> StabilityLobes:
     if method is LobeMethod.AVERAGE_ANGLE:
-        return average_angle_lobes(x, y, cut, speed_rpm)
-    mean = zero_order_lobes(x, y, cut, speed_rpm)
+        return lower_envelope([average_angle_lobes(x, y, cut, speed_rpm) for cut in cuts])
+    means = [zero_order_lobes(x, y, cut, speed_rpm) for cut in cuts]
     if method is LobeMethod.ZERO_ORDER:
-        return mean
+        return lower_envelope(means)
     if isinstance(x, Frf) or isinstance(y, Frf):
         text = "semi-discretisation works from the modes; leave LobeChart.source frf out"
         raise ValueError(f"compute_lobe_chart.method {text}")
     speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MAX_CHART_SPEEDS, speed_rpm.size))
-    lowest = mean.minimum.depth
-    return stability_boundary(x, y, cut, speeds, MAX_CHART_DEPTH_RATIO * lowest if np.isfinite(lowest) else 0.1)
+    lowest = [mean.minimum.depth for mean in means]
+    depths = [MAX_CHART_DEPTH_RATIO * depth if np.isfinite(depth) else 0.1 for depth in lowest]
+    limits = zip(cuts, depths, strict=True)
+    return lower_envelope([stability_boundary(x, y, cut, speeds, depth) for cut, depth in limits])

@@ -16,6 +16,8 @@ from lobes import Cut, StabilityLobes, lower_envelope, project_modes, zero_order
 from lobewatch.arrays import Flags, Floats
 from modal import Mode
 
+TipModes = Sequence[Mode] | None
+"""Modes of one direction at the tool tip; None if no direction is known."""
 MAX_PAIR_FREQUENCY_DISTANCE = 0.05
 """Relative distance up to which frequencies in x and y may be of one mode."""
 MAX_SIBLING_FREQUENCY_DISTANCE = 0.2
@@ -116,9 +118,7 @@ def _pair_vectors(stiff_x: float, stiff_y: float, correlation: Floats, turn: Flo
     return np.asarray(turned * np.sqrt([stiff_x, stiff_y]))
 
 
-def find_principal_directions(
-    x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode] | None = None
-) -> PrincipalDirections:
+def find_principal_directions(x: Sequence[Mode], y: Sequence[Mode], cross: TipModes = None) -> PrincipalDirections:
     """Find the principal directions of the modes measured in x and in y.
 
     cross: signed modes hit in x and measured in y. Peaks of x and y are matched in the order of their frequencies. With
@@ -130,14 +130,12 @@ def find_principal_directions(
     stiffness = np.array([mode.stiffness for mode in modes])
     across = np.arange(len(modes)) >= len(x)
     matched = [(i, len(x) + j) for i, j in _match_modes(x, y)]
-    if cross is None:
-        pairs = _pair_without_cross_tap(modes, matched)
-    else:
-        pairs = [ModePair(*pair, _cross_correlation(pair, modes, matched, cross), -1, 0.0) for pair in matched]
-    alone = np.setdiff1d(np.arange(len(modes)), np.ravel(matched))
     lean = np.zeros(len(modes))
-    if cross is None:
-        for i in alone.astype(int):
+    if cross is not None:
+        pairs = [ModePair(*pair, _cross_correlation(pair, modes, matched, cross), -1, 0.0) for pair in matched]
+    else:
+        pairs = _pair_without_cross_tap(modes, matched)
+        for i in np.setdiff1d(np.arange(len(modes)), np.ravel(matched)).astype(int):
             lean[i] = min(np.sqrt(HIDDEN_PEAK_RATIO * stiffness[i] / np.min(stiffness[across != across[i]])), 1.0)
     return PrincipalDirections(stiffness, across, tuple(pairs), lean)
 
@@ -168,7 +166,7 @@ def _pair_without_cross_tap(modes: Sequence[Mode], matched: Sequence[tuple[int, 
     pairs, sign = list[ModePair](), itertools.count()
     number, direction = -1, 1.0
     for k, (i, j) in enumerate(matched):
-        if not any(_are_siblings(modes, (i, j), other) for other in _other_modes(modes, matched, (i, j))):
+        if not any(_are_siblings(modes, (i, j), other) for other in _other_modes(len(modes), matched, (i, j))):
             pairs.append(ModePair(i, j, 0.0, -1, _max_rotation(modes[i], modes[j])))
             continue
         follows = k > 0 and pairs[-1].sign == number and direction > 0 and _are_siblings(modes, (i, j), matched[k - 1])
@@ -177,13 +175,11 @@ def _pair_without_cross_tap(modes: Sequence[Mode], matched: Sequence[tuple[int, 
     return pairs
 
 
-def _other_modes(
-    modes: Sequence[Mode], matched: Sequence[tuple[int, int]], own: tuple[int, int]
-) -> Iterator[tuple[int, ...]]:
+def _other_modes(count: int, matched: Sequence[tuple[int, int]], own: tuple[int, int]) -> Iterator[tuple[int, ...]]:
     """Yield all other modes, matched pairs and single ones."""
     yield from (pair for pair in matched if pair != own)
     with_partner = {number for pair in matched for number in pair}
-    yield from ((number,) for number in range(len(modes)) if number not in with_partner)
+    yield from ((number,) for number in range(count) if number not in with_partner)
 
 
 def _are_siblings(modes: Sequence[Mode], first: tuple[int, ...], second: tuple[int, ...]) -> bool:
@@ -212,10 +208,6 @@ def _cross_correlation(
         nearest = min(matched, key=lambda pair: abs(middle[pair] - at))
         total += 1 / mode.stiffness if nearest == own and abs(middle[own] - at) < MAX_PAIR_FREQUENCY_DISTANCE else 0.0
     return float(np.clip(total * np.sqrt(modes[own[0]].stiffness * modes[own[1]].stiffness), -1, 1))
-
-
-TipModes = Sequence[Mode] | None
-"""Modes of one direction at the tool tip; None if no direction is known."""
 
 
 def lowest_zero_order_lobes(

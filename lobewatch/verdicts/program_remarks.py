@@ -8,7 +8,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples

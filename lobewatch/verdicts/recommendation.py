@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import DataError, Remark
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
@@ -210,7 +210,8 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
         return ()
     edge = limits.cutting_speed_m_min
     edge_text = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
-    why, cures = (" (its max_speed_rpm)", MAX_SPEED_REMEDIES) if limits.is_capped else (edge_text, TOOL_SPEED_REMEDIES)
+    is_capped = limits.high_rpm == limits.tool.max_speed_rpm
+    why, cures = (" (its max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
     slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
     return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
 

@@ -15,7 +15,7 @@ import scipy
 from lobes import MillingRows, Program, build_milling_system, count_pieces, growth_rate, join_rows, rows_at_speeds
 from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobewatch.arrays import Flags, Floats, Indices
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt

@@ -11,7 +11,7 @@ import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
-from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
+from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts.frequency_drop import StiffnessAt

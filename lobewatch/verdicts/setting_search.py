@@ -15,7 +15,7 @@ import numpy as np
 
 from lobes import Program
 from lobewatch.arrays import Floats
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening

@@ -12,7 +12,7 @@ import numpy as np
 from acquisition import Remark
 from lobes import find_pockets, rank_pockets
 from lobewatch.machine import CutTable, Machine
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.tool.tap_series import compute_frequency_scatter

@@ -18,7 +18,7 @@ from verdict_study import MACHINE, assembly, limit_mm, program
 
 from lobes import build_milling_system, count_pieces, growth_rate, rows_at_speeds
 from lobewatch.machine import ProgramTable
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import draw_samples, find_worst_limit

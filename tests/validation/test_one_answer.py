@@ -10,7 +10,7 @@ from one_answer_study import answers, summary
 from random_milling import random_case
 from verdict_study import MACHINE, assembly, program
 
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.recommendation import find_stable_pockets
 from lobewatch.verdicts.setting_robustness import Setting

@@ -17,7 +17,7 @@ from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutPart
 from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.entries import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""

@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from lobes import Cut
-from lobewatch.machine.journal.cut_entry import CutEntry, CutVerdict
+from lobewatch.machine.journal.entries import CutEntry, CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
 
 CutEntries = Sequence[CutEntry]

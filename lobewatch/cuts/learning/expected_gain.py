@@ -14,7 +14,7 @@ from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 

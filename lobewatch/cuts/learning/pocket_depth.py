@@ -9,8 +9,8 @@ from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence
 from lobewatch.cuts.learning.program_learning import collect_evidence
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.journal.cut_entry import geometry_key
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
+from lobewatch.machine.journal.entries import geometry_key
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
 from lobewatch.verdicts.verdict import NOT_CHECKED_CODE, Stability, Verdict

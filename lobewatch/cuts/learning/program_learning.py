@@ -12,8 +12,8 @@ from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
-from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import find_by_name
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency

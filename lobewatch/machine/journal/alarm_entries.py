@@ -1,6 +1,5 @@
 """Journal lines for acknowledged alarms and fleet scatter, without numpy for a fast start."""
 
-from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -54,11 +53,6 @@ def format_alarm_id(code: str, about: str, raised_by: str) -> str:
     return f"{code}:{about.replace(', ', ':').replace(' ', '_')}:{raised_by}"
 
 
-def read_acknowledgements(entries: Sequence[Mapping[str, Any]]) -> tuple[Acknowledgement, ...]:
-    """Read the acknowledgements of a journal, oldest first."""
-    return tuple(msgspec.convert(line, Acknowledgement) for line in entries if line["kind"] == "ack")
-
-
 class FleetScatter(msgspec.Struct, frozen=True):
     """Reclamping scatter of the other machines of a fleet, as known when it was first needed.
 
@@ -78,8 +72,3 @@ class FleetScatter(msgspec.Struct, frozen=True):
     def line(self) -> dict[str, Any]:
         """Journal line."""
         return {"kind": "scatter", **msgspec.to_builtins(self)}
-
-
-def read_fleet_scatters(entries: Sequence[Mapping[str, Any]]) -> tuple[FleetScatter, ...]:
-    """Read the fleet scatters of a journal, oldest first."""
-    return tuple(msgspec.convert(line, FleetScatter) for line in entries if line["kind"] == "scatter")

@@ -1,17 +1,120 @@
-"""Journal lines for events, exclusions and mode edits."""
+"""Journal lines for test cuts, events and exclusions, and the tests and cuts that all lines give."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
-from typing import Any
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from operator import attrgetter
+from typing import Any, Literal, get_args
 
 import msgspec
 
-from acquisition import check_name
-from lobewatch.machine.journal.cut_entry import CutEntry
-from lobewatch.machine.journal.journal import make_entry
-from lobewatch.machine.journal.tap_entry import TapEntry
+from lobes import Cut
+from lobewatch.machine.journal.journal import JournalReading
+from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
+from lobewatch.machine.settings.drive_power import CutPower
 from modal import ModeEdits
+
+CutVerdict = Literal["stable", "chatter", "flip", "cannot tell"]
+"""Result of a test cut; flip: chatter with the period of two teeth."""
+CUT_LINE_KIND = "cut"
+"""Kind of its journal line."""
+
+
+@dataclass(frozen=True)
+class RecordingFile:
+    """File of a recorded cut, as committed to the journal."""
+
+    id: str
+    """Identity of the cut."""
+    sha256: str
+    """SHA-256 of the file."""
+    size: int
+    """Size of the file (bytes)."""
+
+    @property
+    def file(self) -> str:
+        """Path of the file in the machine folder."""
+        return f"cuts/{self.id}.h5"
+
+
+@dataclass(frozen=True)
+class CutEntry:
+    """Test cut with its result; the settings are those at the time of the cut."""
+
+    id: str
+    """Identity in the journal, "c1" on."""
+    at: datetime
+    """Time of the cut (UTC)."""
+    program: str | None
+    """Name of the program; None for the reference cut."""
+    tool: str
+    """Tool in the spindle."""
+    cut: Cut
+    """Teeth, pitch, immersion, direction and cutting coefficients."""
+    coefficients: str
+    """Material of the coefficients; empty if machine.toml gave the numbers."""
+    feed: str
+    """Axis of the feed, "x" or "y"; "both" if unknown."""
+    feed_per_tooth: float | None
+    """Feed per tooth (m); None if unknown."""
+    commanded_rpm: float
+    """Commanded spindle speed (rpm)."""
+    speed_rpm: float
+    """Detected spindle speed (rpm); the commanded one without a recording."""
+    depth: float
+    """Axial depth of cut ap (m)."""
+    word: CutVerdict
+    """Result of the cut."""
+    chatter_frequency_hz: float | None
+    """Chatter frequency (Hz); None without chatter or if unknown."""
+    by: Literal["ear", "accelerometer", "microphone"]
+    """Ear or instrument that detected the result."""
+    software: str
+    """Version of lobewatch that wrote the line."""
+    chatter_frequency_std_hz: float | None = None
+    """Standard error of the chatter frequency (Hz); None if unknown."""
+    reason: str = ""
+    """Code of the reason of "cannot tell"; empty otherwise."""
+    recording: RecordingFile | None = None
+    """Recording of the cut; None without one."""
+    power: CutPower | None = None
+    """Power of the cut; None if nobody has read it."""
+    excluded: str = ""
+    """Reason of its exclusion, from other lines; empty if included."""
+
+    def __post_init__(self) -> None:
+        if self.word not in get_args(CutVerdict):
+            raise ValueError(f"word={self.word!r} is none of {', '.join(get_args(CutVerdict))}")
+
+    @property
+    def is_usable(self) -> bool:
+        """True if the cut counts for learning."""
+        return not self.excluded and self.word != "cannot tell"
+
+    @property
+    def has_chatter(self) -> bool:
+        """True if chatter of any kind was detected."""
+        return self.word in ("chatter", "flip")
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Journal line."""
+        fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
+
+
+def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
+    """Return the properties that cuts with the same cutter and immersion share."""
+    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch
+
+
+def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
+    """Read a test cut from its journal line."""
+    fields = {name: line[name] for name in CutEntry.__dataclass_fields__ if name in line}
+    fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
+    for name, kind in (("recording", RecordingFile), ("power", CutPower)):
+        fields[name] = kind(**line[name]) if line.get(name) else None
+    return CutEntry(**fields | {"excluded": excluded})
 
 
 @dataclass(frozen=True)
@@ -40,57 +143,11 @@ def read_events(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent,
     return tuple(sorted(events.values(), key=lambda event: event.time))
 
 
-def make_event(
-    entries: Sequence[Mapping[str, Any]],
-    taps: Sequence[TapEntry],
-    text: str,
-    date: datetime | None,
-    new_baseline: bool,
-    now: datetime,
-) -> MaintenanceEvent:
-    """Make an event; date: None for now, local time without a zone, the whole day at midnight.
-
-    Raises ValueError for an empty text, a date in the future, a duplicate, and a new baseline on a whole day with tap
-    tests, whose order is then unknown.
-    """
-    if not text.strip():
-        raise ValueError('the event has no text; say what was done, such as "bearings replaced"')
-    check_name(text, "event")
-    time = now if date is None else _to_utc(date)
-    if time - now > timedelta(days=1):
-        raise ValueError(f"MaintenanceEvent.time {date}: lies in the future; give the day on which it was done")
-    same = [event.id for event in read_events(entries) if (event.time, event.text) == (time, text)]
-    if same:
-        raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; MachineFolder.contents lists all events")
-    if new_baseline and date is not None and date.time() == datetime.min.time():
-        _refuse_tapped_day(taps, time)
-    number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
-    return MaintenanceEvent(f"e{number}", time, text, new_baseline)
-
-
-def _to_utc(date: datetime) -> datetime:
-    try:
-        return date.astimezone(UTC)
-    except (OverflowError, ValueError) as error:
-        raise ValueError(f"MaintenanceEvent.time {date}: is out of range; give a date after 1970-01-01") from error
-
-
-def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
-    tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
-    if tapped:
-        clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
-        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
-        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
-        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
-
-
 ExcludableEntry = TapEntry | CutEntry
 """Entry that can be excluded."""
 
 
-def find_excludable_entry(
-    name: str, taps: Sequence[TapEntry], cuts: Sequence[CutEntry], folder: str
-) -> ExcludableEntry:
+def find_excludable_entry(name: str, taps: Sequence[TapEntry], cuts: Sequence[CutEntry], path: str) -> ExcludableEntry:
     """Find the test cut of an identity, or the tap test of an identity, a part of it, or a file.
 
     Raises ValueError if there is none or there are several.
@@ -99,31 +156,13 @@ def find_excludable_entry(
         if cut.id == name:
             return cut
     part = name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
-    exact = [tap for tap in taps if tap.id == part]
-    matches = exact or [tap for tap in taps if part and part in tap.id]
+    matches = [tap for tap in taps if tap.id == part] or [tap for tap in taps if part and part in tap.id]
     if len(matches) == 1:
         return matches[0]
     if matches:
         examples = f"({matches[0].id}, {matches[1].id}, ...)"
         raise ValueError(f"{name}: part of {len(matches)} tap tests {examples}; give one whole")
-    raise ValueError(f"{name!r}: no such tap test in {folder}; MachineFolder.contents {folder} lists all {len(taps)}")
-
-
-def make_exclusion_line(entry: ExcludableEntry, reason: str) -> dict[str, Any]:
-    """Make the line that excludes an entry; ValueError if it is excluded or has no reason."""
-    if entry.excluded:
-        raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
-    if not reason.strip():
-        raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
-    check_name(reason, "reason")
-    return make_entry("exclude", tap=entry.id, reason=reason)
-
-
-def make_inclusion_line(entry: ExcludableEntry) -> dict[str, Any]:
-    """Make the line that includes an entry again; ValueError if it is not excluded."""
-    if not entry.excluded:
-        raise ValueError(f"{entry.id}: is not excluded; it counts already")
-    return make_entry("include", tap=entry.id)
+    raise ValueError(f"{name!r}: no such tap test in {path}; MachineFolder.contents {path} lists all {len(taps)}")
 
 
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:
@@ -137,6 +176,31 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
     return reasons
 
 
-def read_mode_edits(entries: Sequence[Mapping[str, Any]]) -> dict[str, ModeEdits]:
-    """Read the mode edits by identity of the tap test; the newest line counts."""
-    return {line["tap"]: msgspec.convert(line, ModeEdits) for line in entries if line["kind"] == "modes"}
+def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
+    """Read the test cuts of the journal, oldest first."""
+    excluded = read_exclusion_reasons(reading.other_entries)
+    lines = {line["id"]: line for line in reading.other_entries if line["kind"] == CUT_LINE_KIND}
+    cuts = [parse_cut_line(line, excluded.get(name, "")) for name, line in lines.items()]
+    return tuple(sorted(cuts, key=attrgetter("at")))
+
+
+def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
+    """Read the tap tests of the journal by identity."""
+    accepted, lines = dict[str, tuple[str, ...]](), reading.other_entries
+    for line in lines:
+        if line["kind"] == "accept":
+            accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
+    excluded = read_exclusion_reasons(lines)
+    by_hand = {line["tap"]: msgspec.convert(line, ModeEdits) for line in lines if line["kind"] == "modes"}
+    old = (TapEntry.from_line(line) for line in lines if line["kind"] == "tap")
+    entries = {entry.id: entry for entry in (*decode_tap_entries(reading.lines), *old)}
+    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
+        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+        changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
+        entries[name] = msgspec.structs.replace(entries[name], **changes)
+    return entries
+
+
+def read_given_up_ids(reading: JournalReading) -> set[str]:
+    """Return the identities of lost tap tests and recordings."""
+    return {line["tap"] for line in reading.other_entries if line["kind"] == "lost"}

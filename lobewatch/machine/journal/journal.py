@@ -16,7 +16,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
-from io import FileIO
 from itertools import count, pairwise
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from typing import Any
 import msgspec
 
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
-from acquisition.file_io import atomic_write, open_regular_file, read_regular_file, sync_folder
+from acquisition.file_io import atomic_write, read_regular_file, sync_folder
 from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX
 from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
 
@@ -39,8 +38,6 @@ PREVIOUS_DIGEST_KEY = b'"previous": "'
 """Bytes of a line before the SHA-256 of the previous line."""
 MAX_JOURNAL_BYTES = 200_000_000
 """Largest size of a journal (bytes); chosen, ten times that of 20 000 tap tests."""
-COMPARE_CHUNK_BYTES = 1 << 18
-"""Size of a chunk that is compared at once (bytes)."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +64,9 @@ def scan_journal_file(path: Path, before: JournalFileState) -> JournalFileState:
     """Read a journal file line by line, from the part that was read before on."""
     if not path.exists():
         return JournalFileState(exists=False)
-    with open_regular_file(path, MAX_JOURNAL_BYTES) as file:
-        begun = before if _starts_with(file, before.chain_bytes) else JournalFileState(exists=False)
-        file.seek(len(begun.chain_bytes))
-        content = file.read()
+    content = read_regular_file(path, MAX_JOURNAL_BYTES)
+    begun = before if content.startswith(before.chain_bytes) else JournalFileState(exists=False)
+    content = content[len(begun.chain_bytes) :]
     if begun.exists and not (content or before.first_broken_line or before.torn) and before.line_ending == b"\n":
         return before
     *lines, end = content.split(b"\n")
@@ -89,17 +85,6 @@ def scan_journal_file(path: Path, before: JournalFileState) -> JournalFileState:
     loose += [part for part in (end, end[:-1]) if broken and _parse_line(part)][:1]
     whole = begun.chain_bytes + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
     return JournalFileState(True, tuple(chain), whole, broken, torn=end, unchained_lines=tuple(loose))
-
-
-def _starts_with(file: FileIO, start: bytes) -> bool:
-    """Tell whether a file starts with these bytes."""
-    at = 0
-    while at < len(start):
-        part = file.read(min(COMPARE_CHUNK_BYTES, len(start) - at))
-        if not part or not start.startswith(part, at):
-            return False
-        at += len(part)
-    return True
 
 
 def _continue_chain(chain: list[bytes], lines: list[bytes]) -> bool:
@@ -155,13 +140,8 @@ class JournalReading:
         return _decode_lines(self.lines)
 
     @cached_property
-    def tap_lines(self) -> list[bytes]:
-        """Lines for `decode_tap_entries`."""
-        return [line for line in self.lines if line.startswith(TAP_LINE_PREFIX)]
-
-    @cached_property
     def other_entries(self) -> list[JournalEntry]:
-        """All other lines as JSON objects."""
+        """Lines of other kinds as JSON objects, with tap tests of older versions."""
         return _decode_lines(line for line in self.lines if not line.startswith(TAP_LINE_PREFIX))
 
 
@@ -214,11 +194,10 @@ class Journal:
         with contextlib.suppress(OSError):  # it is committed; the copy is brought up at the next line
             _append_lines(self.copy_path, lines)
 
-    def refuse_damage(self, reading: JournalReading | None = None) -> None:
+    def refuse_damage(self, reading: JournalReading) -> None:
         """Raise DataError if the journal is damaged."""
-        damage = (reading or self.read()).damage
-        if damage:
-            raise DataError(f"{self.path.parent}: {'; '.join(map(str, damage))}; nothing is written before")
+        if reading.damage:
+            raise DataError(f"{self.path.parent}: {'; '.join(map(str, reading.damage))}; nothing is written before")
 
     def rewrite(self, entries: list[JournalEntry]) -> None:
         """Write both files with these entries in a new chain, and keep the old files."""

@@ -115,9 +115,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         return f"taps/{self.id}.h5"
 
 
-_decode_tap_lines = msgspec.json.Decoder(list[TapEntry]).decode
-
-
 def decode_tap_entries(lines: Iterable[bytes]) -> list[TapEntry]:
-    """Read the entries of lines with `TAP_LINE_PREFIX`, twenty times as fast as `TapEntry.from_line` for each line."""
-    return _decode_tap_lines(b"[" + b",".join(lines) + b"]")
+    """Read the entries of lines with `TAP_LINE_PREFIX`, twenty times as fast as each with `TapEntry.from_line`."""
+    tap_lines = (line for line in lines if line.startswith(TAP_LINE_PREFIX))
+    return msgspec.json.decode(b"[" + b",".join(tap_lines) + b"]", type=list[TapEntry])

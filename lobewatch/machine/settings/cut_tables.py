@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from lobes import CuttingCoefficients, Direction, tangential_and_radial
 from lobes.cut import normalize_pitch
-from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Plausible, Positive, PositiveOrInfinite, TomlTable
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
 """Angle from x to the feed (rad) by axis."""
@@ -16,10 +16,10 @@ MAX_ENGAGEMENT_STEP = math.radians(15)
 """Largest step between the engagement angles along a path (rad)."""
 ValueRange = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
 """Lower and upper limit. msgspec 0.22 misreads the fixed length `tuple[A, B]` in a union with a number."""
+CuttingPressure = Annotated[Positive, Plausible(200, 6000)]
+"""Tangential cutting coefficient Kt, or specific cutting force (N/mm2)."""
 ToolWear = Literal["new", "used", "worn"]
 """Wear of the cutting edges."""
-IsoMaterialGroup = Literal["P", "M", "K", "N", "S", "H"]
-"""Group of materials by ISO 513."""
 
 
 def convert_pitch(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
@@ -57,23 +57,23 @@ class CutTable(TomlTable, frozen=True):
     (0.5, ('x', 'y'))
     """
 
-    teeth: Annotated[int, Meta(ge=1)]
+    teeth: Annotated[int, Meta(ge=1), Plausible(1, 40)]
     """Number of teeth (flutes)."""
     radial_depth_mm: Positive | ValueRange
     """Radial depth of cut ae (mm), or its range along the path."""
-    tool_diameter_mm: Positive
+    tool_diameter_mm: Annotated[Positive, Plausible(0.3, 299)]
     """Tool diameter (mm)."""
     direction: Direction
     """Direction of milling, "up" (conventional) or "down" (climb)."""
     material: str | None = None
     """Name of the material, built-in or of a [[material]]."""
-    tangential_n_per_mm2: Positive | None = None
+    tangential_n_per_mm2: CuttingPressure | None = None
     """Tangential cutting coefficient Kt (N/mm2); None: that of the material."""
     radial_n_per_mm2: NotNegative | None = None
     """Radial cutting coefficient Kr (N/mm2); None: that of the material."""
-    helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
+    helix_deg: Annotated[float, Meta(ge=0, lt=90), Plausible(1, 70)] | None = None
     """Helix angle (deg); None for straight flutes."""
-    feed_per_tooth_mm: Positive | None = None
+    feed_per_tooth_mm: Annotated[Positive, Plausible(0.002, 1.9)] | None = None
     """Feed per tooth (mm); None: torque is unknown."""
     flute_length_mm: Positive | None = None
     """Flute length (mm)."""
@@ -140,7 +140,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     """Spindle speed (rpm); NaN if requested."""
     depth_mm: Positive = math.nan
     """Axial depth of cut ap (mm); NaN if requested."""
-    corner_radius_mm: Positive | None = None
+    corner_radius_mm: Annotated[Positive, Plausible(0.2, 199)] | None = None
     """Radius of the tightest corner on the path (mm); None for a straight path."""
     wear: ToolWear | None = None
     """Allowed tool wear; None: that of [doubt]."""
@@ -196,14 +196,15 @@ class MaterialTable(TomlTable, frozen=True):
     """Table [[material]]: Ktc and Krc, or Ks and beta, with edge coefficients if known."""
 
     name: Annotated[str, Meta(min_length=1)]
-    tangential_n_per_mm2: Positive | None = None
+    tangential_n_per_mm2: CuttingPressure | None = None
     radial_n_per_mm2: NotNegative | None = None
-    specific_force_n_per_mm2: Positive | None = None
-    force_angle_deg: Annotated[float, Meta(gt=0, le=90)] | None = None
-    tangential_edge_n_per_mm: NotNegative = math.nan
-    radial_edge_n_per_mm: NotNegative = math.nan
+    specific_force_n_per_mm2: CuttingPressure | None = None
+    force_angle_deg: Annotated[float, Meta(gt=0, le=90), Plausible(39, 90)] | None = None
+    tangential_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
+    radial_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
     source: str = "machine.toml"
-    iso_group: IsoMaterialGroup | None = None
+    iso_group: Literal["P", "M", "K", "N", "S", "H"] | None = None
+    """Group of materials by ISO 513."""
 
     def __post_init__(self) -> None:
         first, second = ("tangential_n_per_mm2", "radial_n_per_mm2"), ("specific_force_n_per_mm2", "force_angle_deg")
@@ -226,8 +227,8 @@ class MaterialTable(TomlTable, frozen=True):
 class DriveTable(TomlTable, frozen=True):
     """Table [drive]: power and torque of the spindle motor."""
 
-    power_kw: PositiveOrInfinite = math.inf
-    torque_nm: PositiveOrInfinite = math.inf
+    power_kw: Annotated[PositiveOrInfinite, Plausible(0.1, 99)] = math.inf
+    torque_nm: Annotated[PositiveOrInfinite, Plausible(0.05, 5000)] = math.inf
 
 
 Percent = Annotated[float, Meta(ge=0, le=100)]
@@ -236,25 +237,25 @@ Percent = Annotated[float, Meta(ge=0, le=100)]
 class UncertaintyTable(TomlTable, frozen=True):
     """Table [doubt]: half-widths (%) of independent uniform distributions; defaults: docs/lobes.md."""
 
-    frequency_percent: Percent | None = None
+    frequency_percent: Annotated[Percent, Plausible(0.01, 9)] | None = None
     """Natural frequency from test to test; None: scatter of the series from 8 tests on, before that 0.3."""
-    damping_percent: Percent | None = None
+    damping_percent: Annotated[Percent, Plausible(0.5, 100)] | None = None
     """Damping ratio from test to test; None: scatter of the series from 8 tests on, before that 10."""
-    stiffness_percent: Percent | None = None
+    stiffness_percent: Annotated[Percent, Plausible(0.1, 50)] | None = None
     """Modal stiffness from test to test; None: scatter of the series from 8 tests on, before that 3."""
-    speed_percent: Percent = 1.0
+    speed_percent: Annotated[Percent, Plausible(0.02, 10)] = 1.0
     """Spindle speed."""
-    coefficients_percent: Percent = 20.0
+    coefficients_percent: Annotated[Percent, Plausible(1, 100)] = 20.0
     """Cutting coefficients and their ratio without a published range."""
-    predicted_frequency_percent: Percent = 3.0
+    predicted_frequency_percent: Annotated[Percent, Plausible(0.1, 50)] = 3.0
     """Natural frequencies of a predicted tool."""
-    predicted_damping_percent: Percent = 30.0
+    predicted_damping_percent: Annotated[Percent, Plausible(1, 100)] = 30.0
     """Damping ratios of a predicted tool."""
-    predicted_stiffness_percent: Percent = 15.0
+    predicted_stiffness_percent: Annotated[Percent, Plausible(0.5, 100)] = 15.0
     """Modal stiffnesses of a predicted tool."""
-    untapped_frequency_percent: Percent = 5.0
+    untapped_frequency_percent: Annotated[Percent, Plausible(0.1, 50)] = 5.0
     """Natural frequencies in an untapped direction, relative to the other one."""
-    untapped_stiffness_percent: Percent = 30.0
+    untapped_stiffness_percent: Annotated[Percent, Plausible(1, 100)] = 30.0
     """Modal stiffnesses in an untapped direction, relative to the other one."""
     wear: ToolWear = "new"
     """Allowed tool wear of programs without their own."""

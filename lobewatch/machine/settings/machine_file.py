@@ -97,11 +97,6 @@ class Machine(toml.TomlTable, frozen=True):
         """Programs with speed and depth."""
         return tuple(program for program in self.all_programs if not program.is_incomplete)
 
-    @property
-    def incomplete_programs(self) -> tuple[ProgramTable, ...]:
-        """Programs whose speed or depth is requested."""
-        return tuple(program for program in self.all_programs if program.is_incomplete)
-
     def coefficients(self, table: CutTable) -> CuttingCoefficients:
         """Return the cutting coefficients of a cut: its own, else those of its material.
 
@@ -120,20 +115,17 @@ class Machine(toml.TomlTable, frozen=True):
         tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
         if table.material is None:
             return CuttingCoefficients("", tangential, radial, source=USER_SOURCE)
-        known = self._material(table.material)
+        own = {fold_material_name(material.name): material.build() for material in self.material}
+        by_name, name = {**materials_by_name(), **own}, fold_material_name(table.material)
+        if name not in by_name:
+            near = nearest_material_name(table.material, by_name)
+            cure = f"is {near!r} meant? lobes.materials_by_name lists those that are known; or add a [[material]]"
+            raise ValueError(f"material={table.material!r} is not known; {cure}")
+        known = by_name[name]
         if table.tangential_n_per_mm2 is None:
             return known
         unpublished: dict[str, Any] = {"tangential_range": None, "ratio_range": None, "specific_forces": ()}
         return replace(known, tangential=tangential, radial=radial, source=USER_SOURCE, **unpublished)
-
-    def _material(self, name: str) -> CuttingCoefficients:
-        own = {fold_material_name(material.name): material.build() for material in self.material}
-        by_name = {**materials_by_name(), **own}
-        if fold_material_name(name) not in by_name:
-            near = nearest_material_name(name, by_name)
-            known = f"is {near!r} meant? lobes.materials_by_name lists those that are known; or add a [[material]]"
-            raise ValueError(f"material={name!r} is not known; {known}")
-        return by_name[fold_material_name(name)]
 
     def build_cut(self, table: CutTable) -> Cut:
         """Build a cut in SI units at its largest radial depth on a straight path, feed along x.
@@ -266,11 +258,6 @@ class Machine(toml.TomlTable, frozen=True):
     def modelled_tools(self) -> list[ToolTable]:
         """Tools that have a shape for the spindle model."""
         return [tool for tool in self.tool if tool.segments]
-
-    @property
-    def drawing_tolerance(self) -> float:
-        """Relative standard error of each diameter of the model (-); 0 without a model."""
-        return self.spindle.tolerance if self.spindle else 0.0
 
     def find_modelled_tool(self, name: str) -> ToolTable:
         """Return the [[tool]] of a name that has a shape; DataError without one.

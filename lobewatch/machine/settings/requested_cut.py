@@ -2,16 +2,15 @@
 
 import difflib
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from lobes import Cut
-from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
-from lobewatch.machine.settings.drive_power import PowerReading, build_power_reading
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, PowerReading, build_power_reading
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine
-from lobewatch.machine.settings.tool_limits import PROGRAM_KEYS_BY_TOOL_FIELD, find_tool_properties
+from lobewatch.machine.settings.tool_limits import PROGRAM_KEYS_BY_TOOL_FIELD, find_common_values, find_tool_properties
 
 NamedTable = TypeVar("NamedTable", bound=CutTable)
 
@@ -77,7 +76,7 @@ def find_cut_setting(
     speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
     if speed is None or depth is None:
-        missing = _missing_setting_field(speed)
+        missing = f"ProgramTable.{'speed_rpm' if speed is None else 'depth_mm'}"
         raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
@@ -98,13 +97,9 @@ def choose_cut(
         both = f"{'both' if cut else 'neither'} of choose_cut.program and choose_cut.cut"
         raise ValueError(f"{both}: say which cut it is; there are {names}")
     if cut and (speed is None or depth is None):
-        cure = "give speed and depth, or choose_cut.program with those of its own"
-        raise ValueError(f"choose_cut.cut {cut}: {_missing_setting_field(speed)} is missing; {cure}")
+        key, cure = "speed_rpm" if speed is None else "depth_mm", "choose_cut.program with those of its own"
+        raise ValueError(f"choose_cut.cut {cut}: ProgramTable.{key} is missing; give speed and depth, or {cure}")
     return find_cut_setting(machine, program or cut, speed, depth, power_kw)
-
-
-def _missing_setting_field(speed: float | None) -> str:
-    return "ProgramTable.speed_rpm" if speed is None else "ProgramTable.depth_mm"
 
 
 def _is_positive(value: float) -> bool:
@@ -166,8 +161,8 @@ def _complete_values(machine: Machine, values: Mapping[str, Any]) -> dict[str, A
     given = {key: value for key, value in values.items() if value is not None}
     _check_numbers(machine, given)
     programs = machine.all_programs
-    tool = given.get("tool") or (_find_common_values(programs).get("tool") if programs else machine.tap.tool)
-    common = _find_common_values([program for program in programs if program.tool == tool])
+    tool = given.get("tool") or (find_common_values(programs).get("tool") if programs else machine.tap.tool)
+    common = find_common_values([program for program in programs if program.tool == tool])
     if "material" in given or not common.keys() >= COEFFICIENT_KEYS:
         common = {key: value for key, value in common.items() if key not in COEFFICIENT_KEYS}
     if tool is None:
@@ -194,12 +189,6 @@ def _check_numbers(machine: Machine, given: Mapping[str, Any]) -> None:
     if not speeds.low_rpm <= speed <= speeds.high_rpm:
         limits = f"{speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
         raise ValueError(f"ProgramTable.speed_rpm {speed:g}: is outside [speed] {limits}")
-
-
-def _find_common_values(programs: Sequence[ProgramTable]) -> dict[str, Any]:
-    keys = [key for key in ProgramTable.__struct_fields__ if key not in ("name", *SETTING_KEYS)]
-    values = {key: {getattr(program, key) for program in programs} for key in keys}
-    return {key: next(iter(same)) for key, same in values.items() if len(same) == 1 and same != {None}}
 
 
 def _explain_missing(machine: Machine, tool: str | None) -> str:

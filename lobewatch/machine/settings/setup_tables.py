@@ -1,6 +1,6 @@
 """Tables of machine.toml on the machine, its tap test, its sensors and its DAQ."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from math import hypot, isfinite
 from typing import Annotated, Literal, Self
@@ -11,7 +11,7 @@ import acquisition
 from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
 from acquisition.text_boards import FrameFormat, OutputFormat
-from lobewatch.machine.settings.toml import NotNegative, Positive, TomlTable
+from lobewatch.machine.settings.toml import NotNegative, Plausible, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
 """Mounting of an accelerometer."""
@@ -52,7 +52,7 @@ class MachineTable(TomlTable, frozen=True):
 
     name: Annotated[str, Meta(min_length=1)]
     """Name of the machine."""
-    tap_interval_days: Positive = 30.0
+    tap_interval_days: Annotated[Positive, Plausible(0.5, 400)] = 30.0
     """Planned interval of tap tests (days)."""
     accepted: tuple[str, ...] = ()
     """Accepted questions about implausible settings."""
@@ -67,27 +67,27 @@ class TapTable(TomlTable, frozen=True):
     """Force sensor of the hammer; with "none" the acceleration detects hits, and K stays unknown."""
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
     """Number of good hits."""
-    record_s: Positive | None = None
+    record_s: Annotated[Positive, Plausible(0.01, 9)] | None = None
     """Record length (s); None: chosen by trial hits."""
-    pre_trigger_s: Positive = 0.02
+    pre_trigger_s: Annotated[Positive, Plausible(0.001, 0.9)] = 0.02
     """Pre-trigger time (s)."""
-    trigger_n: Positive | None = None
+    trigger_n: Annotated[Positive, Plausible(0.2, 199)] | None = None
     """Trigger level of the force (N); None: chosen by trial hits."""
-    position_mm: NotNegative = 0.0
+    position_mm: Annotated[NotNegative, Plausible(1, 999)] = 0.0
     """Distance of the hammer from the tool tip (mm)."""
-    stick_out_mm: float | None = None
+    stick_out_mm: Annotated[float, Plausible(3, 1000)] | None = None
     """Stick-out of the tool (mm)."""
-    drawbar_kn: float | None = None
+    drawbar_kn: Annotated[float, Plausible(0.5, 150)] | None = None
     """Drawbar force (kN)."""
     state: str = ""
     """State of the machine, a word or two."""
-    sensor_mass_g: Annotated[float, Meta(ge=0, le=MAX_SENSOR_MASS_G)] | None = None
+    sensor_mass_g: Annotated[float, Meta(ge=0, le=MAX_SENSOR_MASS_G), Plausible(0.1, 99)] | None = None
     """Mass of the accelerometer with its magnet (g); None if unknown."""
-    cable_mass_g: NotNegative = 0.0
+    cable_mass_g: Annotated[NotNegative, Plausible(0.1, 99)] = 0.0
     """Mass of the cable carried by the accelerometer (g)."""
     mounting: SensorMounting | None = None
     """Mounting of the accelerometer."""
-    sensor_band_hz: Positive | None = None
+    sensor_band_hz: Annotated[Positive, Plausible(100, 99_000)] | None = None
     """Upper frequency limit of the accelerometer from its data sheet (Hz); None: that of the sample rate."""
 
     def __post_init__(self) -> None:
@@ -123,7 +123,7 @@ class TapTable(TomlTable, frozen=True):
 class ModeTable(TomlTable, frozen=True):
     """Table [mode]: choice of the followed mode."""
 
-    band_hz: tuple[NotNegative, Positive] | None = None
+    band_hz: Annotated[tuple[NotNegative, Positive], Plausible(5, 100_000)] | None = None
     """Frequency band of the followed mode (Hz); None for all frequencies."""
     model_mode: Annotated[int, Meta(ge=1, le=50)] = 1
     """Number of the same mode in the spindle model, from 1."""
@@ -136,18 +136,18 @@ class ModeTable(TomlTable, frozen=True):
 class LimitsTable(TomlTable, frozen=True):
     """Table [limits]: frequency drops that warn and alarm; the defaults are the paper's."""
 
-    frequency_warn_percent: Positive = 5.0
+    frequency_warn_percent: Annotated[Positive, Plausible(0.1, 60)] = 5.0
     """Frequency drop that warns (%)."""
-    frequency_alarm_percent: Positive = 10.0
+    frequency_alarm_percent: Annotated[Positive, Plausible(0.1, 60)] = 10.0
     """Frequency drop that alarms (%)."""
 
 
 class SpeedTable(TomlTable, frozen=True):
     """Table [speed]: speed range of the lobe diagrams."""
 
-    low_rpm: Positive = 1000.0
+    low_rpm: Annotated[Positive, Plausible(10, 60_000)] = 1000.0
     """Lowest speed (rpm)."""
-    high_rpm: Positive = 24000.0
+    high_rpm: Annotated[Positive, Plausible(300, 250_000)] = 24000.0
     """Highest speed (rpm)."""
     steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
     """Number of speeds of a diagram."""
@@ -170,15 +170,15 @@ class ChannelTable(TomlTable, frozen=True):
 
     input: Annotated[int, Meta(ge=0)]
     quantity: Literal["force", "acceleration"]
-    range_v: Positive
-    sensitivity_mv_per_n: Sensitivity | None = None
-    sensitivity_mv_per_g: Sensitivity | None = None
-    gain: Positive = 1.0
+    range_v: Annotated[Positive, Plausible(0.05, 40)]
+    sensitivity_mv_per_n: Annotated[Sensitivity, Plausible(0.08, 30)] | None = None
+    sensitivity_mv_per_g: Annotated[Sensitivity, Plausible(0.8, 799)] | None = None
+    gain: Annotated[Positive, Plausible(0.2, 199)] = 1.0
     iepe: bool = True
     direction: TapDirection | Literal[""] = ""
     serial_number: str = ""
     calibration_date: date | None = None
-    skew_us: Annotated[float, Meta(ge=-1e6, le=1e6)] = 0.0
+    skew_us: Annotated[float, Meta(ge=-1e6, le=1e6), Plausible(0.05, 49)] = 0.0
 
     def __post_init__(self) -> None:
         key = "sensitivity_mv_per_n" if self.quantity == "force" else "sensitivity_mv_per_g"
@@ -192,19 +192,11 @@ class ChannelTable(TomlTable, frozen=True):
 
     def build(self) -> SensorInput:
         """Build the sensor input in SI units: volts per N or per m/s^2."""
-        if self.sensitivity_mv_per_n is not None:
-            sensitivity = self.sensitivity_mv_per_n / 1e3
-        else:
-            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
-        channel = Channel(
-            self.quantity,
-            sensitivity * self.gain,
-            self.range_v,
-            direction=self.direction,
-            serial_number=self.serial_number,
-            calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
-            skew=self.skew_us / 1e6,
-        )
+        per_newton, per_g = self.sensitivity_mv_per_n, self.sensitivity_mv_per_g or 0.0
+        sensitivity = per_g / 1e3 / acquisition.STANDARD_GRAVITY if per_newton is None else per_newton / 1e3
+        date = self.calibration_date.isoformat() if self.calibration_date else ""
+        channel = Channel(self.quantity, sensitivity * self.gain, self.range_v, skew=self.skew_us / 1e6)
+        channel = replace(channel, direction=self.direction, serial_number=self.serial_number, calibration_date=date)
         return SensorInput(self.input, channel, self.iepe)
 
 
@@ -235,7 +227,7 @@ class DaqTable(TomlTable, frozen=True):
     """Port of the DAQ; empty: search all ports."""
     driver: str = "taps"
     """Name of the driver."""
-    sample_rate_hz: Positive | None = None
+    sample_rate_hz: Annotated[Positive, Plausible(1000, 999_999)] | None = None
     """Sample rate (Hz); None: that of the driver."""
     loss_detection: bool = True
     """True to detect lost scans."""
@@ -243,7 +235,7 @@ class DaqTable(TomlTable, frozen=True):
     """True if a square wave on digital input 0 reveals lost scans."""
     accept_measured_rate: bool = False
     """True to use the measured sample rate if it differs from the nominal one."""
-    calibration_interval_months: Positive = 12.0
+    calibration_interval_months: Annotated[Positive, Plausible(1, 120)] = 12.0
     """Calibration interval of the sensors (months)."""
     anti_alias: bool | None = None
     """True if the DAQ has an anti-aliasing filter; None if unknown."""

@@ -1,6 +1,5 @@
 """Tables of machine.toml on the spindle model and the tools."""
 
-import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,76 +10,73 @@ from msgspec import Meta
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
-from lobewatch.machine.settings.toml import NotNegative, Positive, PositiveOrInfinite, TomlTable
+from lobewatch.machine.settings.toml import (
+    NotNegative,
+    Plausible,
+    Positive,
+    PositiveOrInfinite,
+    TomlTable,
+    suggest_spelling,
+)
+
+SHAFT_LENGTHS, SHAFT_POSITIONS = Plausible(0.6, 599), Plausible(1, 999)
+"""Plausible lengths and diameters of a segment, and positions on the shaft (mm)."""
 
 
 class SegmentTable(TomlTable, frozen=True):
     """Segment of the shaft."""
 
-    length_mm: Positive
-    outer_mm: Positive
-    bore_mm: NotNegative = 0.0
-    end_outer_mm: Positive | None = None
-    end_bore_mm: NotNegative | None = None
-    mass_outer_mm: Positive | None = None
+    length_mm: Annotated[Positive, SHAFT_LENGTHS]
+    outer_mm: Annotated[Positive, SHAFT_LENGTHS]
+    bore_mm: Annotated[NotNegative, SHAFT_LENGTHS] = 0.0
+    end_outer_mm: Annotated[Positive, SHAFT_LENGTHS] | None = None
+    end_bore_mm: Annotated[NotNegative, SHAFT_LENGTHS] | None = None
+    mass_outer_mm: Annotated[Positive, SHAFT_LENGTHS] | None = None
     material: str = ""
 
     def __post_init__(self) -> None:
         _check_wall(self.bore_mm, self.outer_mm, "bore_mm", "outer_mm")
-        if self.end_outer_mm is not None or self.end_bore_mm is not None:
-            outer = self.outer_mm if self.end_outer_mm is None else self.end_outer_mm
-            bore = self.bore_mm if self.end_bore_mm is None else self.end_bore_mm
-            _check_wall(bore, outer, "end_bore_mm", "end_outer_mm")
-        if self.mass_outer_mm is not None:
-            _check_wall(self.bore_mm, self.mass_outer_mm, "bore_mm", "mass_outer_mm")
+        bore = self.bore_mm if self.end_bore_mm is None else self.end_bore_mm
+        _check_wall(bore, self.end_outer_mm or self.outer_mm, "end_bore_mm", "end_outer_mm")
+        _check_wall(self.bore_mm, self.mass_outer_mm or math.inf, "bore_mm", "mass_outer_mm")
         if self.material and self.material not in MATERIALS:
-            near = difflib.get_close_matches(self.material, MATERIALS, n=1)
-            hint = f"; is {near[0]!r} meant?" if near else ""
+            hint = suggest_spelling(self.material, MATERIALS)
             raise ValueError(f"material={self.material!r} is none of {', '.join(MATERIALS)}{hint}")
 
     def build(self) -> Segment:
         """Build the segment in SI units."""
-        return Segment(
-            self.length_mm / 1e3,
-            self.outer_mm / 1e3,
-            self.bore_mm / 1e3,
-            material=MATERIALS[self.material] if self.material else None,
-            end_outer_diameter=_to_metres(self.end_outer_mm),
-            end_bore_diameter=_to_metres(self.end_bore_mm),
-            mass_diameter=_to_metres(self.mass_outer_mm),
-        )
+        material = MATERIALS[self.material] if self.material else None
+        segment = Segment(self.length_mm / 1e3, self.outer_mm / 1e3, self.bore_mm / 1e3, material=material)
+        diameters = self.end_outer_mm, self.end_bore_mm, self.mass_outer_mm
+        outer, bore, mass = (None if diameter is None else diameter / 1e3 for diameter in diameters)
+        return replace(segment, end_outer_diameter=outer, end_bore_diameter=bore, mass_diameter=mass)
 
 
 class BearingTable(TomlTable, frozen=True):
     """Bearing of the spindle."""
 
-    position_mm: NotNegative
-    stiffness_n_per_um: PositiveOrInfinite | None = None
-    damping_n_s_per_m: NotNegative = 0.0
-    rotational_stiffness_n_m_per_rad: NotNegative = 0.0
-    housing_stiffness_n_per_um: PositiveOrInfinite = math.inf
+    position_mm: Annotated[NotNegative, SHAFT_POSITIONS]
+    stiffness_n_per_um: Annotated[PositiveOrInfinite, Plausible(5, 4999)] | None = None
+    damping_n_s_per_m: Annotated[NotNegative, Plausible(5, 50_000)] = 0.0
+    rotational_stiffness_n_m_per_rad: Annotated[NotNegative, Plausible(100, 9e6)] = 0.0
+    housing_stiffness_n_per_um: Annotated[PositiveOrInfinite, Plausible(5, 9999)] = math.inf
     group: str = "bearings"
     rolling_elements: Literal["balls", "rollers"] = "balls"
 
     def build(self, stiffness_n_per_um: float) -> Bearing:
         """Build the bearing in SI units, with a default stiffness."""
         stiffness = stiffness_n_per_um if self.stiffness_n_per_um is None else self.stiffness_n_per_um
-        return Bearing(
-            self.position_mm / 1e3,
-            stiffness * 1e6,
-            damping=self.damping_n_s_per_m,
-            rotational_stiffness=self.rotational_stiffness_n_m_per_rad,
-            housing_stiffness=self.housing_stiffness_n_per_um * 1e6,
-            group=self.group,
-            rolling_elements=self.rolling_elements,
-        )
+        housing, tilting = self.housing_stiffness_n_per_um * 1e6, self.rotational_stiffness_n_m_per_rad
+        bearing = Bearing(self.position_mm / 1e3, stiffness * 1e6, damping=self.damping_n_s_per_m, group=self.group)
+        bearing = replace(bearing, rotational_stiffness=tilting, housing_stiffness=housing)
+        return replace(bearing, rolling_elements=self.rolling_elements)
 
 
 class MassTable(TomlTable, frozen=True):
     """Lumped mass, for example a pulley or a balance ring."""
 
-    position_mm: NotNegative
-    mass_kg: NotNegative
+    position_mm: Annotated[NotNegative, SHAFT_POSITIONS]
+    mass_kg: Annotated[NotNegative, Plausible(0.02, 199)]
     diametral_inertia_kg_mm2: NotNegative = 0.0
     polar_inertia_kg_mm2: NotNegative = 0.0
 
@@ -93,9 +89,9 @@ class MassTable(TomlTable, frozen=True):
 class JointTable(TomlTable, frozen=True):
     """Joint: tool in holder, or holder in spindle."""
 
-    position_mm: Positive
-    stiffness_n_per_um: Positive
-    rotational_stiffness_n_m_per_rad: Positive
+    position_mm: Annotated[Positive, SHAFT_POSITIONS]
+    stiffness_n_per_um: Annotated[Positive, Plausible(20, 1e5)]
+    rotational_stiffness_n_m_per_rad: Annotated[Positive, Plausible(1e4, 2e8)]
     group: str = ""
 
     def build(self) -> Joint:
@@ -109,16 +105,16 @@ class SpindleTable(TomlTable, frozen=True):
 
     segments: Annotated[list[SegmentTable], Meta(min_length=1)]
     bearings: Annotated[list[BearingTable], Meta(min_length=1)]
-    bearing_stiffness_n_per_um: Positive
+    bearing_stiffness_n_per_um: Annotated[Positive, Plausible(5, 4999)]
     masses: tuple[MassTable, ...] = ()
     joints: tuple[JointTable, ...] = ()
     theory: Theory = "euler-bernoulli"
-    youngs_modulus_gpa: Positive = 210.0
-    shear_modulus_gpa: Positive | None = None
-    density_kg_per_m3: Positive = 7850.0
-    damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
-    tool_length_mm: Positive | None = None
-    tolerance: Annotated[float, Meta(ge=0, le=0.1)] = 0.01
+    youngs_modulus_gpa: Annotated[Positive, Plausible(10, 700)] = 210.0
+    shear_modulus_gpa: Annotated[Positive, Plausible(5, 300)] | None = None
+    density_kg_per_m3: Annotated[Positive, Plausible(1000, 20_000)] = 7850.0
+    damping_ratio: Annotated[float, Meta(gt=0, lt=1), Plausible(0.001, 0.3)] = 0.03
+    tool_length_mm: Annotated[Positive, Plausible(3, 1000)] | None = None
+    tolerance: Annotated[float, Meta(ge=0, le=0.1), Plausible(0.0002, 0.1)] = 0.01
     label: str = ""
 
     def __post_init__(self) -> None:
@@ -140,25 +136,17 @@ class SpindleTable(TomlTable, frozen=True):
 
     def build(self) -> Spindle:
         """Build the spindle in SI units."""
-        return Spindle(
-            [segment.build() for segment in self.segments],
-            [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings],
-            youngs_modulus=self.youngs_modulus_gpa * 1e9,
-            density=self.density_kg_per_m3,
-            theory=self.theory,
-            shear_modulus=None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9,
-            masses=[mass.build() for mass in self.masses],
-            joints=[joint.build() for joint in self.joints],
-        )
+        segments = [segment.build() for segment in self.segments]
+        bearings = [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings]
+        masses, joints = [mass.build() for mass in self.masses], [joint.build() for joint in self.joints]
+        shear = None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9
+        steel = self.youngs_modulus_gpa * 1e9, self.density_kg_per_m3, self.theory, shear
+        return Spindle(segments, bearings, *steel, masses, joints)
 
 
 def _check_wall(bore: float, outer: float, bore_key: str, outer_key: str) -> None:
     if bore >= outer:
         raise ValueError(f"{bore_key}={bore:g} is not smaller than {outer_key}={outer:g}")
-
-
-def _to_metres(millimetres: float | None) -> float | None:
-    return None if millimetres is None else millimetres / 1e3
 
 
 class ToolTable(TomlTable, frozen=True):
@@ -168,14 +156,14 @@ class ToolTable(TomlTable, frozen=True):
     segments: tuple[SegmentTable, ...] = ()
     masses: tuple[MassTable, ...] = ()
     pitch_deg: tuple[float, ...] | None = None
-    teeth: Annotated[int, Meta(ge=1)] | None = None
-    diameter_mm: Positive | None = None
-    helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
-    flute_length_mm: Positive | None = None
+    teeth: Annotated[int, Meta(ge=1), Plausible(1, 40)] | None = None
+    diameter_mm: Annotated[Positive, Plausible(0.3, 299)] | None = None
+    helix_deg: Annotated[float, Meta(ge=0, lt=90), Plausible(1, 70)] | None = None
+    flute_length_mm: Annotated[Positive, Plausible(0.5, 499)] | None = None
     tool_material: ToolMaterial | None = None
-    cutting_speed_m_min: Positive | ValueRange | None = None
-    feed_per_tooth_mm: Positive | ValueRange | None = None
-    max_speed_rpm: Positive | None = None
+    cutting_speed_m_min: Annotated[Positive | ValueRange, Plausible(5, 4999)] | None = None
+    feed_per_tooth_mm: Annotated[Positive | ValueRange, Plausible(0.002, 1.9)] | None = None
+    max_speed_rpm: Annotated[Positive, Plausible(300, 250_000)] | None = None
 
     def __post_init__(self) -> None:
         convert_pitch(self.pitch_deg, self.teeth or len(self.pitch_deg or ()))

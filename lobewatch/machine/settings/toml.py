@@ -7,7 +7,8 @@ import json
 import re
 import tomllib
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -20,6 +21,19 @@ Positive = Annotated[float, Meta(gt=0, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
 PositiveOrInfinite = Annotated[float, Meta(gt=0)]
 """Positive number; infinite for "rigid" or "no limit"."""
+
+
+class Plausible(NamedTuple):
+    """Plausible range of a number in the unit of its key; 0 and infinity stand for "none" and are not asked about.
+
+    All ranges are chosen: what shops have, with room beside it, and where that can be had less than a factor of 1000
+    wide, so that a slip of 1000 leaves them. docs/plausible.md says which slips are not seen.
+    """
+
+    low: float
+    """Smallest plausible number."""
+    high: float
+    """Largest plausible number."""
 
 
 class TomlTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -39,10 +53,8 @@ def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
                     check_control_characters(inner, f"{place}{key.removesuffix('s')} {i}: ")
 
 
-RANGE_ERROR_HINTS = {
-    "helix_deg": "give the angle from the axis, 0 up to 90 deg; left-hand flutes cut alike, without a sign"
-}
-"""Remedy for a number outside the range of its key."""
+HELIX_HINT = "give the angle from the axis, 0 up to 90 deg; left-hand flutes cut alike, without a sign"
+"""Remedy for a helix angle outside its range."""
 
 
 def explain_validation_error(message: str, tables: Mapping[str, Any], root: type[TomlTable]) -> str:
@@ -53,13 +65,15 @@ def explain_validation_error(message: str, tables: Mapping[str, Any], root: type
     unknown, choice = re.search(r"unknown field `(\w+)`", text), re.search(r"Invalid enum value (.+)", text)
     if unknown:
         keys = _find_table_type(place, root).__struct_encode_fields__
-        text = f"unknown key {unknown[1]!r}{_suggest_spelling(unknown[1], keys)}"
+        text = f"unknown key {unknown[1]!r}{suggest_spelling(unknown[1], keys)}"
     elif choice:
-        allowed = _list_choices(place, root)
-        text = f"{choice[1]} is none of {', '.join(map(repr, allowed))}{_suggest_spelling(choice[1], allowed)}"
+        parent, _, key = place.rpartition(".")
+        kinds = _iterate_types(_find_field_type(_find_table_type(parent, root), key))
+        allowed = [kind for kind in kinds if isinstance(kind, str)]
+        text = f"{choice[1]} is none of {', '.join(map(repr, allowed))}{suggest_spelling(choice[1], allowed)}"
     elif re.match(r"Expected `\w+` [<>]", text):
-        key = re.split(r"\W", place.rstrip("0123456789[]"))[-1]
-        text = "; ".join(filter(None, [f"{text}, not {_find_value(tables, place)}", RANGE_ERROR_HINTS.get(key)]))
+        hint = f"; {HELIX_HINT}" if place.endswith(".helix_deg") else ""
+        text = f"{text}, not {_find_value(tables, place)}{hint}"
     return f"{where.replace('.', ' ')}: {text}" if where else text
 
 
@@ -69,8 +83,9 @@ def suggest_decimal_point(text: str) -> str:
     return f"; write {match[1]}.{match[2]} with a point" if match else ""
 
 
-def _suggest_spelling(word: str, words: typing.Sequence[str]) -> str:
-    near = difflib.get_close_matches(word.strip("'"), words, n=1)
+def suggest_spelling(word: str, words: Iterable[str]) -> str:
+    """Return a hint at the nearest of some words; empty without one."""
+    near = difflib.get_close_matches(word.strip("'"), list(words), n=1)
     return f"; is {near[0]!r} meant?" if near else ""
 
 
@@ -83,16 +98,16 @@ def _find_table_type(place: str, root: type[TomlTable]) -> type[TomlTable]:
     return table
 
 
-def _list_choices(place: str, root: type[TomlTable]) -> list[str]:
-    """Return the allowed words at a place like ".program[0].wear"."""
-    parent, _, key = place.rpartition(".")
-    kinds = _iterate_types(_find_field_type(_find_table_type(parent, root), key))
-    return [kind for kind in kinds if isinstance(kind, str)]
-
-
 def _find_field_type(table: type[TomlTable], key: str) -> object:
     own = dict(zip(table.__struct_encode_fields__, table.__struct_fields__, strict=True))[key]
     return typing.get_type_hints(table, include_extras=True)[own]
+
+
+@cache
+def find_plausible_ranges(table: type[TomlTable]) -> dict[str, Plausible]:
+    """Return the plausible ranges of a table by key."""
+    hints = typing.get_type_hints(table, include_extras=True).items()
+    return {key: part for key, kind in hints for part in _iterate_types(kind) if isinstance(part, Plausible)}
 
 
 def _iterate_types(kind: object) -> Iterator[object]:
@@ -232,23 +247,15 @@ def _edit_line(lines: list[str], start: int, end: int, key: str, value: TomlValu
         if places and places[0][1][1] is None:
             lines[places[0][0]] = f"# {lines[places[0][0]]}"
         return 0
-    content = f"{key} = {_format_toml_value(value)}"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        value = int(value)
+    content = f"{key} = {json.dumps(value, ensure_ascii=False)}"  # texts, numbers and words of TOML are those of JSON
     if not places:
-        lines.insert(_find_last_key(lines, start, end) + 1, content)
+        keys = (i for i in range(start, end) if re.match(r"[\w\"'. -]+=", lines[i]))
+        lines.insert(max(keys, default=start - 1) + 1, content)
         return 1
     number, match = places[0]
     comment = (match[3] or "").strip()
     column = lines[number].rindex(comment) if comment else 0
     lines[number] = f"{content.ljust(column - 1)} {comment}" if comment else content
     return 0
-
-
-def _find_last_key(lines: list[str], start: int, end: int) -> int:
-    """Return the last line of a range that sets a key, or the header line."""
-    return max((i for i in range(start, end) if re.match(r"[\w\"'. -]+=", lines[i])), default=start - 1)
-
-
-def _format_toml_value(value: TomlValue) -> str:
-    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    return json.dumps(value, ensure_ascii=False)  # texts, numbers and words of TOML are those of JSON

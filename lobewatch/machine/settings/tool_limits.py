@@ -1,7 +1,7 @@
 """Limits of a tool: speed range, feed range and depth from its [[tool]] or published tables."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -61,16 +61,21 @@ def find_tool_properties(machine: Machine, name: str) -> ToolProperties:
     """
     table = machine.tool_table(name)
     programs = [program for program in machine.all_programs if program.tool == name]
-    common: dict[str, Any] = {}
-    for field, key in PROGRAM_KEYS_BY_TOOL_FIELD.items():
-        values = {getattr(program, key) for program in programs}
-        common[field] = values.pop() if len(values) == 1 else None
+    shared = find_common_values(programs)
+    common: dict[str, Any] = {field: shared.get(key) for field, key in PROGRAM_KEYS_BY_TOOL_FIELD.items()}
     if table is None:
         return ToolProperties(name, **common)
     own = {field: value for field in PROGRAM_KEYS_BY_TOOL_FIELD if (value := getattr(table, field, None)) is not None}
     own |= {key: _to_range(getattr(table, key)) for key in ("cutting_speed_m_min", "feed_per_tooth_mm")}
     own |= {"tool_material": table.tool_material, "max_speed_rpm": table.max_speed_rpm or math.inf}
     return ToolProperties(name, **common | own)
+
+
+def find_common_values(programs: Sequence[ProgramTable]) -> dict[str, Any]:
+    """Return the values that all programs have in common, by key, except name, speed and depth."""
+    keys = [key for key in ProgramTable.__struct_fields__ if key not in ("name", "speed_rpm", "depth_mm")]
+    values = {key: {getattr(program, key) for program in programs} for key in keys}
+    return {key: next(iter(same)) for key, same in values.items() if len(same) == 1 and same != {None}}
 
 
 def find_feed_per_tooth(machine: Machine, table: CutTable) -> float | None:
@@ -136,11 +141,6 @@ class ToolLimits:
     def is_empty(self) -> bool:
         """True if the tool allows no speed of the spindle."""
         return self.low_rpm > self.high_rpm
-
-    @property
-    def is_capped(self) -> bool:
-        """True if max_speed_rpm of the [[tool]] sets the highest speed."""
-        return self.high_rpm == self.tool.max_speed_rpm
 
     @property
     def is_guessed(self) -> bool:

@@ -90,6 +90,13 @@ class MachineDraft:
             return dict(table)
         return dict(table[number]) if number < len(table) else {}
 
+    def find_number(self, name: str, key: str, value: str) -> int:
+        """Return the index of the table with a value in an array of tables, or of a new one."""
+        number = 0
+        while (table := self.table(name, number)) and table.get(key) != value:
+            number += 1
+        return number
+
     def set(self, name: str, number: int | None = None, /, **values: TomlValue) -> Self:
         """Set values of a table; DataError if the text cannot be edited."""
         return replace(self, text=edit_toml(self.text, TablePath(name, number), values))

@@ -6,6 +6,7 @@ from typing import Any, get_args
 
 from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
+from lobewatch.machine.settings.setting_questions import TEMPLATE_COEFFICIENTS
 from lobewatch.machine.settings.setup_tables import SensorMounting
 from lobewatch.machine.settings.toml import TomlValue
 from lobewatch.machine.setup_questions import draft as setup
@@ -52,12 +53,6 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft
 
 
-def _channel_number(quantity: str, draft: MachineDraft) -> int:
-    """Return the index of a sensor in [[daq.channel]], or of a new one."""
-    quantities = [channel.get("quantity") for channel in draft.table("daq").get("channel", ())]
-    return quantities.index(quantity) if quantity in quantities else len(quantities)
-
-
 def _described_by_daq(quantity: str, draft: MachineDraft) -> str:
     if draft.needs_sensors or (quantity == "force" and _lacks_hammer(draft)):
         return ""
@@ -72,25 +67,29 @@ def _lacks_hammer(draft: MachineDraft) -> bool:
 def _current_sensor(quantity: str, draft: MachineDraft) -> str:
     if quantity == "force" and (draft.has_no_force_sensor or _lacks_hammer(draft)):
         return NO_HAMMER_ANSWER
-    channel = draft.table("daq.channel", _channel_number(quantity, draft))
+    channel = draft.table("daq.channel", draft.find_number("daq.channel", "quantity", quantity))
     if not channel:
         return ""
     return setup.format_answer(*(channel[key] for key in ("input", SENSITIVITY_KEYS[quantity], "range_v")))
 
 
 def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft:
+    if quantity == "force":
+        if answer.strip().casefold() == NO_HAMMER_ANSWER:
+            return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
+        draft = draft.set("tap", hammer=None)
     names = ("input of the DAQ", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
     number, sensitivity, reach = setup.parse_numbers(answer, names)
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
     values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
-    return draft.set("daq.channel", _channel_number(quantity, draft), **values, range_v=reach)
+    place = draft.find_number("daq.channel", "quantity", quantity)
+    return draft.set("daq.channel", place, **values, range_v=reach)
 
 
-def _set_hammer(draft: MachineDraft, answer: str) -> MachineDraft:
-    if answer.strip().casefold() == NO_HAMMER_ANSWER:
-        return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
-    return _set_sensor("force", draft.set("tap", hammer=None), answer)
+def _sensor_question(name: str, quantity: str, text: str, example: str) -> SetupQuestion:
+    current, apply = partial(_current_sensor, quantity), partial(_set_sensor, quantity)
+    return SetupQuestion(name, text, example, current, apply, partial(_described_by_daq, quantity))
 
 
 def _current_mounting(draft: MachineDraft) -> str:
@@ -113,6 +112,14 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
 _DAQ_EXAMPLE = "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200"
 _FIXING_TEXT = f"Accelerometer on the tool: its mass (g), and fixed by {', '.join(MOUNTINGS[:-1])} or hand?"
 DAQ_QUESTION = SetupQuestion("daq", "On which port is the DAQ?", _DAQ_EXAMPLE, _current_port, _set_port)
+
+
+def _current_name(draft: MachineDraft) -> str:
+    return str(draft.table("machine")["name"])
+
+
+def _set_name(draft: MachineDraft, answer: str) -> MachineDraft:
+    return draft.set("machine", name=answer.strip())
 
 
 def _current_speeds(draft: MachineDraft) -> str:
@@ -138,19 +145,15 @@ def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
-DEFAULT_PROGRAM_NAME = "first cut"
-"""Name of the first program if the answer has none."""
 SETUP_COEFFICIENT_KEYS = ("tangential_n_per_mm2", "radial_n_per_mm2")
 """Keys of the coefficients that replace a material."""
-SETUP_TEMPLATE_COEFFICIENTS = (700, 250)
-"""Values of these keys in a new machine.toml."""
 _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
 def _current_tool(draft: MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    made_of = draft.table("tool", _tool_number(draft)).get("tool_material")
+    made_of = draft.table("tool", draft.find_number("tool", "name", draft.table("tap")["tool"])).get("tool_material")
     numbers = setup.format_answer(*values, *([stick_out] if stick_out else []))
     return f"{numbers} {made_of}" if made_of else numbers
 
@@ -165,7 +168,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
     tool: dict[str, TomlValue] = {"teeth": int(teeth), "tool_diameter_mm": diameter, "helix_deg": helix}
     draft = _set_in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
-    number = _tool_number(draft)
+    number = draft.find_number("tool", "name", draft.table("tap")["tool"])
     if made_of is None and not draft.table("tool", number):
         return draft
     return draft.set("tool", number, name=draft.table("tap")["tool"], tool_material=made_of)
@@ -179,20 +182,12 @@ def _split_tool_answer(answer: str) -> tuple[str, ToolMaterial | None]:
     return answer, None
 
 
-def _tool_number(draft: MachineDraft) -> int:
-    """Return the index of the [[tool]] of the tapped tool, or of a new one."""
-    number = 0
-    while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
-        number += 1
-    return number
-
-
 def _current_material(draft: MachineDraft) -> str:
     cut = draft.table("reference_cut")
     if "material" in cut:
         return str(cut["material"])
     pair = tuple(cut[key] for key in SETUP_COEFFICIENT_KEYS if key in cut)
-    return setup.OPEN_ANSWER if pair in (SETUP_TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
+    return setup.OPEN_ANSWER if pair in (TEMPLATE_COEFFICIENTS, ()) else setup.format_answer(*pair)
 
 
 def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
@@ -228,7 +223,7 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
-    name = name.strip() if colon else DEFAULT_PROGRAM_NAME
+    name = name.strip() if colon else "first cut"
     setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
     setting["feed_per_tooth_mm"] = feed[0] if feed else None
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
@@ -238,35 +233,16 @@ _TOOL_TEXT = "The tool that is tapped: teeth, diameter (mm), helix (deg), length
 _MATERIAL_TEXT = "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)"
 _MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
 _PROGRAM_TEXT = "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?"
+_SENSOR_TEXT = "{}: input of the DAQ, sensitivity (mV/{}, on its calibration sheet), range (V)?"
 _DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor?"
 _EXAMPLE_TOOL = "4 20 30 80 coated carbide"
 SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
-    SetupQuestion(
-        "name",
-        "What is the machine called?",
-        "mill-3",
-        lambda draft: str(draft.table("machine")["name"]),
-        lambda draft, answer: draft.set("machine", name=answer.strip()),
-    ),
+    SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name),
     SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds),
     SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     DAQ_QUESTION,
-    SetupQuestion(
-        "hammer",
-        "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)? Or none: no force sensor.",
-        "0 2.25 5",
-        partial(_current_sensor, "force"),
-        _set_hammer,
-        partial(_described_by_daq, "force"),
-    ),
-    SetupQuestion(
-        "accelerometer",
-        "Accelerometer: input of the DAQ, sensitivity (mV/g, on its calibration sheet), range (V)?",
-        "1 10 5",
-        partial(_current_sensor, "acceleration"),
-        partial(_set_sensor, "acceleration"),
-        partial(_described_by_daq, "acceleration"),
-    ),
+    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('Hammer', 'N')} Or none: no force sensor.", "0 2.25 5"),
+    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("Accelerometer", "g"), "1 10 5"),
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
     SetupQuestion("tool", f"{_TOOL_TEXT} {_TOOL_MATERIALS_TEXT}?", _EXAMPLE_TOOL, _current_tool, _set_tool),
     SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),
@@ -277,8 +253,7 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
 
 def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
-    for question in SETUP_QUESTIONS:
-        if question.name == name:
-            return question
-    names = ", ".join(question.name for question in SETUP_QUESTIONS)
-    raise ValueError(f"find_setup_question.name {name}: no such question; there are {names}")
+    by_name = {question.name: question for question in SETUP_QUESTIONS}
+    if name not in by_name:
+        raise ValueError(f"find_setup_question.name {name}: no such question; there are {', '.join(by_name)}")
+    return by_name[name]

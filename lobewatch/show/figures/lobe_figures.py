@@ -20,10 +20,10 @@ from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
-from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
-from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
+from lobewatch.machine.journal.entries import CutEntry, geometry_key
 from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, LabelPlacer, Paint, new_axes, save_figure
 from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid

@@ -14,12 +14,12 @@ from acquisition import Frf, TapTest
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.verdict_at_speed import compute_lobes_at_speed
 from lobewatch.history import HistoryRow
-from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.history.history import compute_row_lobes
 from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import Machine
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.show.figures.lobe_figures import LobeDiagram, pick_evenly, select_test_cuts

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobewatch.history.export_columns import make_export_columns
+from lobewatch.history.history import make_export_columns
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""

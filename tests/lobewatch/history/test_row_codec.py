@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Circumstances, Conditions, Remark, TapTest, from_accelerance, new_tap_id
 from lobewatch.history import HistoryRow
-from lobewatch.history.row_codec import decode_row, encode_row
+from lobewatch.history.history import decode_row, encode_row
 from lobewatch.logbook import Logbook
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS

@@ -89,7 +89,7 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
 
 def test_one_that_is_found_damaged_late_is_left_out_too(tapped: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     tapped.logbook.status()
-    monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_BYTES", 0)
+    monkeypatch.setattr("lobewatch.machine.folder.MAX_HASHED_BYTES", 0)
     bad = file_of(tapped, -1)
     flip(bad)
     logbook = tapped.logbook

@@ -29,8 +29,7 @@ from acquisition import (
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
 from lobes import SldHistory, lower_envelope, zero_order_lobes
 from lobewatch.history import History
-from lobewatch.history.export_columns import compute_row_lobes, make_export_columns
-from lobewatch.history.history import HistoryRow
+from lobewatch.history.history import HistoryRow, compute_row_lobes, make_export_columns
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder

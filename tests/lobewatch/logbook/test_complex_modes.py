@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from lobes import lower_envelope, program_limit, read_history, write_history, zero_order_lobes
-from lobewatch.history.export_columns import make_export_columns
-from lobewatch.history.history import HistoryRow, make_empty_history
-from lobewatch.history.row_codec import decode_row, encode_row
+from lobewatch.history.history import HistoryRow, decode_row, encode_row, make_empty_history, make_export_columns
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.tool import Assembly

@@ -20,7 +20,7 @@ from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
 from lobewatch.machine.folder_updates import exclude_entry, include_entry, make_observed_cut, store_cut
-from lobewatch.machine.journal.cut_entry import CutEntry, parse_cut_line
+from lobewatch.machine.journal.entries import CutEntry, parse_cut_line
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.settings.requested_cut import find_by_name, find_cut_setting
 from lobewatch.machine.verify_files import verify

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lobes import Cut, radial_lobes, stability_boundary
-from lobewatch.history.export_columns import compute_row_lobes
+from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.figures.lobe_figures import BAND_LABEL, plot_radial_map, plot_waterfall

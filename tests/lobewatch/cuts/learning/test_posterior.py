@@ -19,7 +19,7 @@ from lobewatch.cuts.learning.cut_likelihood import (
 )
 from lobewatch.cuts.learning.label_check import Contradiction, find_inconsistent_cuts
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.entries import CutVerdict
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill, doubt
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import exclude_entry, make_observed_cut, store_cut
-from lobewatch.machine.journal.cut_entry import CutEntry
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.verdicts import Stability
 

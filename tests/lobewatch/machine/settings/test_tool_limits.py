@@ -10,7 +10,7 @@ import pytest
 
 from acquisition import DataError
 from lobewatch.machine import CutTable, Machine, MissingToolData, ToolLimits, find_tool_limits, find_tool_properties
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.setting_questions import find_all_questions
 

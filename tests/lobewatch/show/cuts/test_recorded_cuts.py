@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.show.cuts.recorded_cuts import FAULT_TEXTS, NEXT_STEP_TEXTS
 
 pytestmark = pytest.mark.quick

@@ -73,7 +73,7 @@ def test_the_oldest_test_is_left_out_where_its_file_turns_out_to_be_damaged(
     for week in range(3):
         shop.tap(7 * week, 1713.0 - week)
     assert len(shop.logbook.history.rows) == 3
-    monkeypatch.setattr("lobewatch.machine.folder_contents.MAX_HASHED_FILES", 1)
+    monkeypatch.setattr("lobewatch.machine.folder.MAX_HASHED_FILES", 1)
     oldest: Path = min((shop.path / "taps").glob("*.h5"))
     content = bytearray(oldest.read_bytes())
     content[len(content) // 2] ^= 1

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats, Indices
+from dsm.arrays import Floats, Indices, require_number
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness, scale_parts
 from dsm.matrix.assemble import assemble
@@ -117,9 +117,7 @@ def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, grou
     frequency: (n,) Hz, > 0; shape of the result (n,). group: bearings that the factor is for; None: all that have
     a group. One eigenproblem of the order of the number of bearings for each frequency.
     """
-    f = check_frequencies(frequency)
-    if np.any(f == 0):
-        raise ValueError("frequency=0 Hz is not > 0")
+    f = check_frequencies(frequency, positive=True)
     problem = bearing_eigenproblem(spindle, f, group)
     index = problem.pick(mode)
     value = problem.values[np.arange(f.size), np.where(index < 0, 0, index)]
@@ -244,10 +242,8 @@ def calibrate(
 
 
 def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -> None:
-    if not (math.isfinite(frequency) and frequency > 0):
-        raise ValueError(f"frequency={frequency} Hz is not a finite number > 0")
-    if frequency_std is not None and not (math.isfinite(frequency_std) and frequency_std >= 0):
-        raise ValueError(f"frequency_std={frequency_std} Hz is not a finite number >= 0")
+    require_number("frequency", frequency, " Hz", positive=True)
+    require_number("frequency_std", frequency_std, " Hz")
     if not 1 <= mode <= MAX_MODES:
         raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
 

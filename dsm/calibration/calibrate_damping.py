@@ -1,14 +1,13 @@
 """Calibrate the damping of bearings to one measured damping ratio."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from dsm.arrays import Floats
+from dsm.arrays import Floats, require_number
 from dsm.calibration.report_text import format_with_error
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.modes.damped_modes import DampedMode, DampedShaft
@@ -199,8 +198,7 @@ def calibrate_damping(
 def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> None:
     if not 0 < damping_ratio < 1:
         raise ValueError(f"damping_ratio={damping_ratio} is not between 0 and 1")
-    if damping_ratio_std is not None and not (math.isfinite(damping_ratio_std) and damping_ratio_std >= 0):
-        raise ValueError(f"damping_ratio_std={damping_ratio_std} is not a finite number >= 0")
+    require_number("damping_ratio_std", damping_ratio_std)
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
 
@@ -234,7 +232,7 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
     def excess(amount: float) -> float:
         return dampers.follow(low, amount).mode.damping_ratio - target
 
-    root = _find_root(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
+    root = scipy.optimize.brentq(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
     return dampers.follow(low, root)
 
 
@@ -246,7 +244,9 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
     for _ in range(MAX_DAMPING_STEPS):
         if low.amount > MAX_DAMPER_SHARE * unit:
             break
-        step = min(_damper_step(low, target), max(FIRST_DAMPER_STEP * unit, MAX_DAMPER_GROWTH * low.amount), longest)
+        # Twice the Newton step, which is too short if the curve bends down.
+        newton = 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
+        step = min(newton, max(FIRST_DAMPER_STEP * unit, MAX_DAMPER_GROWTH * low.amount), longest)
         try:
             high = dampers.follow(low, low.amount + step)
         except ArithmeticError:
@@ -263,16 +263,7 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
     )
 
 
-def _damper_step(low: _DampingPoint, target: float) -> float:
-    """Return twice the Newton step, which is too short if the curve bends down."""
-    return 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
-
-
 def _find_maximum(dampers: _Dampers, low: _DampingPoint, high: _DampingPoint) -> _DampingPoint:
     """Find the largest damping ratio between a point with rising and one with falling slope."""
-    return dampers.follow(low, _find_root(lambda v: dampers.follow(low, v).slope, low.amount, high.amount, rtol=1e-10))
-
-
-def _find_root(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
-
-    return float(scipy.optimize.brentq(function, low, high, **tolerances))
+    ends = low.amount, high.amount
+    return dampers.follow(low, scipy.optimize.brentq(lambda v: dampers.follow(low, v).slope, *ends, rtol=1e-10))

@@ -16,7 +16,6 @@ from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.matrix.dynamic_stiffness import check_frequencies
 from dsm.modes.find_modes import find_modes
 from dsm.modes.natural_frequencies import natural_frequencies
-from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle
 
 DIAMETER_STEP = 1e-3
@@ -54,7 +53,7 @@ def diameter_effects(spindle: Spindle, values: Callable[[Spindle], Floats], name
     """
     columns = []
     for number in range(len(spindle.segments)):
-        low, high = (values(_scale_diameter(spindle, number, 1 + side * DIAMETER_STEP)) for side in (-1, 1))
+        low, high = (values(_scale_diameters(spindle, number, 1 + side * DIAMETER_STEP)) for side in (-1, 1))
         columns.append(np.log(high / low) / (2 * DIAMETER_STEP))
     own = [column for column, (owner, _) in zip(columns, names, strict=False) if owner != ALL_SPINDLES]
     return np.array([*columns, TOOL_TOLERANCE_RATIO * np.sum(own, axis=0)] if own else columns).T
@@ -82,24 +81,12 @@ def diameter_columns(names: Sequence[Sequence[DiameterKey]]) -> dict[DiameterKey
     return {name: column for column, name in enumerate(dict.fromkeys(name for row in names for name in row))}
 
 
-def _scale_diameter(spindle: Spindle, number: int, factor: float) -> Spindle:
+def _scale_diameters(spindle: Spindle, number: int, factor: float) -> Spindle:
+    """Scale all diameters of one segment."""
     segments = list(spindle.segments)
-    segments[number] = _scale_segment(segments[number], factor)
+    diameters = {field: size for field, size in vars(segments[number]).items() if field.endswith("_diameter") and size}
+    segments[number] = replace(segments[number], **{field: factor * size for field, size in diameters.items()})
     return replace(spindle, segments=segments)
-
-
-def _scale_segment(segment: Segment, factor: float) -> Segment:
-    def times(diameter: float | None) -> float | None:
-        return None if diameter is None else factor * diameter
-
-    return replace(
-        segment,
-        outer_diameter=factor * segment.outer_diameter,
-        bore_diameter=factor * segment.bore_diameter,
-        end_outer_diameter=times(segment.end_outer_diameter),
-        end_bore_diameter=times(segment.end_bore_diameter),
-        mass_diameter=times(segment.mass_diameter),
-    )
 
 
 class MeasuredModes(NamedTuple):
@@ -128,9 +115,7 @@ def check_measured_modes(
     shaft: Sequence[int] | None,
 ) -> MeasuredModes:
     """Check the measured modes of so many spindles, as fit_stiffness takes them; ValueError for invalid ones."""
-    f = check_frequencies(frequency)
-    if np.any(f == 0):
-        raise ValueError("frequency=0 Hz is not > 0")
+    f = check_frequencies(frequency, positive=True)
     std = None if frequency_std is None else np.atleast_1d(np.asarray(frequency_std, dtype=np.float64))
     if std is not None and (std.shape != f.shape or not np.all(np.isfinite(std) & (std > 0))):
         raise ValueError(

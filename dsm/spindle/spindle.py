@@ -8,8 +8,9 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from dsm.arrays import require_numbers
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.segment import SAME_PLACE, STEEL, Material, Segment, nearest_index, require_positive, ring_area
+from dsm.spindle.segment import MATERIAL_UNITS, SAME_PLACE, STEEL, Material, Segment, nearest_index, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
@@ -66,10 +67,7 @@ class Spindle:
             raise ValueError(f"theory={self.theory!r} is none of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
             raise ValueError(f"{len(self.segments)} segments were given; a spindle has 1 to {MAX_SEGMENTS} of them")
-        require_positive("", "youngs_modulus", self.youngs_modulus, "Pa")
-        require_positive("", "density", self.density, "kg/m^3")
-        if self.shear_modulus is not None:
-            require_positive("", "shear_modulus", self.shear_modulus, "Pa")
+        require_numbers("", self, MATERIAL_UNITS, positive=True)
         for number, segment in enumerate(self.segments, 1):
             segment.check(f"segment {number}: ")
         self._check_parts("bearing", self.bearings)

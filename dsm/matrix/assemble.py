@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from dsm.arrays import Flags, Floats, Indices
-from dsm.elements.beam_elements import link_elements, place_nodes, stiffness_elements
+from dsm.arrays import Flags, Floats
+from dsm.elements.beam_elements import beam_elements, place_nodes
 from dsm.elements.element_series import combine_rotary_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
@@ -40,23 +41,31 @@ def assemble(
     bearings far softer than the shaft. Matrices are cached.
     Raises ValueError for a place off the shaft.
     """
-    nodes = tuple(map(float, places))
-    return _assemble(spindle, float(top_frequency), nodes, tuple(held), tuple(left_out), spin, links)
+    shaft = ShaftRequest(spindle, tuple(map(float, places)), tuple(held), tuple(left_out), spin, links)
+    return assemble_request(shaft, float(top_frequency))
+
+
+class ShaftRequest(NamedTuple):
+    """Arguments of assemble without the frequency, hashable."""
+
+    spindle: Spindle
+    places: tuple[float, ...]
+    held: tuple[HeldDof, ...]
+    left_out: tuple[int, ...] = ()
+    spin: float | None = None
+    links: bool = False
 
 
 @lru_cache(maxsize=32)
-def _assemble(
-    spindle: Spindle,
-    top_frequency: float,
-    places: tuple[float, ...],
-    held: tuple[HeldDof, ...],
-    left_out: tuple[int, ...],
-    spin: float | None,
-    links: bool,
-) -> DynamicStiffness:
-    if spin is not None and spin < 0:
-        return _reverse_spin(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
-    wanted = (*_part_positions(spindle), *places, *(z for z, _ in held))
+def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffness:
+    """Assemble the matrix of a request, see assemble."""
+    spindle, places, held, left_out, spin, links = shaft
+    if spin is not None and spin < 0:  # speed and frequency change their signs together
+        opposite = assemble_request(shaft._replace(spin=-spin), top_frequency)
+        sign = (-1.0) ** np.arange(opposite.diagonal.shape[2])
+        return replace(opposite, diagonal=sign * opposite.diagonal, coupling=sign * opposite.coupling, spin=spin)
+    parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
+    wanted = (*(part.position for part in parts), *places, *(z for z, _ in held))
     fastest = None if spin is None else shared_spin_limit(spin, top_frequency)
     segments, joints = tuple(spindle.segments), tuple(spindle.joints)
     bare = _assemble_shaft(segments, spindle.material, spindle.theory, joints, wanted, top_frequency, fastest, links)
@@ -96,9 +105,9 @@ def _assemble_shaft(
     fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
     """
     shaft = sections_of_segments(segments, material)
-    position, segment, short = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
-    series = _element_series(theory, shaft, position, segment, short, fastest is not None)
-    position, series, short = _insert_joints(joints, position, series, short)
+    nodes = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
+    series = beam_elements(shaft, theory, nodes, apart=fastest is not None)
+    position, series, short = _insert_joints(joints, nodes.position, series, nodes.short)
     return _join_elements(position, series, short, top_frequency, _shaft_stiffness(shaft))
 
 
@@ -108,30 +117,6 @@ def shared_spin_limit(spin: float, top_frequency: float) -> float:
     while fastest < spin:
         fastest *= 2
     return fastest
-
-
-def _reverse_spin(model: DynamicStiffness) -> DynamicStiffness:
-    """Return the shaft with the opposite sense of rotation: speed and frequency change their signs together."""
-    sign = (-1.0) ** np.arange(model.diagonal.shape[2])
-    spin = None if model.spin is None else -model.spin
-    return replace(model, diagonal=sign * model.diagonal, coupling=sign * model.coupling, spin=spin)
-
-
-def _part_positions(spindle: Spindle) -> list[float]:
-    parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
-    return [part.position for part in parts]
-
-
-def _element_series(
-    theory: Theory, shaft: Sections, position: Floats, segment: Indices, short: Flags, apart: bool
-) -> Floats:
-    """Return the series of all elements, (10, n_elements, n_terms): link_elements if short, else stiffness_elements."""
-    blocks = []
-    for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        blocks.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
-    series = np.empty((10, segment.size, blocks[0].shape[2]))
-    series[:, ~short], series[:, short] = blocks
-    return series
 
 
 def _insert_joints(

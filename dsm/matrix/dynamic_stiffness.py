@@ -3,24 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from dsm.arrays import Flags, Floats, Indices
+from dsm.arrays import Flags, Floats, Indices, check_numbers
+from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.segment import nearest_index, nearest_indices
 
 
-def check_frequencies(frequency: ArrayLike) -> Floats:
-    """Return the frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
-    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    if f.ndim != 1:
-        raise ValueError(f"frequency has shape {f.shape}; a 1-D array (Hz) is needed")
-    bad = f[~(np.isfinite(f) & (f >= 0))]
-    if bad.size:
-        raise ValueError(f"frequency={bad[0]} Hz is not a finite number >= 0")
+def check_frequencies(frequency: ArrayLike, positive: bool = False) -> Floats:
+    """Return frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0.
+
+    ValueError for 0, too, if `positive`.
+    """
+    f = check_numbers("frequency", np.atleast_1d(frequency), " Hz", " (Hz)")
+    if positive and np.any(f == 0):
+        raise ValueError("frequency=0 Hz is not > 0")
     return f
 
 
@@ -51,14 +52,6 @@ def symmetric_factor(matrix: Floats) -> SymmetricFactor:
 
 
 Number = TypeVar("Number", np.float64, np.complex128)
-
-
-class _PositionedPart(Protocol):
-    """Part of a spindle."""
-
-    @property
-    def position(self) -> float:
-        """Distance from the tool tip (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +106,8 @@ class DynamicStiffness:
         """Return the index of the node nearest to a position (m)."""
         return nearest_index(self.position, position)
 
-    def dofs(self, parts: Sequence[_PositionedPart]) -> Indices:
+    def dofs(self, parts: Sequence[Bearing | Joint]) -> Indices:
         """Return the indices of the deflections at parts in a full matrix, shape (n,)."""
-        if not parts:
-            return np.zeros(0, dtype=int)
         return 2 * nearest_indices(self.position, [part.position for part in parts])
 
     def blocks(self, eigenvalue: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
@@ -183,17 +174,16 @@ class DynamicStiffness:
 
     def term(self, power: int) -> Floats:
         """Return the coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
-        return np.asarray(
-            full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
-        )
+        return np.asarray(full_matrices(self.diagonal[..., [power]], self.coupling[..., [power]])[0])
 
 
 def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
     """Return full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
-    uu, ut, tt = diagonal
-    size = 2 * uu.shape[0]
-    matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
-    matrices[:, _block_indices(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
+    size = 2 * diagonal.shape[1]
+    rows, columns = _lower_half(diagonal.shape[1])
+    values = np.concatenate([*diagonal, *coupling]).T
+    matrices = np.zeros((values.shape[0], size * size), dtype=diagonal.dtype)
+    matrices[:, size * rows + columns] = matrices[:, size * columns + rows] = values
     return matrices.reshape(-1, size, size)
 
 
@@ -206,16 +196,6 @@ def _lower_half(n_nodes: int) -> tuple[Indices, Indices]:
     pairs += [(right, left), (right + 1, left), (right, left + 1), (right + 1, left + 1)]
     rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
     return rows, columns
-
-
-@lru_cache(maxsize=32)
-def _block_indices(n_nodes: int) -> Indices:
-    """Return the indices of the blocks in a flattened matrix: on, above and below the diagonal."""
-    u = 2 * np.arange(n_nodes)
-    left, right = u[:-1], u[1:]
-    above = [(left, right), (left, right + 1), (left + 1, right), (left + 1, right + 1)]
-    pairs = [(u, u), (u, u + 1), (u + 1, u), (u + 1, u + 1), *above, *((column, row) for row, column in above)]
-    return np.concatenate([2 * n_nodes * row + column for row, column in pairs])
 
 
 def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:

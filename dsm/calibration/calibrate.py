@@ -111,19 +111,6 @@ def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | Non
     return CalibratedSprings(tuple(chosen), model, forces * model.scale[:, np.newaxis], np.diag(softness))
 
 
-def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
-    """Return the factor on the bearing stiffnesses that puts a mode at each frequency; NaN if none does.
-
-    frequency: (n,) Hz, > 0; shape of the result (n,). group: bearings that the factor is for; None: all that have
-    a group. One eigenproblem of the order of the number of bearings for each frequency.
-    """
-    f = check_frequencies(frequency, positive=True)
-    problem = bearing_eigenproblem(spindle, f, group)
-    index = problem.pick(mode)
-    value = problem.values[np.arange(f.size), np.where(index < 0, 0, index)]
-    return np.where(index < 0, np.nan, -1 / value)
-
-
 def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
     """Compute the bearing stiffness for which a mode has each frequency.
 
@@ -158,7 +145,10 @@ def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group
     [250.0, 196.9, nan]
     """
     mean = parts_stiffness(spindle, calibrated_parts(spindle, group))
-    return mean * stiffness_factor(spindle, frequency, mode, group)
+    problem = bearing_eigenproblem(spindle, check_frequencies(frequency, positive=True), group)
+    index = problem.pick(mode)
+    value = problem.values[np.arange(index.size), np.where(index < 0, 0, index)]
+    return mean * np.where(index < 0, np.nan, -1 / value)
 
 
 LOOSE_JOINT_FACTOR = 1e-9
@@ -216,7 +206,10 @@ def calibrate(
     >>> abs(now.residual) < 1e-6  # Hz: solved again
     True
     """
-    _check_frequency(frequency, frequency_std, mode)
+    require_number("frequency", frequency, " Hz", positive=True)
+    require_number("frequency_std", frequency_std, " Hz")
+    if not 1 <= mode <= MAX_MODES:
+        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
     problem = bearing_eigenproblem(spindle, _with_interval_ends(frequency, frequency_std), group)
     index = int(problem.pick(mode)[0])
     chosen = problem.springs.parts
@@ -239,13 +232,6 @@ def calibrate(
         given=spindle,
         parts=chosen,
     )
-
-
-def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -> None:
-    require_number("frequency", frequency, " Hz", positive=True)
-    require_number("frequency_std", frequency_std, " Hz")
-    if not 1 <= mode <= MAX_MODES:
-        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
 
 
 def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats:

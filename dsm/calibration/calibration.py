@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from dsm.calibration.identifiability import MIN_ENERGY_SHARE
+from dsm.calibration.least_squares import MIN_ENERGY_SHARE
 from dsm.calibration.report_text import FitRemark, format_with_error
 from dsm.calibration.stiffness_groups import scale_parts
 from dsm.modes.natural_frequencies import modal_stiffness, natural_frequencies

@@ -12,13 +12,11 @@ import numpy as np
 import scipy
 
 from dsm.arrays import Floats
-from dsm.calibration.least_squares import Iterate, StiffnessProblem, minimize
+from dsm.calibration.least_squares import MAX_LOG_INTERVAL, Iterate, StiffnessProblem, minimize
 from dsm.calibration.report_text import FitRemark
 
 PROFILE_CONFIDENCE = 0.95
 """Confidence of the compared intervals."""
-MAX_LOG_INTERVAL = math.log(30.0)
-"""Largest interval, in the logarithm of the factor."""
 PROFILE_STEPS = 0.2, 0.7, 1.7, 3.4
 """Distances beyond the first-order interval at which S(v) is computed (logarithm of the factor)."""
 RIVAL_START_DISTANCES = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
@@ -35,8 +33,8 @@ MIN_RIVAL_DISTANCE = 4.0
 """Least distance of another solution (standard errors of a factor)."""
 LOW_ENERGY_SHARE = 0.1
 """Energy share in every measured mode below which stiffness far from the fit is tried."""
-MIN_ENERGY_SHARE = 0.01
-"""Least energy share in a measured mode of a group with effect."""
+MAX_RIVALS = 8
+"""Most solutions that are taken in turn, each as it fits better than the one before."""
 IDENTIFIABILITY_REMEDY = "measure more or other modes, or leave the group out"
 
 
@@ -87,13 +85,28 @@ class Profile(NamedTuple):
 class ProfileScan(NamedTuple):
     """Profiles and other minima around a fit over the whole range of factors."""
 
+    log_covariance: Floats
+    """Covariance of the logarithms of the factors, shape (g, g)."""
     profiles: tuple[Profile | None, ...]
     """Profile of each factor; None if its interval is too small, or the model cannot be solved there."""
     rivals: tuple[Iterate, ...]
     """Other minima, the lowest first; they may be lower than the fit."""
 
 
-def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
+def scan_rivals(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, ProfileScan | None]:
+    """Return the solution, or another that fits better by more than 95 % intervals allow, with its profile scan."""
+    for _ in range(MAX_RIVALS):
+        covariance = problem.covariance(state)
+        if covariance is None:
+            return state, None
+        around = _scan_profiles(problem, state, covariance)
+        if not around.rivals or around.rivals[0].cost + AllowedExcess.of(problem, around.rivals[0]).limit > state.cost:
+            break
+        state = around.rivals[0]
+    return state, around
+
+
+def _scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
     """Scan each factor over its interval, and up to a factor of 30 beyond and through the given stiffness.
 
     Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness,
@@ -112,7 +125,7 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floa
     for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
             rivals.append(minimize(problem, start, (), _profile_tolerance(problem, best))[0])
-    return ProfileScan(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
+    return ProfileScan(log_covariance, tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
 
 
 def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> Floats:
@@ -131,9 +144,7 @@ def _weakest_direction_starts(best: Iterate, log_covariance: Floats) -> list[Flo
     return [best.log_factor + step * direction for step in RIVAL_START_DISTANCES if direction.size > 1]
 
 
-def identifiability_remarks(
-    problem: StiffnessProblem, best: Iterate, log_covariance: Floats | None, around: ProfileScan | None
-) -> list[FitRemark]:
+def identifiability_remarks(problem: StiffnessProblem, best: Iterate, around: ProfileScan | None) -> list[FitRemark]:
     """Return remarks on groups whose factor the frequencies leave open.
 
     For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
@@ -142,34 +153,31 @@ def identifiability_remarks(
     profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of S - S_min as
     normal deviates, the rises at its ends give its coverage, and the likelihood beyond them, integrated over
     v, reduces it: not twice as often wrong as stated is good enough. All other minima within the 95 % intervals
-    are reported. Without a covariance the energy shares alone decide.
+    are reported. Without a scan the energy shares alone decide.
     """
-    felt = np.max(best.share, axis=0)
-    text = "at most {:.2g} % of the strain energy of the measured modes is in it"
-    remarks = [
-        FitRemark("group-not-felt", name, text.format(100 * share), IDENTIFIABILITY_REMEDY)
-        for name, share in zip(problem.names, felt.tolist(), strict=True)
-        if share < MIN_ENERGY_SHARE
-    ]
-    if log_covariance is None or around is None:
+    remarks = []
+    for index in np.flatnonzero(best.unfelt).tolist():
+        text = f"at most {100 * np.max(best.share[:, index]):.2g} % of the strain energy of the measured modes is in it"
+        remarks.append(FitRemark("group-not-felt", problem.names[index], text, IDENTIFIABILITY_REMEDY))
+    if around is None:
         return remarks
-    others = _rival_text(problem, best, log_covariance, around.rivals)
+    others = _rival_text(problem, best, around)
     if others:
         text = f"another solution fits as well: factors {others}"
         return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, IDENTIFIABILITY_REMEDY)]
-    for index in np.flatnonzero(felt >= MIN_ENERGY_SHARE).tolist():
-        text = _open_interval_text(problem, best, float(log_covariance[index, index]), index, around.profiles[index])
+    for index in np.flatnonzero(~best.unfelt).tolist():
+        text = _open_interval_text(problem, best, around, index)
         if text:
             remarks.append(FitRemark("stiffness-ambiguous", problem.names[index], text, IDENTIFIABILITY_REMEDY))
     return remarks
 
 
-def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: Floats, rivals: Sequence[Iterate]) -> str:
+def _rival_text(problem: StiffnessProblem, best: Iterate, around: ProfileScan) -> str:
     """Return the factors of all solutions that fit as well, far off in one that is not open."""
-    error, highest = np.sqrt(np.diag(log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
+    error, highest = np.sqrt(np.diag(around.log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
     far = np.where(error < MAX_LOG_INTERVAL, MIN_RIVAL_DISTANCE * error + MIN_PROFILE_WIDTH, math.inf)
     apart = [best.log_factor]
-    for rival in rivals:
+    for rival in around.rivals:
         if rival.cost < highest and all(np.max(np.abs(rival.log_factor - other) / far) > 1 for other in apart):
             apart.append(rival.log_factor)
     return " or ".join(", ".join(f"{math.exp(value):.3g}" for value in rival) for rival in apart[1:])
@@ -194,9 +202,9 @@ def _likelihood_profile(problem: StiffnessProblem, best: Iterate, cov: Floats, i
     return Profile(ends, (below, above))
 
 
-def _open_interval_text(problem: StiffnessProblem, best: Iterate, var: float, i: int, way: Profile | None) -> str:
+def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: ProfileScan, i: int) -> str:
     """Return the fault of the interval of one factor; empty if there is none."""
-    allowed = AllowedExcess.of(problem, best)
+    allowed, way, var = AllowedExcess.of(problem, best), around.profiles[i], float(around.log_covariance[i, i])
     half = math.sqrt(allowed.rise * var)
     if not half < MAX_LOG_INTERVAL:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"

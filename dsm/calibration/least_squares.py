@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats, Indices
+from dsm.arrays import Flags, Floats, Indices
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.matrix.dynamic_stiffness import check_frequencies
 from dsm.modes.find_modes import find_modes
@@ -158,6 +158,10 @@ FREQUENCY_ROUNDING = 1e-10
 """Relative rounding error of frequencies, which may hide the gain of a step."""
 MIN_CHI_SQUARE_PROBABILITY = 1e-3
 """Least probability of a chi-square, or least relative residual without standard errors, that is reported."""
+MAX_LOG_INTERVAL = math.log(30.0)
+"""Largest interval, in the logarithm of a factor."""
+MIN_ENERGY_SHARE = 0.01
+"""Least energy share in a measured mode of a group with effect."""
 
 
 class Iterate(NamedTuple):
@@ -182,6 +186,11 @@ class Iterate(NamedTuple):
     def cost(self) -> float:
         """Sum of squares."""
         return float(self.residual @ self.residual)
+
+    @property
+    def unfelt(self) -> Flags:
+        """Factors without effect on the measured modes, shape (g,)."""
+        return np.asarray(np.max(self.share, axis=0) < MIN_ENERGY_SHARE)
 
 
 class StiffnessProblem(NamedTuple):
@@ -227,12 +236,38 @@ class StiffnessProblem(NamedTuple):
             residual, slope = self.weight @ residual, self.weight @ slope
         return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope)
 
+    def covariance(self, state: Iterate) -> Floats | None:
+        """Return (J^T J)^-1, times the variance of the residuals if no standard errors were given.
+
+        A group without effect, known to a factor of 30 at best, counts as known to that and independent of all others.
+        """
+        variance = 1.0
+        if self.measured.std is None:
+            if self.degrees_of_freedom == 0:
+                return None
+            variance = state.cost / self.degrees_of_freedom
+        covariance = variance * _inverse_normal_matrix(state.slope)
+        felt = ~state.unfelt | (np.diag(covariance) < MAX_LOG_INTERVAL**2)
+        if np.all(felt):
+            return covariance
+        limited = np.diag(np.full(felt.size, MAX_LOG_INTERVAL**2))
+        if np.any(felt):
+            limited[np.ix_(felt, felt)] = variance * _inverse_normal_matrix(state.slope[:, felt])
+        return limited
+
     def fits(self, state: Iterate) -> bool:
         """Return whether the residuals have the expected size."""
         measured = self.measured
         if measured.std is None:
             return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < MIN_CHI_SQUARE_PROBABILITY
         return float(scipy.special.chdtrc(max(self.degrees_of_freedom, 1), state.cost)) > MIN_CHI_SQUARE_PROBABILITY
+
+
+def _inverse_normal_matrix(slope: Floats) -> Floats:
+    """Return (J^T J)^-1, large if J is singular."""
+    _, values, vectors = np.linalg.svd(slope, full_matrices=False)
+    root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
+    return np.asarray(root @ root.T)
 
 
 def minimize(

@@ -44,8 +44,8 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
     """Scale bearing stiffnesses, and both stiffnesses of joints, by a factor; see calibrated_parts."""
-    factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
-    return _with_parts(spindle, [_scale_part(p, one, one) for p, one in zip(_parts(spindle), factors, strict=True)])
+    parts = [_scale_part(p, factor, factor) if i in chosen else p for i, p in enumerate(_parts(spindle))]
+    return _with_parts(spindle, parts)
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
@@ -111,10 +111,10 @@ def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
 
     It is d ln w^2 / d ln factor.
     """
-    energy = spring_energy(modes)
+    energy, parts = spring_energy(modes), _parts(modes.spindle)
     shares = np.zeros((modes.frequency.size, len(groups)))
     springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
-    names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting_group, modes.spindle.joints)]
+    names = [*(part.group for part in parts), *map(_tilting_group, modes.spindle.joints)]
     for name, of_spring in zip(names, springs, strict=True):
         if name in groups:
             shares[:, groups.index(name)] += of_spring

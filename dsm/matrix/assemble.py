@@ -108,7 +108,7 @@ def _assemble_shaft(
     nodes = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
     series = beam_elements(shaft, theory, nodes, apart=fastest is not None)
     position, series, short = _insert_joints(joints, nodes.position, series, nodes.short)
-    return _join_elements(position, series, short, top_frequency, _shaft_stiffness(shaft))
+    return _join_elements(position, series, short, top_frequency, shaft)
 
 
 def shared_spin_limit(spin: float, top_frequency: float) -> float:
@@ -135,9 +135,9 @@ def _insert_joints(
 
 
 def _join_elements(
-    position: Floats, series: Floats, short: Flags, top_frequency: float, least: tuple[float, float]
+    position: Floats, series: Floats, short: Flags, top_frequency: float, shaft: Sections
 ) -> DynamicStiffness:
-    """Join elements, with a node of force and moment inside each link; the scale is that of `least` only."""
+    """Join elements, with a node of force and moment inside each link; the scale is that of the whole shaft only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
     count, terms = node[-1] + 1, series.shape[2]
     diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
@@ -150,16 +150,11 @@ def _join_elements(
     places = np.full(count, math.inf)
     places[node] = position
     held = np.zeros((count, 2), dtype=bool)
-    scale = np.tile(1 / np.sqrt(least), count)
-    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
-
-
-def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
-    """Return the stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
-    middle = np.arange(shaft.ends.size - 1)
-    rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
+    middle = (shaft.ends[1:] + shaft.ends[:-1]) / 2
+    rigidity = float(np.mean(shaft.at(np.arange(middle.size), middle).rigidity))
     length = float(shaft.ends[-1])
-    return rigidity / length**3, rigidity / length
+    scale = np.tile(1 / np.sqrt([rigidity / length**3, rigidity / length]), count)
+    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
 
 
 def _dof_scale(model: DynamicStiffness) -> Floats:

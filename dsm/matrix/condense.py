@@ -49,7 +49,8 @@ def condense_to_node(
     # From the far end down to the node, where the two sides of a coupling block change places.
     flipped = coupling[: node - diagonal.shape[0] : -1][:, [0, 2, 1, 3]]
     right, _, _ = _eliminate(diagonal[:node:-1], flipped, is_link[:node:-1], flipped.shape[0])
-    return CondensedStiffness(*(diagonal[node] - left - right), share_u, share_t)
+    uu, ut, tt = diagonal[node] - left - right
+    return CondensedStiffness(uu, ut, tt, share_u, share_t)
 
 
 def _eliminate(

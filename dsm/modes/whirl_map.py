@@ -139,12 +139,9 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     # Both senses of a speed one after the other: they share a matrix.
     frequencies = [[find_modes(spindle, count, spin=sense * spin).frequency for sense in (1.0, -1.0)] for spin in spins]
     forward, backward = np.moveaxis(np.reshape(frequencies, (-1, 2, count)), 0, 2)
-    return WhirlMap(speed, forward, backward, _critical_speeds(spindle, speed, forward))
-
-
-def _critical_speeds(spindle: Spindle, speed: Floats, forward: Floats) -> Floats:
-    """Return the critical speed of each mode ahead of the slowest speed and behind the fastest."""
+    # The critical speeds are those of each mode ahead of the slowest speed and behind the fastest.
     slowest, fastest = np.argmin(speed), np.argmax(speed)
     ahead = forward[:, slowest] >= speed[slowest] / 60
     crossed = np.flatnonzero(ahead & (forward[:, fastest] <= speed[fastest] / 60))
-    return np.array([critical_speed(spindle, int(mode) + 1) for mode in crossed], dtype=np.float64)
+    critical = np.array([critical_speed(spindle, int(mode) + 1) for mode in crossed], dtype=np.float64)
+    return WhirlMap(speed, forward, backward, critical)

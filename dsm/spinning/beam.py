@@ -103,12 +103,8 @@ class SpinningBeam:
     @property
     def is_supported(self) -> bool:
         """True if nothing moves without bending or straining a spring, in either plane."""
-        for axis in ("u", "v"):
-            supports = self._supports(axis)
-            pins = {position for position, is_slope in supports if not is_slope}
-            if len(pins) < 2 and not (pins and len(supports) > len(pins)):
-                return False
-        return True
+        planes = [self._supports(axis) for axis in ("u", "v")]
+        return all(len(held) > 1 and any(not is_slope for _, is_slope in held) for held in planes)
 
     def stiffness(self, spring: SpinningSpring) -> Iterator[tuple[SpinningDof, float]]:
         """Yield the stiffness that a spring adds to u and to v (N/m).

@@ -71,18 +71,15 @@ def _matrices(length: Floats, section: Floats, kind: ElementKind) -> tuple[Float
     """Return stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
     rigidity, shear, mass, rotary = section
     point, weight = np.polynomial.legendre.leggauss(4)
-    if kind == "linear":
-        strain_point, strain_weight = np.array([0.5]), np.array([1.0])
-    else:
-        strain_point, strain_weight = (1 + point) / 2, weight / 2
+    everywhere = list(zip((1 + point) / 2, weight / 2, strict=True))
     softness = 12 * rigidity / (shear * length**2) if kind == "timoshenko" else np.zeros(length.size)
     stiff, heavy = np.zeros((length.size, 4, 4)), np.zeros((length.size, 4, 4))
-    for x, share in zip(strain_point, strain_weight, strict=True):
+    for x, share in [(0.5, 1.0)] if kind == "linear" else everywhere:
         bend, slide = _strains(x, length, softness, kind)
         stiff += _weighted_square(bend, share * length * rigidity)
         if kind != "euler-bernoulli":
             stiff += _weighted_square(slide, share * length * shear)
-    for x, share in zip((1 + point) / 2, weight / 2, strict=True):
+    for x, share in everywhere:
         deflection, rotation = _shapes(x, length, softness, kind)
         heavy += _weighted_square(deflection, share * length * mass)
         if kind != "euler-bernoulli":

@@ -31,7 +31,9 @@ def require_number(
 def require_numbers(where: str, part: object, units: Mapping[str, str], **rule: bool) -> None:
     """Check the numbers of a part named in `units` with require_number; `where` begins the message."""
     for name, unit in units.items():
-        require_number(where + name, getattr(part, name), "", f" ({unit})", **rule)
+        value = getattr(part, name)
+        if value is not None and not 0 < value < math.inf:  # a few only, as texts cost time
+            require_number(where + name, value, "", f" ({unit})", **rule)
 
 
 def check_numbers(

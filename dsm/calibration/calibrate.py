@@ -13,7 +13,7 @@ from dsm.arrays import Floats, Indices, require_number
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness, scale_parts
 from dsm.matrix.assemble import assemble
-from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies, count_modes_of_factor, symmetric_factor
+from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies
 from dsm.modes.find_modes import MAX_MODES
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
@@ -84,8 +84,8 @@ def bearing_eigenproblem(spindle: Spindle, frequency: Floats, group: str | None 
     """
     springs = _calibrated_springs(spindle, 2.0 ** (math.ceil(4 * math.log2(np.max(frequency, initial=1.0))) / 4), group)
     w2 = (2 * np.pi * frequency) ** 2
-    factors = [symmetric_factor(matrix) for matrix in springs.model.scaled(w2)]
-    below = np.array([count_modes_of_factor(springs.model, factor) for factor in factors], dtype=int)
+    factors = springs.model.factors(w2)
+    below = np.array([factor.modes_below for factor in factors], dtype=int)
     solved = [factor.solve(springs.forces) for factor in factors]
     response = np.array(solved).reshape(w2.size, *springs.forces.shape)
     values, vectors = np.linalg.eigh(springs.forces.T @ response + springs.housing)

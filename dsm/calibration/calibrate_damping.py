@@ -72,14 +72,12 @@ class DampingCalibration:
         """Return the report."""
         damping = format_with_error(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
         measured = format_with_error(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
-        return "\n".join(
-            [
-                f"bearing damping  {damping} each on average",
-                f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz",
-                f"other damping    damping ratio {self.other_damping_ratio:.6g} without these dampers, "
-                f"loss factor {self.loss_factor:g}",
-                f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio",
-            ]
+        other = f"{self.other_damping_ratio:.6g} without these dampers, loss factor {self.loss_factor:g}"
+        return (
+            f"bearing damping  {damping} each on average\n"
+            f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz\n"
+            f"other damping    damping ratio {other}\n"
+            f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio"
         )
 
 
@@ -205,16 +203,15 @@ def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: 
 
 def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
     """Return the given dampers, or dampers with damper over stiffness of 1 us in each bearing."""
-    ratio = np.zeros(len(spindle.bearings))
-    damped = [index for index in chosen if spindle.bearings[index].damping > 0]
+    bearings = [spindle.bearings[index] for index in chosen]
+    damped = [bearing for bearing in bearings if bearing.damping > 0]
     if damped and len(damped) < len(chosen):
         raise ValueError(
             f"{len(damped)} of the {len(chosen)} bearings to calibrate have damping; give it to all of them, for its "
             "ratio, or to none, for the ratio of their stiffnesses"
         )
-    for index in chosen:
-        bearing = spindle.bearings[index]
-        ratio[index] = bearing.damping if damped else 1e-6 * bearing.stiffness
+    ratio = np.zeros(len(spindle.bearings))
+    ratio[chosen] = [bearing.damping if damped else 1e-6 * bearing.stiffness for bearing in bearings]
     return ratio
 
 
@@ -228,11 +225,8 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
-
-    def excess(amount: float) -> float:
-        return dampers.follow(low, amount).mode.damping_ratio - target
-
-    root = scipy.optimize.brentq(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
+    ends, close = (low.amount, high.amount), {"xtol": 1e-15 * high.amount, "rtol": 1e-13}
+    root = scipy.optimize.brentq(lambda v: dampers.follow(low, v).mode.damping_ratio - target, *ends, **close)
     return dampers.follow(low, root)
 
 

@@ -68,18 +68,12 @@ class AllowedExcess(NamedTuple):
         return -square / 2 if math.isinf(dof) else -(dof + 1) / 2 * math.log1p(square / dof)
 
 
-class Profile(NamedTuple):
-    """Least sum of squares over all other factors, S(v), along the logarithm v of one factor."""
+Profile = list[list[Iterate]]
+"""Least sum of squares over all other factors, S(v), along the logarithm v of one factor, below and above the fit.
 
-    ends: tuple[Iterate, Iterate]
-    """Ends of its first-order interval, below and above; the best fit without an interval."""
-    beyond: tuple[tuple[Iterate, ...], tuple[Iterate, ...]]
-    """States further away, below and above; empty if not computed."""
-
-    def sides(self) -> Iterator[tuple[Iterate, ...]]:
-        """Yield each end with the states beyond."""
-        for end, further in zip(self.ends, self.beyond, strict=True):
-            yield end, *further
+Each side begins with the end of the first-order interval, the best fit without an interval; the states further away
+follow if they are computed.
+"""
 
 
 class ProfileScan(NamedTuple):
@@ -120,7 +114,7 @@ def _scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Flo
             ways.append(_likelihood_profile(problem, best, log_covariance, index, felt < LOW_ENERGY_SHARE))
         except ArithmeticError:
             ways.append(None)
-    falling = [state.log_factor for way in ways if way is not None for s in way.sides() for state in _lower_points(s)]
+    falling = [state.log_factor for way in ways if way for side in way for state in _lower_points(side)]
     rivals = []
     for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
@@ -189,17 +183,15 @@ def _likelihood_profile(problem: StiffnessProblem, best: Iterate, cov: Floats, i
     if half < MIN_PROFILE_WIDTH:
         return None
     fixed = [i, *np.flatnonzero(np.diag(cov) >= MAX_LOG_INTERVAL**2).tolist()]
-    ends = best, best
+    ends = [best, best]
     if half < MAX_LOG_INTERVAL:
         along = np.clip(half * cov[:, i] / cov[i, i], -MAX_LOG_INTERVAL, MAX_LOG_INTERVAL)
-        ends = problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)
+        ends = [problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)]
         if not all(MIN_INTERVAL_RISE < (end.cost - best.cost) / allowed.limit < 1 / MIN_INTERVAL_RISE for end in ends):
-            low, high = (minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends)
-            ends = low, high
+            ends = [minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends]
     if not far:
-        return Profile(ends, ((), ()))
-    below, above = (tuple(_extend_profile(problem, best, end, fixed, s)) for s, end in zip((-1, 1), ends, strict=True))
-    return Profile(ends, (below, above))
+        return [[end] for end in ends]
+    return [[end, *_extend_profile(problem, best, end, fixed, s)] for s, end in zip((-1, 1), ends, strict=True)]
 
 
 def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: ProfileScan, i: int) -> str:
@@ -212,18 +204,16 @@ def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: Profil
         return ""
     if way is None:
         return "its interval reaches where the model cannot be solved"
-    near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end in way.ends])
-    beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way.sides()]
+    near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end, *_ in way])
+    beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way]
     mass = math.sqrt(2 * math.pi * var)
     total = mass + math.fsum(part for side in beyond for part, _ in side)
     held = near * mass / total
     if held >= MIN_INTERVAL_COVERAGE:
         return ""
     low, high = (_interval_reach(side, total * (1 - PROFILE_CONFIDENCE) / 2, half) for side in beyond)
-    reach = f"the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
-    return (
-        f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: {reach}"
-    )
+    text = f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: "
+    return f"{text}the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
 
 
 def _likelihood_masses(

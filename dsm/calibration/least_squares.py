@@ -130,14 +130,13 @@ def check_measured_modes(
     numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
     for number in range(spindles):
-        _check_mode_numbers(f[where == number], numbers[where == number] if whole else numbers, mode)
+        _check_mode_numbers(f[where == number], numbers[where == number] if whole else numbers[:0], mode)
     return MeasuredModes(numbers, f, std, where)
 
 
 def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None) -> None:
     """Check the mode numbers of one spindle."""
-    whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
-    if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
+    if numbers.shape != f.shape or np.any(numbers < 1) or np.unique(numbers).size < f.size:
         raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
     order = np.argsort(numbers)
     if np.any(np.diff(f[order]) <= 0):

@@ -143,9 +143,11 @@ class StiffnessFit:
 
     def __str__(self) -> str:
         """Return the report."""
-        return "\n".join(
-            [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines(), *self._remark_lines()]
-        )
+        lines = [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines()]
+        chi = self.reduced_chi_square
+        if chi is not None:
+            lines.append(f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right")
+        return "\n".join([*lines, *(f"warning: {remark}" for remark in self.remarks)])
 
     def _stiffness_lines(self) -> list[str]:
         width = max(map(len, self.groups))
@@ -179,13 +181,6 @@ class StiffnessFit:
             place = f"{self.shaft[index] + 1:7d}, {number:4d}" if several else f"{number:4d}"
             lines.append(f"{place}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
         return lines
-
-    def _remark_lines(self) -> list[str]:
-        chi = self.reduced_chi_square
-        lines = []
-        if chi is not None:
-            lines = [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
-        return [*lines, *(f"warning: {remark}" for remark in self.remarks)]
 
 
 class StiffnessFitError(ArithmeticError):

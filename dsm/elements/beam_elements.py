@@ -48,8 +48,8 @@ def beam_elements(shaft: Sections, theory: Theory, nodes: Nodes, apart: bool) ->
     for chosen, rows_of in ((~nodes.short & ~plain, _stiffness_rows), (nodes.short, _link_rows)):
         if np.any(chosen):
             transfer = transfer_series(shaft, theory, nodes.segment[chosen], start[chosen], end[chosen], apart)
-            quarters = (transfer[:, :2, :2], transfer[:, :2, 2:], transfer[:, 2:, :2], transfer[:, 2:, 2:])
-            series[:, chosen] = rows_of(*quarters)
+            far = np.ascontiguousarray(transfer.transpose(1, 2, 3, 0))
+            series[:, chosen] = rows_of(far[:2, :2], far[:2, 2:], far[2:, :2], far[2:, 2:]).swapaxes(1, 2)
     return series
 
 
@@ -75,46 +75,39 @@ def _link_rows(_: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
 
 
 def _matrix_rows(first: Floats, second: Floats, across: Floats) -> Floats:
-    """Return the upper halves of two symmetric matrices, the means of both halves, and all entries of a third."""
-    halves = [(m[:, 0, 0], (m[:, 0, 1] + m[:, 1, 0]) / 2, m[:, 1, 1]) for m in (first, second)]
-    return np.stack([*halves[0], *halves[1], *(across[:, i, j] for i in (0, 1) for j in (0, 1))])
+    """Return the upper halves of two symmetric matrices, the means of both halves, and all entries of a third.
+
+    Power series of 2 x 2 matrices have the shape (2, 2, n_terms, n), rows the shape (10, n_terms, n).
+    """
+    halves = [(m[0, 0], (m[0, 1] + m[1, 0]) / 2, m[1, 1]) for m in (first, second)]
+    return np.stack([*halves[0], *halves[1], *across[0], *across[1]])
 
 
 def _multiply_series(a: Floats, b: Floats) -> Floats:
-    """Multiply power series of 2 x 2 matrices, shape (n, 2, 2, n_terms), cut off after n_terms."""
-    near, far = _terms_outside(a), _terms_outside(b)
-    series = np.zeros_like(far)
-    for power in np.flatnonzero(near.any(axis=(0, 1, 3))):
-        series[:, :, power:] += _multiply(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
-    return _terms_last(series)
+    """Multiply power series of 2 x 2 matrices, cut off after n_terms."""
+    series = np.zeros_like(b)
+    for power in np.flatnonzero(a.any(axis=(0, 1, 3))):
+        series[:, :, power:] += _multiply(a[:, :, power, np.newaxis], b[:, :, : b.shape[2] - power])
+    return series
 
 
 def _invert_series(a: Floats) -> Floats:
     """Invert a power series of 2 x 2 matrices whose term 0 has an inverse."""
-    given = _terms_outside(a)
-    (p, q), (r, s) = given[:, :, :1]
+    (p, q), (r, s) = a[:, :, :1]
     inverted = np.array([[s, -q], [-r, p]]) / (p * s - q * r)
-    series, remainder = np.zeros_like(given), np.zeros_like(given)
+    series, remainder = np.zeros_like(a), np.zeros_like(a)
     remainder[0, 0, 0] = remainder[1, 1, 0] = 1.0
-    for power in range(given.shape[2]):
+    for power in range(a.shape[2]):
         if not np.any(remainder[:, :, power]):
             continue
         series[:, :, power, np.newaxis] = _multiply(inverted, remainder[:, :, power, np.newaxis])
-        earlier = _multiply(given[:, :, 1 : given.shape[2] - power], series[:, :, power, np.newaxis])
+        earlier = _multiply(a[:, :, 1 : a.shape[2] - power], series[:, :, power, np.newaxis])
         remainder[:, :, power + 1 :] -= earlier
-    return _terms_last(series)
+    return series
 
 
 def _multiply(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, :1] * b[:1] + a[:, 1:] * b[1:])
-
-
-def _terms_outside(series: Floats) -> Floats:
-    return np.ascontiguousarray(series.transpose(1, 2, 3, 0))
-
-
-def _terms_last(terms: Floats) -> Floats:
-    return np.ascontiguousarray(terms.transpose(3, 0, 1, 2))
 
 
 MAX_SHAFT_ELEMENTS = 1000

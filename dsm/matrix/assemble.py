@@ -21,6 +21,7 @@ SLOW_SPIN_SHARE = 0.25
 """Speed over the highest w below which shafts are divided alike: gyroscopic moments are small then."""
 HeldDof = tuple[float, int]
 """Fixed degree of freedom: position (m), and 0 for the deflection or 1 for the slope."""
+_ShaftAlone = tuple[tuple[Segment, ...], Material, Theory, tuple[Joint, ...]]
 
 
 def assemble(
@@ -67,13 +68,13 @@ def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffn
     parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
     wanted = (*(part.position for part in parts), *places, *(z for z, _ in held))
     fastest = None if spin is None else shared_spin_limit(spin, top_frequency)
-    segments, joints = tuple(spindle.segments), tuple(spindle.joints)
-    bare = _assemble_shaft(segments, spindle.material, spindle.theory, joints, wanted, top_frequency, fastest, links)
+    shaft_alone = tuple(spindle.segments), spindle.material, spindle.theory, tuple(spindle.joints)
+    bare = _assemble_shaft(shaft_alone, wanted, top_frequency, fastest, links)
     diagonal, coupling = (
         part.copy() if spin is None else combine_rotary_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
-    held_dofs, scale = bare.held.copy(), bare.scale.copy()
-    model = replace(bare, diagonal=diagonal, coupling=coupling, held=held_dofs, scale=scale, spin=spin)
+    own = {name: getattr(bare, name).copy() for name in ("held", "scale")}
+    model = replace(bare, diagonal=diagonal, coupling=coupling, spin=spin, **own)
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
     model.scale[:] = _dof_scale(model)
@@ -91,19 +92,13 @@ def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffn
 
 @lru_cache(maxsize=32)
 def _assemble_shaft(
-    segments: tuple[Segment, ...],
-    material: Material,
-    theory: Theory,
-    joints: tuple[Joint, ...],
-    wanted: tuple[float, ...],
-    top_frequency: float,
-    fastest: float | None,
-    links: bool,
+    alone: _ShaftAlone, wanted: tuple[float, ...], top_frequency: float, fastest: float | None, links: bool
 ) -> DynamicStiffness:
     """Assemble the shaft and its joints alone, common to spindles that differ in bearings and masses.
 
     fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
     """
+    segments, material, theory, joints = alone
     shaft = sections_of_segments(segments, material)
     nodes = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
     series = beam_elements(shaft, theory, nodes, apart=fastest is not None)

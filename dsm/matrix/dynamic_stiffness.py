@@ -32,23 +32,19 @@ class SymmetricFactor(NamedTuple):
     """Entries of L, and of D in 1 x 1 and 2 x 2 blocks."""
     pivots: NDArray[np.int32]
     """Row exchanges; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
+    link_pivots: int
+    """Number of negative eigenvalues that belong to links."""
 
     @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues (Sylvester's law of inertia)."""
+    def modes_below(self) -> int:
+        """Number of modes below w, of K(w): its negative eigenvalues (Sylvester's law) without those of links."""
         single = self.pivots > 0
         pairs = (self.pivots.size - np.count_nonzero(single)) // 2
-        return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs)
+        return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs) - self.link_pivots
 
     def solve(self, right: Floats) -> Floats:
         """Solve matrix times y = right, shape (n, m)."""
         return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
-
-
-def symmetric_factor(matrix: Floats) -> SymmetricFactor:
-    """Factor a matrix (n, n) in Fortran order from its lower half; the matrix is overwritten."""
-    values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
-    return SymmetricFactor(values, pivots)
 
 
 Number = TypeVar("Number", np.float64, np.complex128)
@@ -122,12 +118,14 @@ class DynamicStiffness:
         """Return K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
         return full_matrices(*self.blocks(eigenvalue, derivative))
 
-    def scaled(self, eigenvalue: Floats) -> list[Floats]:
-        """Return K at each eigenvalue, scaled, in Fortran order; the lower half, 0 above it."""
+    def factors(self, eigenvalue: Floats) -> list[SymmetricFactor]:
+        """Return the factor of K, scaled, at each eigenvalue."""
         place, coefficients = self._lower
         matrices = np.zeros((eigenvalue.size, self.scale.size**2))
         matrices[:, place] = (coefficients @ self._powers(eigenvalue)).T
-        return [matrix.reshape(self.scale.size, -1).T for matrix in matrices]
+        lower_halves = (matrix.reshape(self.scale.size, -1).T for matrix in matrices)  # in Fortran order
+        factors = (scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)[:2] for matrix in lower_halves)
+        return [SymmetricFactor(values, pivots, self.link_pivots) for values, pivots in factors]
 
     def slope_of(self, eigenvalue: Floats, shape: Floats) -> Floats:
         """Return phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
@@ -207,10 +205,4 @@ def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
     of links are subtracted. For a spinning shaft, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
     falls through 0 once, for any phi.
     """
-    counts = [count_modes_of_factor(model, symmetric_factor(matrix)) for matrix in model.scaled(eigenvalue)]
-    return np.array(counts, dtype=int)
-
-
-def count_modes_of_factor(model: DynamicStiffness, factor: SymmetricFactor) -> int:
-    """Count the modes below w from the factor of K(w): negative pivots without those of links."""
-    return factor.negative - model.link_pivots
+    return np.array([factor.modes_below for factor in model.factors(eigenvalue)], dtype=int)

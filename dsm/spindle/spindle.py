@@ -116,9 +116,8 @@ class Spindle:
             part.check(where)
             for earlier, other in enumerate(parts[: number - 1], 1):
                 if abs(other.position - part.position) <= slack:
-                    raise ValueError(
-                        f"{where}position={part.position} m is that of {kind} {earlier}; put both into one {kind}"
-                    )
+                    same = f"that of {kind} {earlier}; put both into one {kind}"
+                    raise ValueError(f"{where}position={part.position} m is {same}")
 
     def _check_joints(self) -> None:
         """Check that a joint is inside the shaft and alone at its place, as the side of a part would be unknown."""

@@ -1,5 +1,7 @@
 """Natural frequencies of a spinning beam, proved complete by counting."""
 
+from typing import get_args
+
 import numpy as np
 from scipy.linalg import eig, eigh
 
@@ -19,7 +21,6 @@ MAX_SPINNING_INTERVAL = 1e-3
 """Half-width, relative to w + W, beyond which a mode is not proved."""
 SAME_BEAM_PLACE = 1e-6
 """Largest distance of equal places, over the length."""
-DOF_OFFSETS: dict[SpinningDof, int] = {"u": 0, "v": 1, "u'": 2, "v'": 3}
 
 
 def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats, int, int]:
@@ -96,7 +97,7 @@ def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> Spinning
 
 
 def _dof_index(position: Floats, place: float, dof: SpinningDof) -> int:
-    return 4 * nearest_index(position, place) + DOF_OFFSETS[dof]
+    return 4 * nearest_index(position, place) + get_args(SpinningDof).index(dof)
 
 
 def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[Floats, Floats]:

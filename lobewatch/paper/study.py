@@ -107,13 +107,8 @@ class PaperStudy:
     def sections(self) -> tuple[NumberGroup, ...]:
         """Every number of the paper with ours, in the order of the paper."""
         at_rest, spinning = shaft_study.shaft_sections(self.plain, self.shear)
-        of_shaft = self.element, at_rest, mesh_section(self.meshes), spinning
-        return (
-            *of_shaft,
-            tap_section(self.tap),
-            shaft_study.stiffness_section(self.stiffness),
-            lobe_section(self.lobes),
-        )
+        of_tip = tap_section(self.tap), shaft_study.stiffness_section(self.stiffness), lobe_section(self.lobes)
+        return (self.element, at_rest, mesh_section(self.meshes), spinning, *of_tip)
 
     @property
     def claims(self) -> tuple[Claim, ...]:

@@ -210,8 +210,12 @@ def calibrate(
     require_number("frequency_std", frequency_std, " Hz")
     if not 1 <= mode <= MAX_MODES:
         raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
-    problem = bearing_eigenproblem(spindle, _with_interval_ends(frequency, frequency_std), group)
-    index = int(problem.pick(mode)[0])
+    frequencies = [frequency]
+    if frequency_std is not None:
+        half = STANDARD_ERRORS_95_PERCENT * frequency_std
+        frequencies += [max(frequency - half, LOOSE_JOINT_FACTOR * frequency), frequency + half]
+    problem = bearing_eigenproblem(spindle, np.array(frequencies), group)
+    index, *ends = problem.pick(mode).tolist()
     chosen = problem.springs.parts
     if index < 0:
         raise _unreachable_error(spindle, frequency, mode, chosen)
@@ -219,7 +223,11 @@ def calibrate(
     stiffness, std, interval = factor * parts_stiffness(spindle, chosen), None, None
     if frequency_std is not None:
         std = stiffness * frequency_std / frequency / sensitivity
-        interval = _stiffness_interval(problem, mode, stiffness / factor)
+        start, (low, high) = stiffness / factor, ends
+        interval = (
+            0.0 if low < 0 else float(-start / problem.values[1, low]),
+            math.inf if high < 0 else float(-start / problem.values[2, high]),
+        )
     return Calibration(
         frequency=float(frequency),
         frequency_std=frequency_std,
@@ -231,23 +239,6 @@ def calibrate(
         sensitivity=sensitivity,
         given=spindle,
         parts=chosen,
-    )
-
-
-def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats:
-    """Return the frequency, and the ends of its 95 % interval (Hz)."""
-    if frequency_std is None:
-        return np.array([frequency])
-    half = STANDARD_ERRORS_95_PERCENT * frequency_std
-    return np.array([frequency, max(frequency - half, LOOSE_JOINT_FACTOR * frequency), frequency + half])
-
-
-def _stiffness_interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
-    """Return the stiffnesses (N/m) for the second and third frequency; 0 and inf if they are out of range."""
-    low, high = problem.pick(mode)[1:].tolist()
-    return (
-        0.0 if low < 0 else float(-start / problem.values[1, low]),
-        math.inf if high < 0 else float(-start / problem.values[2, high]),
     )
 
 

@@ -212,8 +212,7 @@ def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRe
 def _misfit_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     if problem.fits(state):
         return []
-    measured = problem.measured
-    worst = float(np.max(np.abs(state.fitted / measured.frequency - 1)))
+    worst = float(np.max(np.abs(state.fitted / problem.measured.frequency - 1)))
     text = f"the frequencies do not fit, by up to {100 * worst:.2g} %; standard errors leave a wrong model out"
     return [FitRemark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 

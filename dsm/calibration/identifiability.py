@@ -51,10 +51,9 @@ class AllowedExcess(NamedTuple):
     @classmethod
     def of(cls, problem: StiffnessProblem, best: Iterate) -> AllowedExcess:
         """Return the excess for a fit with a covariance."""
-        given = problem.measured.std is not None
-        dof = problem.degrees_of_freedom
-        variance, spare = (1.0, math.inf) if given else (best.cost / dof, dof)
-        return cls(variance, float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2, spare)
+        spare = problem.degrees_of_freedom if problem.measured.std is None else math.inf
+        rise = float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2
+        return cls(problem.variance(best), rise, spare)
 
     @property
     def limit(self) -> float:
@@ -255,8 +254,8 @@ def _lower_points(side: Sequence[Iterate]) -> list[Iterate]:
 
 
 def _profile_tolerance(problem: StiffnessProblem, best: Iterate) -> float:
-    error = math.sqrt(best.cost / problem.degrees_of_freedom) if problem.measured.std is None else 1.0
-    return PROFILE_TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
+    least = float(np.min(problem.measured.scale / problem.measured.frequency))
+    return PROFILE_TOLERANCE * math.sqrt(problem.variance(best)) * least
 
 
 def _extend_profile(

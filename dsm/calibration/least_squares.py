@@ -118,9 +118,8 @@ def check_measured_modes(
     f = check_frequencies(frequency, positive=True)
     std = None if frequency_std is None else np.atleast_1d(np.asarray(frequency_std, dtype=np.float64))
     if std is not None and (std.shape != f.shape or not np.all(np.isfinite(std) & (std > 0))):
-        raise ValueError(
-            f"frequency_std={frequency_std!r} is not one finite number > 0 (Hz) for each of {f.size} modes"
-        )
+        wanted = f"one finite number > 0 (Hz) for each of {f.size} modes"
+        raise ValueError(f"frequency_std={frequency_std!r} is not {wanted}")
     where = np.zeros(f.size, dtype=np.int_) if shaft is None else np.atleast_1d(np.asarray(shaft))
     if where.shape != f.shape or where.dtype.kind not in "iu" or {*where.tolist()} != {*range(spindles)}:
         raise ValueError(
@@ -140,9 +139,8 @@ def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None)
         raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
     order = np.argsort(numbers)
     if np.any(np.diff(f[order]) <= 0):
-        raise ValueError(
-            f"frequency={f[order].tolist()} Hz does not rise with the number of the mode, {numbers[order]}"
-        )
+        rising = f"rise with the number of the mode, {numbers[order]}"
+        raise ValueError(f"frequency={f[order].tolist()} Hz does not {rising}")
 
 
 MAX_LOG_FACTOR = math.log(1e6)
@@ -235,16 +233,18 @@ class StiffnessProblem(NamedTuple):
             residual, slope = self.weight @ residual, self.weight @ slope
         return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope)
 
+    def variance(self, best: Iterate) -> float:
+        """Return the variance of the scaled residuals: 1, or from their scatter without standard errors."""
+        return best.cost / self.degrees_of_freedom if self.measured.std is None else 1.0
+
     def covariance(self, state: Iterate) -> Floats | None:
         """Return (J^T J)^-1, times the variance of the residuals if no standard errors were given.
 
         A group without effect, known to a factor of 30 at best, counts as known to that and independent of all others.
         """
-        variance = 1.0
-        if self.measured.std is None:
-            if self.degrees_of_freedom == 0:
-                return None
-            variance = state.cost / self.degrees_of_freedom
+        if self.measured.std is None and self.degrees_of_freedom == 0:
+            return None
+        variance = self.variance(state)
         covariance = variance * _inverse_normal_matrix(state.slope)
         felt = ~state.unfelt | (np.diag(covariance) < MAX_LOG_INTERVAL**2)
         if np.all(felt):
@@ -287,9 +287,8 @@ def minimize(
             return state, True
         if np.any(np.abs(state.log_factor[free]) == MAX_LOG_FACTOR):
             break
-        trial = problem.evaluate(
-            np.clip(state.log_factor + _damped_step(state, free, damping), -MAX_LOG_FACTOR, MAX_LOG_FACTOR)
-        )
+        moved = state.log_factor + _damped_step(state, free, damping)
+        trial = problem.evaluate(np.clip(moved, -MAX_LOG_FACTOR, MAX_LOG_FACTOR))
         if trial.cost < state.cost:
             state, damping = trial, max(damping / 10, 1e-15)
         elif change <= max(ROUNDING_STEP_LIMIT, converged) or _is_hidden_by_rounding(problem, state, free):

@@ -151,6 +151,5 @@ def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:
 def _require_spring(spindle: Spindle, index: int, otherwise: str) -> None:
     """Raise ValueError for a rigid bearing, which no factor changes."""
     if math.isinf(spindle.bearings[index].stiffness):
-        raise ValueError(
-            f"bearing {index + 1}: stiffness=inf cannot be calibrated; give a finite one to start from, {otherwise}"
-        )
+        remedy = f"give a finite one to start from, {otherwise}"
+        raise ValueError(f"bearing {index + 1}: stiffness=inf cannot be calibrated; {remedy}")

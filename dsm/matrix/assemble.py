@@ -73,8 +73,8 @@ def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffn
     diagonal, coupling = (
         part.copy() if spin is None else combine_rotary_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
-    own = {name: getattr(bare, name).copy() for name in ("held", "scale")}
-    model = replace(bare, diagonal=diagonal, coupling=coupling, spin=spin, **own)
+    held_dofs, scale = bare.held.copy(), bare.scale.copy()
+    model = replace(bare, diagonal=diagonal, coupling=coupling, held=held_dofs, scale=scale, spin=spin)
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
     model.scale[:] = _dof_scale(model)

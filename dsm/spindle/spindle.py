@@ -70,9 +70,8 @@ class Spindle:
         require_numbers("", self, MATERIAL_UNITS, positive=True)
         for number, segment in enumerate(self.segments, 1):
             segment.check(f"segment {number}: ")
-        self._check_parts("bearing", self.bearings)
-        self._check_parts("mass", self.masses)
-        self._check_parts("joint", self.joints)
+        for kind, parts in (("bearing", self.bearings), ("mass", self.masses), ("joint", self.joints)):
+            self._check_parts(kind, parts)
         self._check_joints()
 
     def __hash__(self) -> int:

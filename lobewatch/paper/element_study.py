@@ -66,8 +66,9 @@ ROOT_SCAN_FREQUENCIES = np.linspace(0.05, 40.0, 1600)
 
 def element_section(spindle: Spindle) -> NumberGroup:
     """Return the numbers of the element: of the segments of a round shaft, and of a cantilever that is not round."""
-    pieces, e, rho, frequency = spindle.segments, spindle.youngs_modulus, spindle.density, printed.FREQUENCY
-    segments = [SpinningSegment(s.length, *2 * (e * s.second_moment,), rho * s.area) for s in pieces]
+    frequency, modulus, density = printed.FREQUENCY, spindle.youngs_modulus, spindle.density
+    sizes = ((segment.length, modulus * segment.second_moment, density * segment.area) for segment in spindle.segments)
+    segments = [SpinningSegment(length, rigidity, rigidity, mass) for length, rigidity, mass in sizes]
     root_error = max(_root_error(segment) for segment in segments)
     speeds = ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6)
     error, critical_error = (max(_element_error(segment, frequency, speed) for segment in segments) for speed in speeds)

@@ -93,14 +93,9 @@ def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tu
     if kind == "linear":
         return np.array([(1 - x) * one, none, x * one, none]), np.array([none, (1 - x) * one, none, x * one])
     bump = x - x**2
-    deflection = np.array(
-        [
-            1 - 3 * x**2 + 2 * x**3 + softness * (1 - x),
-            length * (x - 2 * x**2 + x**3 + softness * bump / 2),
-            3 * x**2 - 2 * x**3 + softness * x,
-            length * (x**3 - x**2 - softness * bump / 2),
-        ]
-    )
+    near = 1 - 3 * x**2 + 2 * x**3 + softness * (1 - x), length * (x - 2 * x**2 + x**3 + softness * bump / 2)
+    far = 3 * x**2 - 2 * x**3 + softness * x, length * (x**3 - x**2 - softness * bump / 2)
+    deflection = np.array([*near, *far])
     ends = 1 - 4 * x + 3 * x**2 + softness * (1 - x), 3 * x**2 - 2 * x + softness * x
     rotation = np.array([-6 * bump / length, ends[0], 6 * bump / length, ends[1]])
     return deflection / (1 + softness), rotation / (1 + softness)

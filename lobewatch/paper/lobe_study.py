@@ -64,12 +64,11 @@ def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -
     """Compare lobes of the paper's mode, of the model's K old over new, and of the modes of the surrogate."""
     ratio = printed.OLD_FREQUENCY / printed.FREQUENCY
     aged = age_mode(measured, 0.9, "paper"), age_mode(measured, ratio, "model", stiffness_ratio)
-    first = modes[:1]
+    tips = [measured], [aged[0]], [aged[1]], modes[:1], modes
     new, by_rule, by_model, one_mode, six_modes = (
-        average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM)
-        for tip in ([measured], [aged[0]], [aged[1]], first, modes)
+        average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in tips
     )
-    narrow, full = (zero_order_lobes(tip, tip, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in (first, modes))
+    narrow, full = (zero_order_lobes(tip, tip, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in tips[-2:])
     masses = tuple(float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2) for mode in (measured, *aged))
     return LobeStudy(new, by_rule, by_model, one_mode, six_modes, (narrow, full), masses)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -35,8 +35,7 @@ class CalibratedSprings(NamedTuple):
     """Compliance of the housings with the same weights, shape (m, m), diagonal."""
 
 
-@dataclass(frozen=True, eq=False)
-class BearingEigenproblem:
+class BearingEigenproblem(NamedTuple):
     """Eigenproblem of the compliance at the calibrated springs, on the shaft without them.
 
     With R = B^T K(w)^-1 B + 1/k_housing, each spring weighted with the root of its stiffness, w is a natural frequency

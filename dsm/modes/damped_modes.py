@@ -44,8 +44,7 @@ class DampedMode(NamedTuple):
         return self.w.imag / abs(self.w)
 
 
-@dataclass(frozen=True, eq=False)
-class DampedShaft:
+class DampedShaft(NamedTuple):
     """Dynamic stiffness of a shaft at rest, at complex w, for any damping."""
 
     spindle: Spindle

@@ -1,8 +1,7 @@
 """Finite-element validation of the paper, repeated with textbook elements."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -130,8 +129,7 @@ ELEMENT_COUNTS = (26, 39, 52, 77, 110, printed.FEM_ELEMENTS, 220, 308)
 """Numbers of elements: one per segment, the paper's, twice the paper's, and between."""
 
 
-@dataclass(frozen=True, eq=False)
-class FiniteElementStudy:
+class FiniteElementStudy(NamedTuple):
     """First natural frequency with rigid bearings by finite elements."""
 
     exact: Mapping[ElementKind, float]

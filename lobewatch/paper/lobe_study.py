@@ -1,7 +1,7 @@
 """Stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ POCKET_DEPTH_RATIO = 20.0
 """Largest pocket depth over the lowest limit."""
 
 
-@dataclass(frozen=True, eq=False)
-class LobeStudy:
+class LobeStudy(NamedTuple):
     """Lobes of one mode, new and old, and of more modes."""
 
     new: StabilityLobes

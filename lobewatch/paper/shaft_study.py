@@ -1,8 +1,9 @@
 """Shaft of Figs. 3 and 7 to 9: frequencies, calibrated bearings, critical speeds, tip stiffness."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,7 @@ OPERATING_SPEED_RPM = 24000.0
 """Highest speed of the machine in the example (rpm)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShaftStudy:
+class ShaftStudy(NamedTuple):
     """Frequencies and bearings of the surrogate, by one beam theory."""
 
     rigid: Spindle
@@ -134,8 +134,7 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class StiffnessStudy:
+class StiffnessStudy(NamedTuple):
     """Stiffness at the tool tip of the surrogate, new and old."""
 
     static: tuple[float, float]

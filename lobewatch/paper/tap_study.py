@@ -1,8 +1,8 @@
 """Tap test of Figs. 5 and 6: the mode of the paper, peak picking by (28) and (29), emulated hits."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,8 +45,7 @@ SURROGATE_MODES = 6
 """Number of modes of the surrogate."""
 
 
-@dataclass(frozen=True, eq=False)
-class TapStudy:
+class TapStudy(NamedTuple):
     """FRFs and the modes identified from them."""
 
     measured: Mode

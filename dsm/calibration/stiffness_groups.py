@@ -78,12 +78,9 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
     """Scale bearing stiffnesses, and both stiffnesses of joints, by the factor of their group."""
-
-    def scaled(part: _StiffPart) -> _StiffPart:
-        tilting = factors.get(_tilting_group(part), 1.0) if isinstance(part, Joint) else 1.0
-        return _scale_part(part, factors.get(part.group, 1.0), tilting)
-
-    return _with_parts(spindle, [scaled(part) for part in _parts(spindle)])
+    groups = ((part, part.group, _tilting_group(part)) for part in _parts(spindle))
+    parts = [_scale_part(part, factors.get(group, 1.0), factors.get(tilting, 1.0)) for part, group, tilting in groups]
+    return _with_parts(spindle, parts)
 
 
 def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
@@ -121,9 +118,9 @@ def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
     return np.asarray(shares / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
 
 
-def _tilting_group(joint: Joint) -> str:
-    """Return the group of the stiffness against tilting."""
-    return joint.rotational_group or joint.group
+def _tilting_group(part: _StiffPart) -> str:
+    """Return the group of the stiffness against tilting; that of a bearing is never scaled."""
+    return (isinstance(part, Joint) and part.rotational_group) or part.group
 
 
 def _group_names(spindle: Spindle) -> list[str]:

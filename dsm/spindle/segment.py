@@ -203,7 +203,5 @@ def ring_second_moment(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray
 
 def _check_bore(where: str, end: str, bore: float, outer: float, outer_name: str = "") -> None:
     if not 0 <= bore < outer:
-        raise ValueError(
-            f"{where}{end}bore_diameter={bore} m is not at least 0 and "
-            f"smaller than {outer_name or end + 'outer_diameter'}={outer} m"
-        )
+        name = outer_name or f"{end}outer_diameter"
+        raise ValueError(f"{where}{end}bore_diameter={bore} m is not at least 0 and smaller than {name}={outer} m")

@@ -102,10 +102,9 @@ def scan_rivals(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, Pro
 def _scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
     """Scan each factor over its interval, and up to a factor of 30 beyond and through the given stiffness.
 
-    Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness,
-    or half-way. Other minima, such as that of a nearly symmetric shaft, are searched from all places where S(v) falls
-    again
-    on the way, and nearby along the least certain direction.
+    Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness, or
+    half-way. Other minima, such as that of a nearly symmetric shaft, are searched from all places where S(v) falls
+    again on the way, and nearby along the least certain direction.
     """
     ways: list[Profile | None] = []
     for index, felt in enumerate(_min_group_shares(problem, best).tolist()):

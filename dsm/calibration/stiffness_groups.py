@@ -19,8 +19,7 @@ def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
     """Return the indices in (*bearings, *joints) of the parts with one common factor: all parts of a group.
 
     None: all bearings with a group; joints are excluded, as one factor cannot separate their wear from that of
-    bearings.
-    Raises ValueError if there is none, and for a rigid bearing.
+    bearings. Raises ValueError if there is none, and for a rigid bearing.
     """
     if group is None:
         return calibrated_bearings(spindle)

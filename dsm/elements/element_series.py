@@ -65,11 +65,10 @@ def count_series_terms(apart: bool) -> int:
 def combine_rotary_terms(series: Floats, spin: float) -> Floats:
     """Combine a series with separate rotary inertia to one in powers of w, at a speed of rotation W = `spin` (rad/s).
 
-    Term SERIES_TERMS n + j of the series (..., SERIES_TERMS^2) belongs to w^2 to the power n - j times r to the power
-    j <= n, r the factor of rotary inertia: products of such series are those of their terms, cut off alike. In the
-    circular
-    whirl u exp(i w t), forward for w > 0, of a round shaft gyroscopic moments make r = w^2 - 2 W w. Result: (...,
-    2 SERIES_TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
+    Term SERIES_TERMS n + j of the series (..., SERIES_TERMS^2) belongs to w^2 to the power n - j times r to the power j
+    <= n, r the factor of rotary inertia: products of such series are those of their terms, cut off alike. In the
+    circular whirl u exp(i w t), forward for w > 0, of a round shaft gyroscopic moments make r = w^2 - 2 W w. Result:
+    (..., 2 SERIES_TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
     """
     kept, lowered, binomial = _rotary_terms()
     weight = binomial * (-2 * spin) ** lowered
@@ -97,13 +96,11 @@ def transfer_series(
 ) -> Floats:
     """Return the state (u, t, Q, M) at `end` from that at `start`, in powers of w^2: (n, 4, 4, n_terms).
 
-    segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of
-    the cross-section, Q the shear force and M the bending moment: EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u and
-    M' = -Q - rho I r t with r = w^2; Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a
-    separate variable, see combine_rotary_terms. Each term follows from those below it by integration (Picard), exact
-    but
-    for rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ...,
-    Phil.
+    segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of the
+    cross-section, Q the shear force and M the bending moment: EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u and M' =
+    -Q - rho I r t with r = w^2; Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a separate
+    variable, see combine_rotary_terms. Each term follows from those below it by integration (Picard), exact but for
+    rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ..., Phil.
     Mag. 41 (1921).
     """
     place, weight, running = _quadrature()

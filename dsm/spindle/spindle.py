@@ -149,8 +149,7 @@ def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | Non
     """Return the spindle beyond `position` from the tool tip (m), with positions from the cut, and the joint there.
 
     A segment at the cut is divided. Bearings, masses and joints nearer to the tool tip are removed; a bearing or a mass
-    at
-    the cut stays. Raises ValueError for a cut off the shaft or at its far end.
+    at the cut stays. Raises ValueError for a cut off the shaft or at its far end.
     """
     slack = SAME_PLACE * spindle.length
     if not 0 <= position < spindle.length - slack:

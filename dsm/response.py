@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Complexes, Floats
+from dsm.arrays import Complexes, Floats, require_number
 from dsm.matrix.assemble import assemble
 from dsm.matrix.condense import condense_damped
 from dsm.matrix.dynamic_stiffness import check_frequencies
@@ -158,8 +158,7 @@ def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: flo
     24.74
     """
     require_support(spindle)
-    if not (math.isfinite(linearized_at) and linearized_at >= 0):
-        raise ValueError(f"linearized_at={linearized_at} Hz is not a finite number >= 0")
+    require_number("linearized_at", linearized_at, " Hz")
     model = assemble(spindle, linearized_at, [position])
     node = model.node(position)
     if model.held[node, 0]:

@@ -2,18 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats, Indices
+from dsm.arrays import Floats, Indices, require_number
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness, scale_parts
 from dsm.matrix.assemble import assemble
-from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies, count_modes_of_factor, symmetric_factor
+from dsm.matrix.dynamic_stiffness import DynamicStiffness, check_frequencies
 from dsm.modes.find_modes import MAX_MODES
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
@@ -35,8 +35,7 @@ class CalibratedSprings(NamedTuple):
     """Compliance of the housings with the same weights, shape (m, m), diagonal."""
 
 
-@dataclass(frozen=True, eq=False)
-class BearingEigenproblem:
+class BearingEigenproblem(NamedTuple):
     """Eigenproblem of the compliance at the calibrated springs, on the shaft without them.
 
     With R = B^T K(w)^-1 B + 1/k_housing, each spring weighted with the root of its stiffness, w is a natural frequency
@@ -84,8 +83,8 @@ def bearing_eigenproblem(spindle: Spindle, frequency: Floats, group: str | None 
     """
     springs = _calibrated_springs(spindle, 2.0 ** (math.ceil(4 * math.log2(np.max(frequency, initial=1.0))) / 4), group)
     w2 = (2 * np.pi * frequency) ** 2
-    factors = [symmetric_factor(matrix) for matrix in springs.model.scaled(w2)]
-    below = np.array([count_modes_of_factor(springs.model, factor) for factor in factors], dtype=int)
+    factors = springs.model.factors(w2)
+    below = np.array([factor.modes_below for factor in factors], dtype=int)
     solved = [factor.solve(springs.forces) for factor in factors]
     response = np.array(solved).reshape(w2.size, *springs.forces.shape)
     values, vectors = np.linalg.eigh(springs.forces.T @ response + springs.housing)
@@ -109,21 +108,6 @@ def _calibrated_springs(spindle: Spindle, top_frequency: float, group: str | Non
         forces[near, number], forces[near + DOFS_ACROSS_JOINT, number] = -roots, roots
     softness = [bearing.stiffness / bearing.housing_stiffness for bearing in bearings] + [0.0] * (2 * len(joints))
     return CalibratedSprings(tuple(chosen), model, forces * model.scale[:, np.newaxis], np.diag(softness))
-
-
-def stiffness_factor(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
-    """Return the factor on the bearing stiffnesses that puts a mode at each frequency; NaN if none does.
-
-    frequency: (n,) Hz, > 0; shape of the result (n,). group: bearings that the factor is for; None: all that have
-    a group. One eigenproblem of the order of the number of bearings for each frequency.
-    """
-    f = check_frequencies(frequency)
-    if np.any(f == 0):
-        raise ValueError("frequency=0 Hz is not > 0")
-    problem = bearing_eigenproblem(spindle, f, group)
-    index = problem.pick(mode)
-    value = problem.values[np.arange(f.size), np.where(index < 0, 0, index)]
-    return np.where(index < 0, np.nan, -1 / value)
 
 
 def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group: str | None = None) -> Floats:
@@ -160,7 +144,10 @@ def stiffness_curve(spindle: Spindle, frequency: ArrayLike, mode: int = 1, group
     [250.0, 196.9, nan]
     """
     mean = parts_stiffness(spindle, calibrated_parts(spindle, group))
-    return mean * stiffness_factor(spindle, frequency, mode, group)
+    problem = bearing_eigenproblem(spindle, check_frequencies(frequency, positive=True), group)
+    index = problem.pick(mode)
+    value = problem.values[np.arange(index.size), np.where(index < 0, 0, index)]
+    return mean * np.where(index < 0, np.nan, -1 / value)
 
 
 LOOSE_JOINT_FACTOR = 1e-9
@@ -218,9 +205,16 @@ def calibrate(
     >>> abs(now.residual) < 1e-6  # Hz: solved again
     True
     """
-    _check_frequency(frequency, frequency_std, mode)
-    problem = bearing_eigenproblem(spindle, _with_interval_ends(frequency, frequency_std), group)
-    index = int(problem.pick(mode)[0])
+    require_number("frequency", frequency, " Hz", positive=True)
+    require_number("frequency_std", frequency_std, " Hz")
+    if not 1 <= mode <= MAX_MODES:
+        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
+    frequencies = [frequency]
+    if frequency_std is not None:
+        half = STANDARD_ERRORS_95_PERCENT * frequency_std
+        frequencies += [max(frequency - half, LOOSE_JOINT_FACTOR * frequency), frequency + half]
+    problem = bearing_eigenproblem(spindle, np.array(frequencies), group)
+    index, *ends = problem.pick(mode).tolist()
     chosen = problem.springs.parts
     if index < 0:
         raise _unreachable_error(spindle, frequency, mode, chosen)
@@ -228,7 +222,11 @@ def calibrate(
     stiffness, std, interval = factor * parts_stiffness(spindle, chosen), None, None
     if frequency_std is not None:
         std = stiffness * frequency_std / frequency / sensitivity
-        interval = _stiffness_interval(problem, mode, stiffness / factor)
+        start, (low, high) = stiffness / factor, ends
+        interval = (
+            0.0 if low < 0 else float(-start / problem.values[1, low]),
+            math.inf if high < 0 else float(-start / problem.values[2, high]),
+        )
     return Calibration(
         frequency=float(frequency),
         frequency_std=frequency_std,
@@ -240,32 +238,6 @@ def calibrate(
         sensitivity=sensitivity,
         given=spindle,
         parts=chosen,
-    )
-
-
-def _check_frequency(frequency: float, frequency_std: float | None, mode: int) -> None:
-    if not (math.isfinite(frequency) and frequency > 0):
-        raise ValueError(f"frequency={frequency} Hz is not a finite number > 0")
-    if frequency_std is not None and not (math.isfinite(frequency_std) and frequency_std >= 0):
-        raise ValueError(f"frequency_std={frequency_std} Hz is not a finite number >= 0")
-    if not 1 <= mode <= MAX_MODES:
-        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
-
-
-def _with_interval_ends(frequency: float, frequency_std: float | None) -> Floats:
-    """Return the frequency, and the ends of its 95 % interval (Hz)."""
-    if frequency_std is None:
-        return np.array([frequency])
-    half = STANDARD_ERRORS_95_PERCENT * frequency_std
-    return np.array([frequency, max(frequency - half, LOOSE_JOINT_FACTOR * frequency), frequency + half])
-
-
-def _stiffness_interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
-    """Return the stiffnesses (N/m) for the second and third frequency; 0 and inf if they are out of range."""
-    low, high = problem.pick(mode)[1:].tolist()
-    return (
-        0.0 if low < 0 else float(-start / problem.values[1, low]),
-        math.inf if high < 0 else float(-start / problem.values[2, high]),
     )
 
 

@@ -1,14 +1,13 @@
 """Calibrate the damping of bearings to one measured damping ratio."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from dsm.arrays import Floats
+from dsm.arrays import Floats, require_number
 from dsm.calibration.report_text import format_with_error
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.modes.damped_modes import DampedMode, DampedShaft
@@ -73,14 +72,12 @@ class DampingCalibration:
         """Return the report."""
         damping = format_with_error(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
         measured = format_with_error(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
-        return "\n".join(
-            [
-                f"bearing damping  {damping} each on average",
-                f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz",
-                f"other damping    damping ratio {self.other_damping_ratio:.6g} without these dampers, "
-                f"loss factor {self.loss_factor:g}",
-                f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio",
-            ]
+        other = f"{self.other_damping_ratio:.6g} without these dampers, loss factor {self.loss_factor:g}"
+        return (
+            f"bearing damping  {damping} each on average\n"
+            f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz\n"
+            f"other damping    damping ratio {other}\n"
+            f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio"
         )
 
 
@@ -199,24 +196,22 @@ def calibrate_damping(
 def _check_damping(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> None:
     if not 0 < damping_ratio < 1:
         raise ValueError(f"damping_ratio={damping_ratio} is not between 0 and 1")
-    if damping_ratio_std is not None and not (math.isfinite(damping_ratio_std) and damping_ratio_std >= 0):
-        raise ValueError(f"damping_ratio_std={damping_ratio_std} is not a finite number >= 0")
+    require_number("damping_ratio_std", damping_ratio_std)
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
 
 
 def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
     """Return the given dampers, or dampers with damper over stiffness of 1 us in each bearing."""
-    ratio = np.zeros(len(spindle.bearings))
-    damped = [index for index in chosen if spindle.bearings[index].damping > 0]
+    bearings = [spindle.bearings[index] for index in chosen]
+    damped = [bearing for bearing in bearings if bearing.damping > 0]
     if damped and len(damped) < len(chosen):
         raise ValueError(
             f"{len(damped)} of the {len(chosen)} bearings to calibrate have damping; give it to all of them, for its "
             "ratio, or to none, for the ratio of their stiffnesses"
         )
-    for index in chosen:
-        bearing = spindle.bearings[index]
-        ratio[index] = bearing.damping if damped else 1e-6 * bearing.stiffness
+    ratio = np.zeros(len(spindle.bearings))
+    ratio[chosen] = [bearing.damping if damped else 1e-6 * bearing.stiffness for bearing in bearings]
     return ratio
 
 
@@ -230,11 +225,8 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
-
-    def excess(amount: float) -> float:
-        return dampers.follow(low, amount).mode.damping_ratio - target
-
-    root = _find_root(excess, low.amount, high.amount, xtol=1e-15 * high.amount, rtol=1e-13)
+    ends, close = (low.amount, high.amount), {"xtol": 1e-15 * high.amount, "rtol": 1e-13}
+    root = scipy.optimize.brentq(lambda v: dampers.follow(low, v).mode.damping_ratio - target, *ends, **close)
     return dampers.follow(low, root)
 
 
@@ -246,7 +238,9 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
     for _ in range(MAX_DAMPING_STEPS):
         if low.amount > MAX_DAMPER_SHARE * unit:
             break
-        step = min(_damper_step(low, target), max(FIRST_DAMPER_STEP * unit, MAX_DAMPER_GROWTH * low.amount), longest)
+        # Twice the Newton step, which is too short if the curve bends down.
+        newton = 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
+        step = min(newton, max(FIRST_DAMPER_STEP * unit, MAX_DAMPER_GROWTH * low.amount), longest)
         try:
             high = dampers.follow(low, low.amount + step)
         except ArithmeticError:
@@ -263,16 +257,7 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
     )
 
 
-def _damper_step(low: _DampingPoint, target: float) -> float:
-    """Return twice the Newton step, which is too short if the curve bends down."""
-    return 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
-
-
 def _find_maximum(dampers: _Dampers, low: _DampingPoint, high: _DampingPoint) -> _DampingPoint:
     """Find the largest damping ratio between a point with rising and one with falling slope."""
-    return dampers.follow(low, _find_root(lambda v: dampers.follow(low, v).slope, low.amount, high.amount, rtol=1e-10))
-
-
-def _find_root(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
-
-    return float(scipy.optimize.brentq(function, low, high, **tolerances))
+    ends = low.amount, high.amount
+    return dampers.follow(low, scipy.optimize.brentq(lambda v: dampers.follow(low, v).slope, *ends, rtol=1e-10))

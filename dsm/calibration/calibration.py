@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from dsm.calibration.identifiability import MIN_ENERGY_SHARE
+from dsm.calibration.least_squares import MIN_ENERGY_SHARE
 from dsm.calibration.report_text import FitRemark, format_with_error
 from dsm.calibration.stiffness_groups import scale_parts
 from dsm.modes.natural_frequencies import modal_stiffness, natural_frequencies
@@ -206,7 +206,6 @@ class Calibration:
         lines = [
             ("bearing stiffness", f"{stiffness} each"),
             (f"from mode {self.mode}", format_with_error(self.frequency, self.frequency_std, unit="Hz", percent=True)),
-            *self._interval_lines(),
             ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
             ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
@@ -214,12 +213,9 @@ class Calibration:
             ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
             ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
         ]
+        if self.bearing_stiffness_interval is not None:
+            low, high = (end / 1e6 for end in self.bearing_stiffness_interval)
+            end = "rigid" if math.isinf(high) else f"{high:.5g} N/um"
+            lines.insert(2, ("95 % interval", f"{low:.5g} N/um to {end}"))
         lines += [("warning", str(remark)) for remark in self.remarks]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)
-
-    def _interval_lines(self) -> list[tuple[str, str]]:
-        if self.bearing_stiffness_interval is None:
-            return []
-        low, high = (end / 1e6 for end in self.bearing_stiffness_interval)
-        end = "rigid" if math.isinf(high) else f"{high:.5g} N/um"
-        return [("95 % interval", f"{low:.5g} N/um to {end}")]

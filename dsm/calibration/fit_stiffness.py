@@ -9,15 +9,7 @@ from numpy.typing import ArrayLike
 
 from dsm.arrays import Floats
 from dsm.calibration.calibration import UnreachableFrequencyError
-from dsm.calibration.identifiability import (
-    IDENTIFIABILITY_REMEDY,
-    MAX_LOG_INTERVAL,
-    MIN_ENERGY_SHARE,
-    AllowedExcess,
-    ProfileScan,
-    identifiability_remarks,
-    scan_profiles,
-)
+from dsm.calibration.identifiability import IDENTIFIABILITY_REMEDY, ProfileScan, identifiability_remarks, scan_rivals
 from dsm.calibration.least_squares import MAX_LOG_FACTOR, Iterate, StiffnessProblem, check_measured_modes, minimize
 from dsm.calibration.report_text import FitRemark
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
@@ -122,7 +114,7 @@ def fit_stiffness(
     if tolerance > 0 and measured.std is not None:
         problem = problem.with_drawing(state, tolerance)
         state, found = _search(problem, state.log_factor)
-    state, around = _improve(problem, state) if found else (state, None)
+    state, around = scan_rivals(problem, state) if found else (state, None)
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(problem)
@@ -153,7 +145,7 @@ def _restore_unfelt(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate,
     Such factors run away, to the end of the range or to where rounding ends the search. Returns the state and False
     if there are none, or nothing fits.
     """
-    away = np.flatnonzero(np.max(state.share, axis=0) < MIN_ENERGY_SHARE)
+    away = np.flatnonzero(state.unfelt)
     if away.size == 0:
         return state, False
     for part in BACKTRACK_SHARES:
@@ -165,23 +157,9 @@ def _restore_unfelt(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate,
     return state, False
 
 
-def _improve(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, ProfileScan | None]:
-    """Return the solution, or another that fits better by more than 95 % intervals allow, with its profile scan."""
-    for _ in range(EXTRA_STARTS):
-        covariance = _covariance(problem, state)
-        if covariance is None:
-            return state, None
-        around = scan_profiles(problem, state, covariance)
-        if not around.rivals or around.rivals[0].cost + AllowedExcess.of(problem, around.rivals[0]).limit > state.cost:
-            break
-        state = around.rivals[0]
-    return state, around
-
-
 def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan | None, tol: float) -> StiffnessFit:
     measured = problem.measured
-    covariance = _covariance(problem, state)
-    unsure = identifiability_remarks(problem, state, covariance, around)
+    unsure = identifiability_remarks(problem, state, around)
     checks = _collinear_group_remarks, _close_mode_remarks, _misfit_remarks
     return StiffnessFit(
         groups=problem.names,
@@ -190,7 +168,7 @@ def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan
         frequency_std=measured.std,
         fitted_frequency=state.fitted,
         factor=np.exp(state.log_factor),
-        log_covariance=covariance,
+        log_covariance=problem.covariance(state),
         energy_share=state.share,
         remarks=(*unsure, *(remark for check in checks for remark in check(problem, state))),
         shaft=measured.shaft,
@@ -201,35 +179,9 @@ def _build_result(problem: StiffnessProblem, state: Iterate, around: ProfileScan
     )
 
 
-def _covariance(problem: StiffnessProblem, state: Iterate) -> Floats | None:
-    """Return (J^T J)^-1, times the variance of the residuals if no standard errors were given.
-
-    A group without effect, known to a factor of 30 at best, counts as known to that and independent of all others.
-    """
-    given = problem.measured.std is not None
-    if not given and problem.degrees_of_freedom == 0:
-        return None
-    variance = 1.0 if given else state.cost / problem.degrees_of_freedom
-    covariance = variance * _inverse_normal_matrix(state.slope)
-    felt = (np.max(state.share, axis=0) >= MIN_ENERGY_SHARE) | (np.diag(covariance) < MAX_LOG_INTERVAL**2)
-    if np.all(felt):
-        return covariance
-    limited = np.diag(np.full(felt.size, MAX_LOG_INTERVAL**2))
-    if np.any(felt):
-        limited[np.ix_(felt, felt)] = variance * _inverse_normal_matrix(state.slope[:, felt])
-    return limited
-
-
-def _inverse_normal_matrix(slope: Floats) -> Floats:
-    """Return (J^T J)^-1, large if J is singular."""
-    _, values, vectors = np.linalg.svd(slope, full_matrices=False)
-    root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
-    return np.asarray(root @ root.T)
-
-
 def _collinear_group_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     """Return a remark on groups that change the frequencies in the same ratio."""
-    if np.any(np.max(state.share, axis=0) < MIN_ENERGY_SHARE):
+    if np.any(state.unfelt):
         return []
     ratio = state.share / np.linalg.norm(state.share, axis=0)
     condition = float(np.linalg.cond(ratio))
@@ -260,8 +212,7 @@ def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRe
 def _misfit_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark]:
     if problem.fits(state):
         return []
-    measured = problem.measured
-    worst = float(np.max(np.abs(state.fitted / measured.frequency - 1)))
+    worst = float(np.max(np.abs(state.fitted / problem.measured.frequency - 1)))
     text = f"the frequencies do not fit, by up to {100 * worst:.2g} %; standard errors leave a wrong model out"
     return [FitRemark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 

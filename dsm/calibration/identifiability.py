@@ -12,13 +12,11 @@ import numpy as np
 import scipy
 
 from dsm.arrays import Floats
-from dsm.calibration.least_squares import Iterate, StiffnessProblem, minimize
+from dsm.calibration.least_squares import MAX_LOG_INTERVAL, Iterate, StiffnessProblem, minimize
 from dsm.calibration.report_text import FitRemark
 
 PROFILE_CONFIDENCE = 0.95
 """Confidence of the compared intervals."""
-MAX_LOG_INTERVAL = math.log(30.0)
-"""Largest interval, in the logarithm of the factor."""
 PROFILE_STEPS = 0.2, 0.7, 1.7, 3.4
 """Distances beyond the first-order interval at which S(v) is computed (logarithm of the factor)."""
 RIVAL_START_DISTANCES = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
@@ -35,8 +33,8 @@ MIN_RIVAL_DISTANCE = 4.0
 """Least distance of another solution (standard errors of a factor)."""
 LOW_ENERGY_SHARE = 0.1
 """Energy share in every measured mode below which stiffness far from the fit is tried."""
-MIN_ENERGY_SHARE = 0.01
-"""Least energy share in a measured mode of a group with effect."""
+MAX_RIVALS = 8
+"""Most solutions that are taken in turn, each as it fits better than the one before."""
 IDENTIFIABILITY_REMEDY = "measure more or other modes, or leave the group out"
 
 
@@ -53,10 +51,9 @@ class AllowedExcess(NamedTuple):
     @classmethod
     def of(cls, problem: StiffnessProblem, best: Iterate) -> AllowedExcess:
         """Return the excess for a fit with a covariance."""
-        given = problem.measured.std is not None
-        dof = problem.degrees_of_freedom
-        variance, spare = (1.0, math.inf) if given else (best.cost / dof, dof)
-        return cls(variance, float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2, spare)
+        spare = problem.degrees_of_freedom if problem.measured.std is None else math.inf
+        rise = float(scipy.special.stdtrit(spare, (1 + PROFILE_CONFIDENCE) / 2)) ** 2
+        return cls(problem.variance(best), rise, spare)
 
     @property
     def limit(self) -> float:
@@ -70,36 +67,44 @@ class AllowedExcess(NamedTuple):
         return -square / 2 if math.isinf(dof) else -(dof + 1) / 2 * math.log1p(square / dof)
 
 
-class Profile(NamedTuple):
-    """Least sum of squares over all other factors, S(v), along the logarithm v of one factor."""
+Profile = list[list[Iterate]]
+"""Least sum of squares over all other factors, S(v), along the logarithm v of one factor, below and above the fit.
 
-    ends: tuple[Iterate, Iterate]
-    """Ends of its first-order interval, below and above; the best fit without an interval."""
-    beyond: tuple[tuple[Iterate, ...], tuple[Iterate, ...]]
-    """States further away, below and above; empty if not computed."""
-
-    def sides(self) -> Iterator[tuple[Iterate, ...]]:
-        """Yield each end with the states beyond."""
-        for end, further in zip(self.ends, self.beyond, strict=True):
-            yield end, *further
+Each side begins with the end of the first-order interval, the best fit without an interval; the states further away
+follow if they are computed.
+"""
 
 
 class ProfileScan(NamedTuple):
     """Profiles and other minima around a fit over the whole range of factors."""
 
+    log_covariance: Floats
+    """Covariance of the logarithms of the factors, shape (g, g)."""
     profiles: tuple[Profile | None, ...]
     """Profile of each factor; None if its interval is too small, or the model cannot be solved there."""
     rivals: tuple[Iterate, ...]
     """Other minima, the lowest first; they may be lower than the fit."""
 
 
-def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
+def scan_rivals(problem: StiffnessProblem, state: Iterate) -> tuple[Iterate, ProfileScan | None]:
+    """Return the solution, or another that fits better by more than 95 % intervals allow, with its profile scan."""
+    for _ in range(MAX_RIVALS):
+        covariance = problem.covariance(state)
+        if covariance is None:
+            return state, None
+        around = _scan_profiles(problem, state, covariance)
+        if not around.rivals or around.rivals[0].cost + AllowedExcess.of(problem, around.rivals[0]).limit > state.cost:
+            break
+        state = around.rivals[0]
+    return state, around
+
+
+def _scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floats) -> ProfileScan:
     """Scan each factor over its interval, and up to a factor of 30 beyond and through the given stiffness.
 
-    Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness,
-    or half-way. Other minima, such as that of a nearly symmetric shaft, are searched from all places where S(v) falls
-    again
-    on the way, and nearby along the least certain direction.
+    Beyond the interval only for a group with little energy in all measured modes at the fit, at the given stiffness, or
+    half-way. Other minima, such as that of a nearly symmetric shaft, are searched from all places where S(v) falls
+    again on the way, and nearby along the least certain direction.
     """
     ways: list[Profile | None] = []
     for index, felt in enumerate(_min_group_shares(problem, best).tolist()):
@@ -107,12 +112,12 @@ def scan_profiles(problem: StiffnessProblem, best: Iterate, log_covariance: Floa
             ways.append(_likelihood_profile(problem, best, log_covariance, index, felt < LOW_ENERGY_SHARE))
         except ArithmeticError:
             ways.append(None)
-    falling = [state.log_factor for way in ways if way is not None for s in way.sides() for state in _lower_points(s)]
+    falling = [state.log_factor for way in ways if way for side in way for state in _lower_points(side)]
     rivals = []
     for start in [*_weakest_direction_starts(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
             rivals.append(minimize(problem, start, (), _profile_tolerance(problem, best))[0])
-    return ProfileScan(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
+    return ProfileScan(log_covariance, tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
 
 
 def _min_group_shares(problem: StiffnessProblem, best: Iterate) -> Floats:
@@ -131,9 +136,7 @@ def _weakest_direction_starts(best: Iterate, log_covariance: Floats) -> list[Flo
     return [best.log_factor + step * direction for step in RIVAL_START_DISTANCES if direction.size > 1]
 
 
-def identifiability_remarks(
-    problem: StiffnessProblem, best: Iterate, log_covariance: Floats | None, around: ProfileScan | None
-) -> list[FitRemark]:
+def identifiability_remarks(problem: StiffnessProblem, best: Iterate, around: ProfileScan | None) -> list[FitRemark]:
     """Return remarks on groups whose factor the frequencies leave open.
 
     For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
@@ -142,34 +145,31 @@ def identifiability_remarks(
     profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of S - S_min as
     normal deviates, the rises at its ends give its coverage, and the likelihood beyond them, integrated over
     v, reduces it: not twice as often wrong as stated is good enough. All other minima within the 95 % intervals
-    are reported. Without a covariance the energy shares alone decide.
+    are reported. Without a scan the energy shares alone decide.
     """
-    felt = np.max(best.share, axis=0)
-    text = "at most {:.2g} % of the strain energy of the measured modes is in it"
-    remarks = [
-        FitRemark("group-not-felt", name, text.format(100 * share), IDENTIFIABILITY_REMEDY)
-        for name, share in zip(problem.names, felt.tolist(), strict=True)
-        if share < MIN_ENERGY_SHARE
-    ]
-    if log_covariance is None or around is None:
+    remarks = []
+    for index in np.flatnonzero(best.unfelt).tolist():
+        text = f"at most {100 * np.max(best.share[:, index]):.2g} % of the strain energy of the measured modes is in it"
+        remarks.append(FitRemark("group-not-felt", problem.names[index], text, IDENTIFIABILITY_REMEDY))
+    if around is None:
         return remarks
-    others = _rival_text(problem, best, log_covariance, around.rivals)
+    others = _rival_text(problem, best, around)
     if others:
         text = f"another solution fits as well: factors {others}"
         return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, IDENTIFIABILITY_REMEDY)]
-    for index in np.flatnonzero(felt >= MIN_ENERGY_SHARE).tolist():
-        text = _open_interval_text(problem, best, float(log_covariance[index, index]), index, around.profiles[index])
+    for index in np.flatnonzero(~best.unfelt).tolist():
+        text = _open_interval_text(problem, best, around, index)
         if text:
             remarks.append(FitRemark("stiffness-ambiguous", problem.names[index], text, IDENTIFIABILITY_REMEDY))
     return remarks
 
 
-def _rival_text(problem: StiffnessProblem, best: Iterate, log_covariance: Floats, rivals: Sequence[Iterate]) -> str:
+def _rival_text(problem: StiffnessProblem, best: Iterate, around: ProfileScan) -> str:
     """Return the factors of all solutions that fit as well, far off in one that is not open."""
-    error, highest = np.sqrt(np.diag(log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
+    error, highest = np.sqrt(np.diag(around.log_covariance)), best.cost + AllowedExcess.of(problem, best).limit
     far = np.where(error < MAX_LOG_INTERVAL, MIN_RIVAL_DISTANCE * error + MIN_PROFILE_WIDTH, math.inf)
     apart = [best.log_factor]
-    for rival in rivals:
+    for rival in around.rivals:
         if rival.cost < highest and all(np.max(np.abs(rival.log_factor - other) / far) > 1 for other in apart):
             apart.append(rival.log_factor)
     return " or ".join(", ".join(f"{math.exp(value):.3g}" for value in rival) for rival in apart[1:])
@@ -181,22 +181,20 @@ def _likelihood_profile(problem: StiffnessProblem, best: Iterate, cov: Floats, i
     if half < MIN_PROFILE_WIDTH:
         return None
     fixed = [i, *np.flatnonzero(np.diag(cov) >= MAX_LOG_INTERVAL**2).tolist()]
-    ends = best, best
+    ends = [best, best]
     if half < MAX_LOG_INTERVAL:
         along = np.clip(half * cov[:, i] / cov[i, i], -MAX_LOG_INTERVAL, MAX_LOG_INTERVAL)
-        ends = problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)
+        ends = [problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)]
         if not all(MIN_INTERVAL_RISE < (end.cost - best.cost) / allowed.limit < 1 / MIN_INTERVAL_RISE for end in ends):
-            low, high = (minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends)
-            ends = low, high
+            ends = [minimize(problem, end.log_factor, fixed, _profile_tolerance(problem, best))[0] for end in ends]
     if not far:
-        return Profile(ends, ((), ()))
-    below, above = (tuple(_extend_profile(problem, best, end, fixed, s)) for s, end in zip((-1, 1), ends, strict=True))
-    return Profile(ends, (below, above))
+        return [[end] for end in ends]
+    return [[end, *_extend_profile(problem, best, end, fixed, s)] for s, end in zip((-1, 1), ends, strict=True)]
 
 
-def _open_interval_text(problem: StiffnessProblem, best: Iterate, var: float, i: int, way: Profile | None) -> str:
+def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: ProfileScan, i: int) -> str:
     """Return the fault of the interval of one factor; empty if there is none."""
-    allowed = AllowedExcess.of(problem, best)
+    allowed, way, var = AllowedExcess.of(problem, best), around.profiles[i], float(around.log_covariance[i, i])
     half = math.sqrt(allowed.rise * var)
     if not half < MAX_LOG_INTERVAL:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
@@ -204,18 +202,16 @@ def _open_interval_text(problem: StiffnessProblem, best: Iterate, var: float, i:
         return ""
     if way is None:
         return "its interval reaches where the model cannot be solved"
-    near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end in way.ends])
-    beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way.sides()]
+    near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end, *_ in way])
+    beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way]
     mass = math.sqrt(2 * math.pi * var)
     total = mass + math.fsum(part for side in beyond for part, _ in side)
     held = near * mass / total
     if held >= MIN_INTERVAL_COVERAGE:
         return ""
     low, high = (_interval_reach(side, total * (1 - PROFILE_CONFIDENCE) / 2, half) for side in beyond)
-    reach = f"the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
-    return (
-        f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: {reach}"
-    )
+    text = f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: "
+    return f"{text}the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
 
 
 def _likelihood_masses(
@@ -257,8 +253,8 @@ def _lower_points(side: Sequence[Iterate]) -> list[Iterate]:
 
 
 def _profile_tolerance(problem: StiffnessProblem, best: Iterate) -> float:
-    error = math.sqrt(best.cost / problem.degrees_of_freedom) if problem.measured.std is None else 1.0
-    return PROFILE_TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
+    least = float(np.min(problem.measured.scale / problem.measured.frequency))
+    return PROFILE_TOLERANCE * math.sqrt(problem.variance(best)) * least
 
 
 def _extend_profile(

@@ -11,12 +11,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats, Indices
+from dsm.arrays import Flags, Floats, Indices
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.matrix.dynamic_stiffness import check_frequencies
 from dsm.modes.find_modes import find_modes
 from dsm.modes.natural_frequencies import natural_frequencies
-from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle
 
 DIAMETER_STEP = 1e-3
@@ -54,7 +53,7 @@ def diameter_effects(spindle: Spindle, values: Callable[[Spindle], Floats], name
     """
     columns = []
     for number in range(len(spindle.segments)):
-        low, high = (values(_scale_diameter(spindle, number, 1 + side * DIAMETER_STEP)) for side in (-1, 1))
+        low, high = (values(_scale_diameters(spindle, number, 1 + side * DIAMETER_STEP)) for side in (-1, 1))
         columns.append(np.log(high / low) / (2 * DIAMETER_STEP))
     own = [column for column, (owner, _) in zip(columns, names, strict=False) if owner != ALL_SPINDLES]
     return np.array([*columns, TOOL_TOLERANCE_RATIO * np.sum(own, axis=0)] if own else columns).T
@@ -82,24 +81,12 @@ def diameter_columns(names: Sequence[Sequence[DiameterKey]]) -> dict[DiameterKey
     return {name: column for column, name in enumerate(dict.fromkeys(name for row in names for name in row))}
 
 
-def _scale_diameter(spindle: Spindle, number: int, factor: float) -> Spindle:
+def _scale_diameters(spindle: Spindle, number: int, factor: float) -> Spindle:
+    """Scale all diameters of one segment."""
     segments = list(spindle.segments)
-    segments[number] = _scale_segment(segments[number], factor)
+    diameters = {field: size for field, size in vars(segments[number]).items() if field.endswith("_diameter") and size}
+    segments[number] = replace(segments[number], **{field: factor * size for field, size in diameters.items()})
     return replace(spindle, segments=segments)
-
-
-def _scale_segment(segment: Segment, factor: float) -> Segment:
-    def times(diameter: float | None) -> float | None:
-        return None if diameter is None else factor * diameter
-
-    return replace(
-        segment,
-        outer_diameter=factor * segment.outer_diameter,
-        bore_diameter=factor * segment.bore_diameter,
-        end_outer_diameter=times(segment.end_outer_diameter),
-        end_bore_diameter=times(segment.end_bore_diameter),
-        mass_diameter=times(segment.mass_diameter),
-    )
 
 
 class MeasuredModes(NamedTuple):
@@ -128,14 +115,11 @@ def check_measured_modes(
     shaft: Sequence[int] | None,
 ) -> MeasuredModes:
     """Check the measured modes of so many spindles, as fit_stiffness takes them; ValueError for invalid ones."""
-    f = check_frequencies(frequency)
-    if np.any(f == 0):
-        raise ValueError("frequency=0 Hz is not > 0")
+    f = check_frequencies(frequency, positive=True)
     std = None if frequency_std is None else np.atleast_1d(np.asarray(frequency_std, dtype=np.float64))
     if std is not None and (std.shape != f.shape or not np.all(np.isfinite(std) & (std > 0))):
-        raise ValueError(
-            f"frequency_std={frequency_std!r} is not one finite number > 0 (Hz) for each of {f.size} modes"
-        )
+        wanted = f"one finite number > 0 (Hz) for each of {f.size} modes"
+        raise ValueError(f"frequency_std={frequency_std!r} is not {wanted}")
     where = np.zeros(f.size, dtype=np.int_) if shaft is None else np.atleast_1d(np.asarray(shaft))
     if where.shape != f.shape or where.dtype.kind not in "iu" or {*where.tolist()} != {*range(spindles)}:
         raise ValueError(
@@ -145,20 +129,18 @@ def check_measured_modes(
     numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
     for number in range(spindles):
-        _check_mode_numbers(f[where == number], numbers[where == number] if whole else numbers, mode)
+        _check_mode_numbers(f[where == number], numbers[where == number] if whole else numbers[:0], mode)
     return MeasuredModes(numbers, f, std, where)
 
 
 def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None) -> None:
     """Check the mode numbers of one spindle."""
-    whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
-    if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
+    if numbers.shape != f.shape or np.any(numbers < 1) or np.unique(numbers).size < f.size:
         raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
     order = np.argsort(numbers)
     if np.any(np.diff(f[order]) <= 0):
-        raise ValueError(
-            f"frequency={f[order].tolist()} Hz does not rise with the number of the mode, {numbers[order]}"
-        )
+        rising = f"rise with the number of the mode, {numbers[order]}"
+        raise ValueError(f"frequency={f[order].tolist()} Hz does not {rising}")
 
 
 MAX_LOG_FACTOR = math.log(1e6)
@@ -173,6 +155,10 @@ FREQUENCY_ROUNDING = 1e-10
 """Relative rounding error of frequencies, which may hide the gain of a step."""
 MIN_CHI_SQUARE_PROBABILITY = 1e-3
 """Least probability of a chi-square, or least relative residual without standard errors, that is reported."""
+MAX_LOG_INTERVAL = math.log(30.0)
+"""Largest interval, in the logarithm of a factor."""
+MIN_ENERGY_SHARE = 0.01
+"""Least energy share in a measured mode of a group with effect."""
 
 
 class Iterate(NamedTuple):
@@ -197,6 +183,11 @@ class Iterate(NamedTuple):
     def cost(self) -> float:
         """Sum of squares."""
         return float(self.residual @ self.residual)
+
+    @property
+    def unfelt(self) -> Flags:
+        """Factors without effect on the measured modes, shape (g,)."""
+        return np.asarray(np.max(self.share, axis=0) < MIN_ENERGY_SHARE)
 
 
 class StiffnessProblem(NamedTuple):
@@ -242,12 +233,40 @@ class StiffnessProblem(NamedTuple):
             residual, slope = self.weight @ residual, self.weight @ slope
         return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope)
 
+    def variance(self, best: Iterate) -> float:
+        """Return the variance of the scaled residuals: 1, or from their scatter without standard errors."""
+        return best.cost / self.degrees_of_freedom if self.measured.std is None else 1.0
+
+    def covariance(self, state: Iterate) -> Floats | None:
+        """Return (J^T J)^-1, times the variance of the residuals if no standard errors were given.
+
+        A group without effect, known to a factor of 30 at best, counts as known to that and independent of all others.
+        """
+        if self.measured.std is None and self.degrees_of_freedom == 0:
+            return None
+        variance = self.variance(state)
+        covariance = variance * _inverse_normal_matrix(state.slope)
+        felt = ~state.unfelt | (np.diag(covariance) < MAX_LOG_INTERVAL**2)
+        if np.all(felt):
+            return covariance
+        limited = np.diag(np.full(felt.size, MAX_LOG_INTERVAL**2))
+        if np.any(felt):
+            limited[np.ix_(felt, felt)] = variance * _inverse_normal_matrix(state.slope[:, felt])
+        return limited
+
     def fits(self, state: Iterate) -> bool:
         """Return whether the residuals have the expected size."""
         measured = self.measured
         if measured.std is None:
             return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < MIN_CHI_SQUARE_PROBABILITY
         return float(scipy.special.chdtrc(max(self.degrees_of_freedom, 1), state.cost)) > MIN_CHI_SQUARE_PROBABILITY
+
+
+def _inverse_normal_matrix(slope: Floats) -> Floats:
+    """Return (J^T J)^-1, large if J is singular."""
+    _, values, vectors = np.linalg.svd(slope, full_matrices=False)
+    root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
+    return np.asarray(root @ root.T)
 
 
 def minimize(
@@ -268,9 +287,8 @@ def minimize(
             return state, True
         if np.any(np.abs(state.log_factor[free]) == MAX_LOG_FACTOR):
             break
-        trial = problem.evaluate(
-            np.clip(state.log_factor + _damped_step(state, free, damping), -MAX_LOG_FACTOR, MAX_LOG_FACTOR)
-        )
+        moved = state.log_factor + _damped_step(state, free, damping)
+        trial = problem.evaluate(np.clip(moved, -MAX_LOG_FACTOR, MAX_LOG_FACTOR))
         if trial.cost < state.cost:
             state, damping = trial, max(damping / 10, 1e-15)
         elif change <= max(ROUNDING_STEP_LIMIT, converged) or _is_hidden_by_rounding(problem, state, free):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Complexes, Floats
+from dsm.arrays import Complexes, check_numbers
 from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.matrix.assemble import assemble
 from dsm.matrix.condense import damped_blocks
@@ -67,7 +67,8 @@ def receptance_map(
     >>> (abs(softer).argmax(axis=1) + 1).tolist()  # Hz: peak at the tip as the bearings wear
     [1124, 1019, 896]
     """
-    f, factors = check_frequencies(frequency), _check_factors(factor)
+    f = check_frequencies(frequency)
+    factors = check_numbers("factor", np.atleast_1d(factor), "", " of at least one factor", least=1, positive=True)
     if np.any(f == 0):
         require_support(spindle)
     chosen = calibrated_bearings(spindle, group)
@@ -83,16 +84,6 @@ def receptance_map(
     for value, product in zip(values.T, products.T, strict=True):
         receptances -= product * change / (1 + change * value)
     return receptances
-
-
-def _check_factors(factor: ArrayLike) -> Floats:
-    factors = np.atleast_1d(np.asarray(factor, dtype=np.float64))
-    if factors.ndim != 1 or factors.size == 0:
-        raise ValueError(f"factor has shape {factors.shape}; a 1-D array of at least one factor is needed")
-    bad = factors[~(np.isfinite(factors) & (factors > 0))]
-    if bad.size:
-        raise ValueError(f"factor={bad[0]} is not a finite number > 0")
-    return factors
 
 
 def _compliance(spindle: Spindle, w: Complexes, places: Sequence[float], loss_factor: float) -> Complexes:

@@ -1,6 +1,5 @@
 """Result of a stiffness fit, and the prediction of further modes from it."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from dsm.arrays import Floats, Indices
-from dsm.calibration.least_squares import diameter_columns, diameter_effects, diameter_keys, frequency_effects
+from dsm.calibration.least_squares import (
+    MAX_LOG_INTERVAL,
+    diameter_columns,
+    diameter_effects,
+    diameter_keys,
+    frequency_effects,
+)
 from dsm.calibration.report_text import FitRemark, format_with_error
 from dsm.calibration.stiffness_groups import group_stiffness, is_tilting, scale_groups
 from dsm.modes.natural_frequencies import modes_at
@@ -138,9 +143,11 @@ class StiffnessFit:
 
     def __str__(self) -> str:
         """Return the report."""
-        return "\n".join(
-            [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines(), *self._remark_lines()]
-        )
+        lines = [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines()]
+        chi = self.reduced_chi_square
+        if chi is not None:
+            lines.append(f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right")
+        return "\n".join([*lines, *(f"warning: {remark}" for remark in self.remarks)])
 
     def _stiffness_lines(self) -> list[str]:
         width = max(map(len, self.groups))
@@ -175,13 +182,6 @@ class StiffnessFit:
             lines.append(f"{place}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
         return lines
 
-    def _remark_lines(self) -> list[str]:
-        chi = self.reduced_chi_square
-        lines = []
-        if chi is not None:
-            lines = [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
-        return [*lines, *(f"warning: {remark}" for remark in self.remarks)]
-
 
 class StiffnessFitError(ArithmeticError):
     """Raised if no minimum was found; holds the best estimate.
@@ -200,8 +200,6 @@ class StiffnessFitError(ArithmeticError):
         """Best estimate; not reliable."""
 
 
-MAX_LOG_FACTOR_CHANGE = math.log(30.0)
-"""Largest change of a factor (logarithm) for the error of a predicted mode."""
 MIN_LOG_FACTOR_CHANGE = 1e-9
 """Smallest change of a factor (logarithm) for the error of a predicted mode."""
 
@@ -269,7 +267,7 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
     if fit.log_covariance is None:
         return PredictedMode(float(values[0]), None, float(values[1]), None)
     variance, axes = np.linalg.eigh(fit.log_covariance)
-    sizes = np.clip(np.sqrt(np.maximum(variance, 0.0)), MIN_LOG_FACTOR_CHANGE, MAX_LOG_FACTOR_CHANGE)
+    sizes = np.clip(np.sqrt(np.maximum(variance, 0.0)), MIN_LOG_FACTOR_CHANGE, MAX_LOG_INTERVAL)
     changes = np.array([(at(best + step) - at(best - step)) / 2 for step in (axes * sizes).T])
     squares = np.sum(np.square(changes), axis=0)
     if fit.tolerance > 0 and fit.frequency_std is not None:
@@ -301,6 +299,6 @@ def _diameter_variance(fit: StiffnessFit, effect: tuple[Floats, Floats], slope: 
     relative = np.asarray(fit.frequency_std) / fit.frequency
     covariance = np.diag(relative**2) + fit.tolerance**2 * fitted @ fitted.T
     factors = np.asarray(fit.log_covariance)
-    known = np.where(np.diag(factors) < MAX_LOG_FACTOR_CHANGE**2, 1.0, 0.0)[:, np.newaxis]
+    known = np.where(np.diag(factors) < MAX_LOG_INTERVAL**2, 1.0, 0.0)[:, np.newaxis]
     by_fit = slope.T @ (known * (factors @ (fit.energy_share / 2).T)) @ np.linalg.solve(covariance, fitted)
     return np.asarray(fit.tolerance**2 * np.sum(own**2 - 2 * by_fit * own, axis=1))

@@ -19,8 +19,7 @@ def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
     """Return the indices in (*bearings, *joints) of the parts with one common factor: all parts of a group.
 
     None: all bearings with a group; joints are excluded, as one factor cannot separate their wear from that of
-    bearings.
-    Raises ValueError if there is none, and for a rigid bearing.
+    bearings. Raises ValueError if there is none, and for a rigid bearing.
     """
     if group is None:
         return calibrated_bearings(spindle)
@@ -44,8 +43,8 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
     """Scale bearing stiffnesses, and both stiffnesses of joints, by a factor; see calibrated_parts."""
-    factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
-    return _with_parts(spindle, [_scale_part(p, one, one) for p, one in zip(_parts(spindle), factors, strict=True)])
+    parts = [_scale_part(p, factor, factor) if i in chosen else p for i, p in enumerate(_parts(spindle))]
+    return _with_parts(spindle, parts)
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
@@ -78,12 +77,9 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
     """Scale bearing stiffnesses, and both stiffnesses of joints, by the factor of their group."""
-
-    def scaled(part: _StiffPart) -> _StiffPart:
-        tilting = factors.get(_tilting_group(part), 1.0) if isinstance(part, Joint) else 1.0
-        return _scale_part(part, factors.get(part.group, 1.0), tilting)
-
-    return _with_parts(spindle, [scaled(part) for part in _parts(spindle)])
+    groups = ((part, part.group, _tilting_group(part)) for part in _parts(spindle))
+    parts = [_scale_part(part, factors.get(group, 1.0), factors.get(tilting, 1.0)) for part, group, tilting in groups]
+    return _with_parts(spindle, parts)
 
 
 def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
@@ -111,19 +107,19 @@ def group_shares(modes: Modes, groups: Sequence[str]) -> Floats:
 
     It is d ln w^2 / d ln factor.
     """
-    energy = spring_energy(modes)
+    energy, parts = spring_energy(modes), _parts(modes.spindle)
     shares = np.zeros((modes.frequency.size, len(groups)))
     springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
-    names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting_group, modes.spindle.joints)]
+    names = [*(part.group for part in parts), *map(_tilting_group, modes.spindle.joints)]
     for name, of_spring in zip(names, springs, strict=True):
         if name in groups:
             shares[:, groups.index(name)] += of_spring
     return np.asarray(shares / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
 
 
-def _tilting_group(joint: Joint) -> str:
-    """Return the group of the stiffness against tilting."""
-    return joint.rotational_group or joint.group
+def _tilting_group(part: _StiffPart) -> str:
+    """Return the group of the stiffness against tilting; that of a bearing is never scaled."""
+    return (isinstance(part, Joint) and part.rotational_group) or part.group
 
 
 def _group_names(spindle: Spindle) -> list[str]:
@@ -151,6 +147,5 @@ def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:
 def _require_spring(spindle: Spindle, index: int, otherwise: str) -> None:
     """Raise ValueError for a rigid bearing, which no factor changes."""
     if math.isinf(spindle.bearings[index].stiffness):
-        raise ValueError(
-            f"bearing {index + 1}: stiffness=inf cannot be calibrated; give a finite one to start from, {otherwise}"
-        )
+        remedy = f"give a finite one to start from, {otherwise}"
+        raise ValueError(f"bearing {index + 1}: stiffness=inf cannot be calibrated; {remedy}")

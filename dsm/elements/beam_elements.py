@@ -19,108 +19,95 @@ from dsm.spindle.segment import SAME_PLACE
 from dsm.spindle.spindle import Theory
 
 
-def stiffness_elements(
-    shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
-) -> Floats:
-    """Return the dynamic stiffness of elements as series, shape (10, n, n_terms); arguments as for transfer_series.
+class Nodes(NamedTuple):
+    """Nodes along a shaft and the elements between them."""
+
+    position: Floats
+    """Positions of the nodes (m), rising, shape (n,)."""
+    segment: Indices
+    """Index of the segment of each element, shape (n - 1,)."""
+    short: Flags
+    """True for each element that is a link, as its stiffness would lose all else to rounding, shape (n - 1,)."""
+
+
+def beam_elements(shaft: Sections, theory: Theory, nodes: Nodes, apart: bool) -> Floats:
+    """Return all elements as series, shape (10, n, n_terms); theory and apart as for transfer_series.
 
     With u, t of both ends the rows are k(u1,u1), k(u1,t1), k(t1,t1); k(u2,u2), k(u2,t2), k(t2,t2); k(u1,u2), k(u1,t2),
-    k(t1,u2), k(t1,t2).
+    k(t1,u2), k(t1,t2), those of a short element as in _link_rows.
     """
-    stiffness = np.zeros((10, segment.size, count_series_terms(apart)))
-    plain = ~shaft.is_cone[segment] & (theory == "euler-bernoulli")
+    start, end = nodes.position[:-1], nodes.position[1:]
+    series = np.zeros((10, start.size, count_series_terms(apart)))
+    plain = ~nodes.short & ~shaft.is_cone[nodes.segment] & (theory == "euler-bernoulli")
     if np.any(plain):
-        section = shaft.at(segment[plain], start[plain])
-        series = element_series(section.rigidity, section.mass, (end - start)[plain])
+        section = shaft.at(nodes.segment[plain], start[plain])
+        rows = element_series(section.rigidity, section.mass, (end - start)[plain])
         mirror = np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
-        rows = np.concatenate([series[:3], mirror * series[:3], series[3:5], -series[4:5], series[5:]])
-        stiffness[:, plain, :: SERIES_TERMS if apart else 1] = rows
-    if not np.all(plain):
-        rest = ~plain
-        transfer = transfer_series(shaft, theory, segment[rest], start[rest], end[rest], apart)
-        stiffness[:, rest] = _stiffness_from_transfer(transfer)
-    return stiffness
+        rows = np.concatenate([rows[:3], mirror * rows[:3], rows[3:5], -rows[4:5], rows[5:]])
+        series[:, plain, :: SERIES_TERMS if apart else 1] = rows
+    for chosen, rows_of in ((~nodes.short & ~plain, _stiffness_rows), (nodes.short, _link_rows)):
+        if np.any(chosen):
+            transfer = transfer_series(shaft, theory, nodes.segment[chosen], start[chosen], end[chosen], apart)
+            far = np.ascontiguousarray(transfer.transpose(1, 2, 3, 0))
+            series[:, chosen] = rows_of(far[:2, :2], far[:2, 2:], far[2:, :2], far[2:, 2:]).swapaxes(1, 2)
+    return series
 
 
-def link_elements(
-    shaft: Sections, theory: Theory, segment: Indices, start: Floats, end: Floats, apart: bool = False
-) -> Floats:
-    """Return short elements as series without loss of digits, shape (10, n, n_terms); arguments as for transfer_series.
-
-    Further unknowns besides q1 = (u1, t1) are the force and the moment p at end 2: [f1; 0; f2] = [[S, -H^T, 0],
-    [-H, -F, I], [0, I, 0]] [q1; p; q2], so that q2 = H q1 + F p: a rigid lever H, the flexibility F in series, the
-    inertia
-    in S. The rows are S(u,u), S(u,t), S(t,t); -F(Q,Q), -F(Q,M), -F(M,M); -H^T(u,Q), -H^T(u,M), -H^T(t,Q), -H^T(t,M).
-    """
-    if segment.size == 0:
-        return np.zeros((10, 0, count_series_terms(apart)))
-    transfer = transfer_series(shaft, theory, segment, start, end, apart)
-    _, b, c, d = _split_quarters(transfer)
-    lever = _invert_series(d)  # H^T
-    flexibility = _multiply_series(b, lever)
-    inertia = _multiply_series(lever, c)
-    return np.stack([*_upper_triangle(inertia), *_upper_triangle(-flexibility), *_matrix_entries(-lever)])
-
-
-def _stiffness_from_transfer(transfer: Floats) -> Floats:
+def _stiffness_rows(a: Floats, b: Floats, _: Floats, d: Floats) -> Floats:
     """Return the stiffness rows from q2 = A q1 + B (Q1, M1): K11 = B^-1 A, K12 = -B^-1, K22 = D B^-1.
 
     End forces are f1 = -(Q1, M1) and f2 = (Q2, M2).
     """
-    a, b, _, d = _split_quarters(transfer)
     across = _invert_series(b)
-    near, far = _multiply_series(across, a), _multiply_series(d, across)
-    return np.stack([*_upper_triangle(near), *_upper_triangle(far), *_matrix_entries(-across)])
+    return _matrix_rows(_multiply_series(across, a), _multiply_series(d, across), -across)
 
 
-def _split_quarters(transfer: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    return transfer[:, :2, :2], transfer[:, :2, 2:], transfer[:, 2:, :2], transfer[:, 2:, 2:]
+def _link_rows(_: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
+    """Return rows of short elements without loss of digits.
+
+    Further unknowns besides q1 = (u1, t1) are the force and the moment p at end 2: [f1; 0; f2] = [[S, -H^T, 0],
+    [-H, -F, I], [0, I, 0]] [q1; p; q2], so that q2 = H q1 + F p: a rigid lever H, the flexibility F in series, the
+    inertia in S. The rows are S(u,u), S(u,t), S(t,t); -F(Q,Q), -F(Q,M), -F(M,M); -H^T(u,Q), -H^T(u,M), -H^T(t,Q),
+    -H^T(t,M).
+    """
+    lever = _invert_series(d)  # H^T
+    return _matrix_rows(_multiply_series(lever, c), -_multiply_series(b, lever), -lever)
 
 
-def _matrix_entries(matrix: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    return matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 1]
+def _matrix_rows(first: Floats, second: Floats, across: Floats) -> Floats:
+    """Return the upper halves of two symmetric matrices, the means of both halves, and all entries of a third.
 
-
-def _upper_triangle(matrix: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the upper half of a symmetric matrix, the mean of both halves."""
-    return matrix[:, 0, 0], (matrix[:, 0, 1] + matrix[:, 1, 0]) / 2, matrix[:, 1, 1]
+    Power series of 2 x 2 matrices have the shape (2, 2, n_terms, n), rows the shape (10, n_terms, n).
+    """
+    halves = [(m[0, 0], (m[0, 1] + m[1, 0]) / 2, m[1, 1]) for m in (first, second)]
+    return np.stack([*halves[0], *halves[1], *across[0], *across[1]])
 
 
 def _multiply_series(a: Floats, b: Floats) -> Floats:
-    """Multiply power series of 2 x 2 matrices, shape (n, 2, 2, n_terms), cut off after n_terms."""
-    near, far = _terms_outside(a), _terms_outside(b)
-    series = np.zeros_like(far)
-    for power in np.flatnonzero(near.any(axis=(0, 1, 3))):
-        series[:, :, power:] += _multiply(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
-    return _terms_last(series)
+    """Multiply power series of 2 x 2 matrices, cut off after n_terms."""
+    series = np.zeros_like(b)
+    for power in np.flatnonzero(a.any(axis=(0, 1, 3))):
+        series[:, :, power:] += _multiply(a[:, :, power, np.newaxis], b[:, :, : b.shape[2] - power])
+    return series
 
 
 def _invert_series(a: Floats) -> Floats:
     """Invert a power series of 2 x 2 matrices whose term 0 has an inverse."""
-    given = _terms_outside(a)
-    (p, q), (r, s) = given[:, :, :1]
+    (p, q), (r, s) = a[:, :, :1]
     inverted = np.array([[s, -q], [-r, p]]) / (p * s - q * r)
-    series, remainder = np.zeros_like(given), np.zeros_like(given)
+    series, remainder = np.zeros_like(a), np.zeros_like(a)
     remainder[0, 0, 0] = remainder[1, 1, 0] = 1.0
-    for power in range(given.shape[2]):
+    for power in range(a.shape[2]):
         if not np.any(remainder[:, :, power]):
             continue
         series[:, :, power, np.newaxis] = _multiply(inverted, remainder[:, :, power, np.newaxis])
-        earlier = _multiply(given[:, :, 1 : given.shape[2] - power], series[:, :, power, np.newaxis])
+        earlier = _multiply(a[:, :, 1 : a.shape[2] - power], series[:, :, power, np.newaxis])
         remainder[:, :, power + 1 :] -= earlier
-    return _terms_last(series)
+    return series
 
 
 def _multiply(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, :1] * b[:1] + a[:, 1:] * b[1:])
-
-
-def _terms_outside(series: Floats) -> Floats:
-    return np.ascontiguousarray(series.transpose(1, 2, 3, 0))
-
-
-def _terms_last(terms: Floats) -> Floats:
-    return np.ascontiguousarray(terms.transpose(3, 0, 1, 2))
 
 
 MAX_SHAFT_ELEMENTS = 1000
@@ -131,17 +118,6 @@ SHORT_ELEMENT_SHARE = 0.05
 """Length over the longest allowed below which an element is a link: its stiffness exceeds its inertia 1e4 times."""
 MAX_LINK_SHARE = 0.4
 """Largest length of a link over the longest element; longer ones need more terms: x < 0.8, their pole is at 1.875."""
-
-
-class Nodes(NamedTuple):
-    """Nodes along a shaft and the elements between them."""
-
-    position: Floats
-    """Positions of the nodes (m), rising, shape (n,)."""
-    segment: Indices
-    """Index of the segment of each element, shape (n - 1,)."""
-    short: Flags
-    """True for each element that is a link, as its stiffness would lose all else to rounding, shape (n - 1,)."""
 
 
 def place_nodes(

@@ -5,6 +5,7 @@ from functools import cache
 from math import comb, factorial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsm.arrays import Floats, Indices
 from dsm.spindle.sections import Sections
@@ -16,8 +17,6 @@ FIRST_SERIES_POLE = 500.5639
 """Lowest pole in z = x^4: resonance of the element with clamped ends, 4.7300^4."""
 MAX_ELEMENT_X = 2.0
 """Largest x = L (m w^2/EI)^(1/4) of an element: longer ones are divided, and no clamped frequency is below w."""
-
-_FractionSeries = list[Fraction]
 
 
 def element_series(bending_stiffness: Floats, mass_per_length: Floats, length: Floats) -> Floats:
@@ -43,30 +42,15 @@ def _unit_series() -> Floats:
     The solutions of u'''' = z u with one unit derivative at s = 0 are c_j(s) = sum z^n s^(4n+j)/(4n+j)!, and at
     s = 1 c_3' = c_2, c_2' = c_1, c_1' = c_0, c_0' = z c_3. Solving for the end forces gives the fractions below.
     """
-    c0, c1, c2, c3 = ([Fraction(1, factorial(4 * n + j)) for n in range(SERIES_TERMS)] for j in range(4))
-    z_c3 = [Fraction(0), *c3[:-1]]
-    determinant = _subtract_series(_multiply_series(c2, c2), _multiply_series(c1, c3))
-    numerators = [
-        _subtract_series(_multiply_series(c0, c1), _multiply_series(z_c3, c2)),
-        _subtract_series(_multiply_series(c1, c1), _multiply_series(c0, c2)),
-        _subtract_series(_multiply_series(c1, c2), _multiply_series(c0, c3)),
-        [-term for term in c1],
-        c2,
-        c3,
-    ]
-    return np.array([[float(term) for term in _divide_series(top, determinant)] for top in numerators])
+    c0, c1, c2, c3 = np.array([[Fraction(1, factorial(4 * n + j)) for n in range(SERIES_TERMS)] for j in range(4)])
+    z_c3 = np.array([Fraction(0), *c3[:-1]])
+    products = ((c2, c2, c1, c3), (c0, c1, z_c3, c2), (c1, c1, c0, c2), (c1, c2, c0, c3))
+    determinant, *numerators = (np.convolve(a, b) - np.convolve(c, d) for a, b, c, d in products)
+    return np.array([_divide_series(top, determinant) for top in (*numerators, -c1, c2, c3)], dtype=np.float64)
 
 
-def _subtract_series(a: _FractionSeries, b: _FractionSeries) -> _FractionSeries:
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def _multiply_series(a: _FractionSeries, b: _FractionSeries) -> _FractionSeries:
-    return [sum((a[i] * b[n - i] for i in range(n + 1)), Fraction(0)) for n in range(SERIES_TERMS)]
-
-
-def _divide_series(a: _FractionSeries, b: _FractionSeries) -> _FractionSeries:
-    quotient: _FractionSeries = []
+def _divide_series(a: NDArray[np.object_], b: NDArray[np.object_]) -> list[Fraction]:
+    quotient: list[Fraction] = []
     for n in range(SERIES_TERMS):
         earlier = sum((quotient[i] * b[n - i] for i in range(n)), Fraction(0))
         quotient.append((a[n] - earlier) / b[0])
@@ -81,11 +65,10 @@ def count_series_terms(apart: bool) -> int:
 def combine_rotary_terms(series: Floats, spin: float) -> Floats:
     """Combine a series with separate rotary inertia to one in powers of w, at a speed of rotation W = `spin` (rad/s).
 
-    Term SERIES_TERMS n + j of the series (..., SERIES_TERMS^2) belongs to w^2 to the power n - j times r to the power
-    j <= n, r the factor of rotary inertia: products of such series are those of their terms, cut off alike. In the
-    circular
-    whirl u exp(i w t), forward for w > 0, of a round shaft gyroscopic moments make r = w^2 - 2 W w. Result: (...,
-    2 SERIES_TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
+    Term SERIES_TERMS n + j of the series (..., SERIES_TERMS^2) belongs to w^2 to the power n - j times r to the power j
+    <= n, r the factor of rotary inertia: products of such series are those of their terms, cut off alike. In the
+    circular whirl u exp(i w t), forward for w > 0, of a round shaft gyroscopic moments make r = w^2 - 2 W w. Result:
+    (..., 2 SERIES_TERMS - 1). Source: M. I. Friswell et al., Dynamics of Rotating Machines, 2010, section 5.4.
     """
     kept, lowered, binomial = _rotary_terms()
     weight = binomial * (-2 * spin) ** lowered
@@ -113,13 +96,11 @@ def transfer_series(
 ) -> Floats:
     """Return the state (u, t, Q, M) at `end` from that at `start`, in powers of w^2: (n, 4, 4, n_terms).
 
-    segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of
-    the cross-section, Q the shear force and M the bending moment: EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u and
-    M' = -Q - rho I r t with r = w^2; Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a
-    separate variable, see combine_rotary_terms. Each term follows from those below it by integration (Picard), exact
-    but
-    for rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ...,
-    Phil.
+    segment, start, end (m): shape (n,), elements inside one segment each. With u the deflection, t the rotation of the
+    cross-section, Q the shear force and M the bending moment: EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u and M' =
+    -Q - rho I r t with r = w^2; Euler-Bernoulli theory has neither 1/(kappa G A) nor rho I. apart: r stays a separate
+    variable, see combine_rotary_terms. Each term follows from those below it by integration (Picard), exact but for
+    rounding as long as the cross-section is smooth. Source: S. P. Timoshenko, On the correction for shear ..., Phil.
     Mag. 41 (1921).
     """
     place, weight, running = _quadrature()

@@ -4,11 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from dsm.arrays import Flags, Floats, Indices
-from dsm.elements.beam_elements import link_elements, place_nodes, stiffness_elements
+from dsm.arrays import Flags, Floats
+from dsm.elements.beam_elements import beam_elements, place_nodes
 from dsm.elements.element_series import combine_rotary_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
@@ -20,6 +21,7 @@ SLOW_SPIN_SHARE = 0.25
 """Speed over the highest w below which shafts are divided alike: gyroscopic moments are small then."""
 HeldDof = tuple[float, int]
 """Fixed degree of freedom: position (m), and 0 for the deflection or 1 for the slope."""
+_ShaftAlone = tuple[tuple[Segment, ...], Material, Theory, tuple[Joint, ...]]
 
 
 def assemble(
@@ -40,26 +42,34 @@ def assemble(
     bearings far softer than the shaft. Matrices are cached.
     Raises ValueError for a place off the shaft.
     """
-    nodes = tuple(map(float, places))
-    return _assemble(spindle, float(top_frequency), nodes, tuple(held), tuple(left_out), spin, links)
+    shaft = ShaftRequest(spindle, tuple(map(float, places)), tuple(held), tuple(left_out), spin, links)
+    return assemble_request(shaft, float(top_frequency))
+
+
+class ShaftRequest(NamedTuple):
+    """Arguments of assemble without the frequency, hashable."""
+
+    spindle: Spindle
+    places: tuple[float, ...]
+    held: tuple[HeldDof, ...]
+    left_out: tuple[int, ...] = ()
+    spin: float | None = None
+    links: bool = False
 
 
 @lru_cache(maxsize=32)
-def _assemble(
-    spindle: Spindle,
-    top_frequency: float,
-    places: tuple[float, ...],
-    held: tuple[HeldDof, ...],
-    left_out: tuple[int, ...],
-    spin: float | None,
-    links: bool,
-) -> DynamicStiffness:
-    if spin is not None and spin < 0:
-        return _reverse_spin(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
-    wanted = (*_part_positions(spindle), *places, *(z for z, _ in held))
+def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffness:
+    """Assemble the matrix of a request, see assemble."""
+    spindle, places, held, left_out, spin, links = shaft
+    if spin is not None and spin < 0:  # speed and frequency change their signs together
+        opposite = assemble_request(shaft._replace(spin=-spin), top_frequency)
+        sign = (-1.0) ** np.arange(opposite.diagonal.shape[2])
+        return replace(opposite, diagonal=sign * opposite.diagonal, coupling=sign * opposite.coupling, spin=spin)
+    parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
+    wanted = (*(part.position for part in parts), *places, *(z for z, _ in held))
     fastest = None if spin is None else shared_spin_limit(spin, top_frequency)
-    segments, joints = tuple(spindle.segments), tuple(spindle.joints)
-    bare = _assemble_shaft(segments, spindle.material, spindle.theory, joints, wanted, top_frequency, fastest, links)
+    shaft_alone = tuple(spindle.segments), spindle.material, spindle.theory, tuple(spindle.joints)
+    bare = _assemble_shaft(shaft_alone, wanted, top_frequency, fastest, links)
     diagonal, coupling = (
         part.copy() if spin is None else combine_rotary_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
@@ -82,24 +92,18 @@ def _assemble(
 
 @lru_cache(maxsize=32)
 def _assemble_shaft(
-    segments: tuple[Segment, ...],
-    material: Material,
-    theory: Theory,
-    joints: tuple[Joint, ...],
-    wanted: tuple[float, ...],
-    top_frequency: float,
-    fastest: float | None,
-    links: bool,
+    alone: _ShaftAlone, wanted: tuple[float, ...], top_frequency: float, fastest: float | None, links: bool
 ) -> DynamicStiffness:
     """Assemble the shaft and its joints alone, common to spindles that differ in bearings and masses.
 
     fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
     """
+    segments, material, theory, joints = alone
     shaft = sections_of_segments(segments, material)
-    position, segment, short = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
-    series = _element_series(theory, shaft, position, segment, short, fastest is not None)
-    position, series, short = _insert_joints(joints, position, series, short)
-    return _join_elements(position, series, short, top_frequency, _shaft_stiffness(shaft))
+    nodes = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
+    series = beam_elements(shaft, theory, nodes, apart=fastest is not None)
+    position, series, short = _insert_joints(joints, nodes.position, series, nodes.short)
+    return _join_elements(position, series, short, top_frequency, shaft)
 
 
 def shared_spin_limit(spin: float, top_frequency: float) -> float:
@@ -108,30 +112,6 @@ def shared_spin_limit(spin: float, top_frequency: float) -> float:
     while fastest < spin:
         fastest *= 2
     return fastest
-
-
-def _reverse_spin(model: DynamicStiffness) -> DynamicStiffness:
-    """Return the shaft with the opposite sense of rotation: speed and frequency change their signs together."""
-    sign = (-1.0) ** np.arange(model.diagonal.shape[2])
-    spin = None if model.spin is None else -model.spin
-    return replace(model, diagonal=sign * model.diagonal, coupling=sign * model.coupling, spin=spin)
-
-
-def _part_positions(spindle: Spindle) -> list[float]:
-    parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
-    return [part.position for part in parts]
-
-
-def _element_series(
-    theory: Theory, shaft: Sections, position: Floats, segment: Indices, short: Flags, apart: bool
-) -> Floats:
-    """Return the series of all elements, (10, n_elements, n_terms): link_elements if short, else stiffness_elements."""
-    blocks = []
-    for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        blocks.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
-    series = np.empty((10, segment.size, blocks[0].shape[2]))
-    series[:, ~short], series[:, short] = blocks
-    return series
 
 
 def _insert_joints(
@@ -150,9 +130,9 @@ def _insert_joints(
 
 
 def _join_elements(
-    position: Floats, series: Floats, short: Flags, top_frequency: float, least: tuple[float, float]
+    position: Floats, series: Floats, short: Flags, top_frequency: float, shaft: Sections
 ) -> DynamicStiffness:
-    """Join elements, with a node of force and moment inside each link; the scale is that of `least` only."""
+    """Join elements, with a node of force and moment inside each link; the scale is that of the whole shaft only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
     count, terms = node[-1] + 1, series.shape[2]
     diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
@@ -165,16 +145,11 @@ def _join_elements(
     places = np.full(count, math.inf)
     places[node] = position
     held = np.zeros((count, 2), dtype=bool)
-    scale = np.tile(1 / np.sqrt(least), count)
-    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
-
-
-def _shaft_stiffness(shaft: Sections) -> tuple[float, float]:
-    """Return the stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
-    middle = np.arange(shaft.ends.size - 1)
-    rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
+    middle = (shaft.ends[1:] + shaft.ends[:-1]) / 2
+    rigidity = float(np.mean(shaft.at(np.arange(middle.size), middle).rigidity))
     length = float(shaft.ends[-1])
-    return rigidity / length**3, rigidity / length
+    scale = np.tile(1 / np.sqrt([rigidity / length**3, rigidity / length]), count)
+    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
 
 
 def _dof_scale(model: DynamicStiffness) -> Floats:

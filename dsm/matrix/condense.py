@@ -26,13 +26,12 @@ class CondensedStiffness(NamedTuple):
     """Deflection of the node `start` over t (m)."""
 
 
-class _Elimination(NamedTuple):
-    """Effect of the nodes before one: lost stiffness, and their motion from its motion."""
+_Elimination = tuple[Complexes, tuple[Complexes, ...]]
+"""Effect of the nodes before one.
 
-    lost: tuple[Complexes, Complexes, Complexes]
-    """Values of uu, ut, tt to be subtracted from the stiffness of the node."""
-    follow: tuple[Complexes, Complexes, Complexes, Complexes]
-    """Motion of the node before over that of this one, with changed sign: u/u, u/t, t/u, t/t."""
+Values of uu, ut, tt to be subtracted from its stiffness, shape (3, n), and the motion of the node before over its own,
+with changed sign: u/u, u/t, t/u, t/t.
+"""
 
 
 def condense_to_node(
@@ -50,19 +49,18 @@ def condense_to_node(
     # From the far end down to the node, where the two sides of a coupling block change places.
     flipped = coupling[: node - diagonal.shape[0] : -1][:, [0, 2, 1, 3]]
     right, _, _ = _eliminate(diagonal[:node:-1], flipped, is_link[:node:-1], flipped.shape[0])
-    uu, ut, tt = (own - a - b for own, a, b in zip(diagonal[node], left, right, strict=True))
+    uu, ut, tt = diagonal[node] - left - right
     return CondensedStiffness(uu, ut, tt, share_u, share_t)
 
 
 def _eliminate(
     diagonal: Complexes, coupling: Complexes, is_link: Flags, start: int
-) -> tuple[tuple[Complexes, Complexes, Complexes], Complexes, Complexes]:
+) -> tuple[Complexes, Complexes, Complexes]:
     """Return the stiffness that the last node takes from the next one, and the deflection of node `start`."""
-    nothing = np.zeros(1, dtype=np.complex128)
-    lost = nothing, nothing, nothing
-    share_u, share_t = nothing + 1, nothing
+    lost = np.zeros((3, diagonal.shape[2]), dtype=np.complex128)
+    share_u, share_t = lost[0] + 1, lost[0]
     for number in np.flatnonzero(~is_link):
-        pivot = tuple(own - gone for own, gone in zip(diagonal[number], lost, strict=True))
+        pivot = diagonal[number] - lost
         if number + 1 < is_link.size and is_link[number + 1]:
             passed = _across_link(pivot, coupling[number], diagonal[number + 1], coupling[number + 1])
         else:
@@ -73,20 +71,19 @@ def _eliminate(
     return lost, share_u, share_t
 
 
-def _across_element(pivot: tuple[Complexes, ...], coupling: Complexes) -> _Elimination:
+def _across_element(pivot: Complexes, coupling: Complexes) -> _Elimination:
     a, b, d = pivot
     c_uu, c_ut, c_tu, c_tt = coupling
     determinant = a * d - b * b
     u_u, u_t = (d * c_uu - b * c_tu) / determinant, (d * c_ut - b * c_tt) / determinant
     t_u, t_t = (a * c_tu - b * c_uu) / determinant, (a * c_tt - b * c_ut) / determinant
     lost = c_uu * u_u + c_tu * t_u, c_uu * u_t + c_tu * t_t, c_ut * u_t + c_tt * t_t
-    return _Elimination(lost, (u_u, u_t, t_u, t_t))
+    return np.array(lost), (u_u, u_t, t_u, t_t)
 
 
-def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes, far: Complexes) -> _Elimination:
+def _across_link(pivot: Complexes, near: Complexes, force: Complexes, far: Complexes) -> _Elimination:
     """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a free tip."""
-    shape = near[0].shape
-    a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
+    a, b, d = pivot
     lower = [near[0], near[2], force[0], force[1]], [near[1], near[3], force[1], force[2]]
     both = np.array([[a, b, near[0], near[1]], [b, d, near[2], near[3]], *lower])
     zero = np.zeros_like(a)
@@ -94,7 +91,7 @@ def _across_link(pivot: tuple[Complexes, ...], near: Complexes, force: Complexes
     solved = np.linalg.solve(both.transpose(2, 0, 1), right.transpose(2, 0, 1)).transpose(1, 2, 0)
     (u_u, u_t), (t_u, t_t), (q_u, q_t), (m_u, m_t) = solved
     lost = far[0] * q_u + far[2] * m_u, far[0] * q_t + far[2] * m_t, far[1] * q_t + far[3] * m_t
-    return _Elimination(lost, (u_u, u_t, t_u, t_t))
+    return np.array(lost), (u_u, u_t, t_u, t_t)
 
 
 def damped_blocks(
@@ -148,6 +145,5 @@ def condense_damped(
         diagonal, coupling = damped_blocks(model, spindle, w[chunk], damping)
         if extra is not None:
             diagonal[:, -1] += extra[:, chunk]
-        for row, value in zip(condensed, condense_to_node(diagonal, coupling, model.is_link, node, start), strict=True):
-            row[chunk] = value
+        condensed[:, chunk] = condense_to_node(diagonal, coupling, model.is_link, node, start)
     return CondensedStiffness(*condensed)

@@ -3,24 +3,25 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from dsm.arrays import Flags, Floats, Indices
+from dsm.arrays import Flags, Floats, Indices, check_numbers
+from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.segment import nearest_index, nearest_indices
 
 
-def check_frequencies(frequency: ArrayLike) -> Floats:
-    """Return the frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0."""
-    f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    if f.ndim != 1:
-        raise ValueError(f"frequency has shape {f.shape}; a 1-D array (Hz) is needed")
-    bad = f[~(np.isfinite(f) & (f >= 0))]
-    if bad.size:
-        raise ValueError(f"frequency={bad[0]} Hz is not a finite number >= 0")
+def check_frequencies(frequency: ArrayLike, positive: bool = False) -> Floats:
+    """Return frequencies (Hz) as an array of shape (n,), one number as (1,); ValueError unless finite and >= 0.
+
+    ValueError for 0, too, if `positive`.
+    """
+    f = check_numbers("frequency", np.atleast_1d(frequency), " Hz", " (Hz)")
+    if positive and np.any(f == 0):
+        raise ValueError("frequency=0 Hz is not > 0")
     return f
 
 
@@ -31,34 +32,22 @@ class SymmetricFactor(NamedTuple):
     """Entries of L, and of D in 1 x 1 and 2 x 2 blocks."""
     pivots: NDArray[np.int32]
     """Row exchanges; negative ones belong to 2 x 2 blocks, which have one negative eigenvalue each."""
+    link_pivots: int
+    """Number of negative eigenvalues that belong to links."""
 
     @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues (Sylvester's law of inertia)."""
+    def modes_below(self) -> int:
+        """Number of modes below w, of K(w): its negative eigenvalues (Sylvester's law) without those of links."""
         single = self.pivots > 0
         pairs = (self.pivots.size - np.count_nonzero(single)) // 2
-        return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs)
+        return int(np.count_nonzero(self.values.diagonal()[single] < 0) + pairs) - self.link_pivots
 
     def solve(self, right: Floats) -> Floats:
         """Solve matrix times y = right, shape (n, m)."""
         return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
 
 
-def symmetric_factor(matrix: Floats) -> SymmetricFactor:
-    """Factor a matrix (n, n) in Fortran order from its lower half; the matrix is overwritten."""
-    values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
-    return SymmetricFactor(values, pivots)
-
-
 Number = TypeVar("Number", np.float64, np.complex128)
-
-
-class _PositionedPart(Protocol):
-    """Part of a spindle."""
-
-    @property
-    def position(self) -> float:
-        """Distance from the tool tip (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +102,8 @@ class DynamicStiffness:
         """Return the index of the node nearest to a position (m)."""
         return nearest_index(self.position, position)
 
-    def dofs(self, parts: Sequence[_PositionedPart]) -> Indices:
+    def dofs(self, parts: Sequence[Bearing | Joint]) -> Indices:
         """Return the indices of the deflections at parts in a full matrix, shape (n,)."""
-        if not parts:
-            return np.zeros(0, dtype=int)
         return 2 * nearest_indices(self.position, [part.position for part in parts])
 
     def blocks(self, eigenvalue: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
@@ -131,12 +118,14 @@ class DynamicStiffness:
         """Return K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
         return full_matrices(*self.blocks(eigenvalue, derivative))
 
-    def scaled(self, eigenvalue: Floats) -> list[Floats]:
-        """Return K at each eigenvalue, scaled, in Fortran order; the lower half, 0 above it."""
+    def factors(self, eigenvalue: Floats) -> list[SymmetricFactor]:
+        """Return the factor of K, scaled, at each eigenvalue."""
         place, coefficients = self._lower
         matrices = np.zeros((eigenvalue.size, self.scale.size**2))
         matrices[:, place] = (coefficients @ self._powers(eigenvalue)).T
-        return [matrix.reshape(self.scale.size, -1).T for matrix in matrices]
+        lower_halves = (matrix.reshape(self.scale.size, -1).T for matrix in matrices)  # in Fortran order
+        factors = (scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)[:2] for matrix in lower_halves)
+        return [SymmetricFactor(values, pivots, self.link_pivots) for values, pivots in factors]
 
     def slope_of(self, eigenvalue: Floats, shape: Floats) -> Floats:
         """Return phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
@@ -183,17 +172,16 @@ class DynamicStiffness:
 
     def term(self, power: int) -> Floats:
         """Return the coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
-        return np.asarray(
-            full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
-        )
+        return np.asarray(full_matrices(self.diagonal[..., [power]], self.coupling[..., [power]])[0])
 
 
 def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
     """Return full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
-    uu, ut, tt = diagonal
-    size = 2 * uu.shape[0]
-    matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
-    matrices[:, _block_indices(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
+    size = 2 * diagonal.shape[1]
+    rows, columns = _lower_half(diagonal.shape[1])
+    values = np.concatenate([*diagonal, *coupling]).T
+    matrices = np.zeros((values.shape[0], size * size), dtype=diagonal.dtype)
+    matrices[:, size * rows + columns] = matrices[:, size * columns + rows] = values
     return matrices.reshape(-1, size, size)
 
 
@@ -208,16 +196,6 @@ def _lower_half(n_nodes: int) -> tuple[Indices, Indices]:
     return rows, columns
 
 
-@lru_cache(maxsize=32)
-def _block_indices(n_nodes: int) -> Indices:
-    """Return the indices of the blocks in a flattened matrix: on, above and below the diagonal."""
-    u = 2 * np.arange(n_nodes)
-    left, right = u[:-1], u[1:]
-    above = [(left, right), (left, right + 1), (left + 1, right), (left + 1, right + 1)]
-    pairs = [(u, u), (u, u + 1), (u + 1, u), (u + 1, u + 1), *above, *((column, row) for row, column in above)]
-    return np.concatenate([2 * n_nodes * row + column for row, column in pairs])
-
-
 def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
     """Count the natural frequencies below w, shape (n,), for w^2 (w if spinning): the negative pivots of K(w).
 
@@ -227,10 +205,4 @@ def count_modes_below(model: DynamicStiffness, eigenvalue: Floats) -> Indices:
     of links are subtracted. For a spinning shaft, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
     falls through 0 once, for any phi.
     """
-    counts = [count_modes_of_factor(model, symmetric_factor(matrix)) for matrix in model.scaled(eigenvalue)]
-    return np.array(counts, dtype=int)
-
-
-def count_modes_of_factor(model: DynamicStiffness, factor: SymmetricFactor) -> int:
-    """Count the modes below w from the factor of K(w): negative pivots without those of links."""
-    return factor.negative - model.link_pivots
+    return np.array([factor.modes_below for factor in model.factors(eigenvalue)], dtype=int)

@@ -44,8 +44,7 @@ class DampedMode(NamedTuple):
         return self.w.imag / abs(self.w)
 
 
-@dataclass(frozen=True, eq=False)
-class DampedShaft:
+class DampedShaft(NamedTuple):
     """Dynamic stiffness of a shaft at rest, at complex w, for any damping."""
 
     spindle: Spindle
@@ -72,10 +71,10 @@ class DampedShaft:
     def start(self, number: int) -> DampedMode:
         """Return mode `number` (1 is the lowest) without damping: K(w) phi = 0, by inverse iteration."""
         w = 2 * np.pi * float(self.undamped[number - 1])
-        stiffness, by_w = self.matrices(self.no_damping, w * (1 + INVERSE_ITERATION_OFFSET))
+        matrices = self.matrices(self.no_damping, w * (1 + INVERSE_ITERATION_OFFSET))
         shape = np.ones(self.model.held.size, dtype=np.complex128)
         for _ in range(2):
-            _, shape = self._step(w, stiffness, by_w, shape)
+            _, shape = self._step(w, *matrices, shape)
         return DampedMode(complex(w), shape)
 
     def _step(

@@ -40,18 +40,12 @@ def spring_energy(modes: Modes) -> SpringEnergy:
             squared_force = (bearing.support_stiffness * modes.deflection[:, node]) ** 2
             radial[:, index] = squared_force / bearing.stiffness
             housings[:, index] = squared_force / bearing.housing_stiffness
-    return SpringEnergy(radial, tilting, housings, *_joint_energy(modes))
-
-
-def _joint_energy(modes: Modes) -> tuple[Floats, Floats]:
-    """Return the energy of both springs of each joint, which is between two nodes at one place."""
-    shifts, kinks = np.zeros((2, modes.frequency.size, len(modes.spindle.joints)))
-    for index, joint in enumerate(modes.spindle.joints):
-        node = modes.node(joint.position)
-        shift = modes.deflection[:, node + 1] - modes.deflection[:, node]
-        kink = modes.slope[:, node + 1] - modes.slope[:, node]
+    shifts, kinks = np.zeros((2, modes.frequency.size, len(spindle.joints)))
+    for index, joint in enumerate(spindle.joints):
+        node = modes.node(joint.position)  # a joint is between two nodes at one place
+        shift, kink = (values[:, node + 1] - values[:, node] for values in (modes.deflection, modes.slope))
         shifts[:, index], kinks[:, index] = joint.stiffness * shift**2, joint.rotational_stiffness * kink**2
-    return shifts, kinks
+    return SpringEnergy(radial, tilting, housings, shifts, kinks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +117,7 @@ def _segment_energy(spindle: Spindle, modes: Modes) -> Floats:
     point, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     places = (start[:, np.newaxis] + length[:, np.newaxis] * (point + 1) / 2).ravel()
     left = np.repeat(element, GAUSS_POINTS)
-    shape = modes.deflection, modes.slope
-    state = evaluate_between_nodes(shaft, spindle.theory, modes.frequency, modes.position, shape, places, left)
+    state = evaluate_between_nodes(modes, places, left)
     segment = shaft.segment_at(start + length / 2)
     section = shaft.at(np.repeat(segment, GAUSS_POINTS), places)
     density = state.moment**2 / section.rigidity

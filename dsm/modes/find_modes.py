@@ -3,12 +3,11 @@
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from dsm.arrays import Flags, Floats, Indices
-from dsm.matrix.assemble import HeldDof, assemble, shared_spin_limit
+from dsm.matrix.assemble import HeldDof, ShaftRequest, assemble_request, shared_spin_limit
 from dsm.matrix.dynamic_stiffness import DynamicStiffness, count_modes_below
 from dsm.modes.eigensolvers import finite_element_modes, newton_step, quadratic_form, whirling_modes
 from dsm.modes.modes import Modes
@@ -33,11 +32,6 @@ MAX_MODES = 100
 EXTRA_WHIRL_MODES = 12
 """Further modes at rest that the start values of whirl are made of."""
 
-ROUNDING_MESSAGE = (
-    "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
-    "for bearings, masses or joints far too close to each other or to the end of a segment"
-)
-
 
 def find_modes(
     spindle: Spindle, count: int, places: Sequence[float] = (), held: Sequence[HeldDof] = (), spin: float | None = None
@@ -54,53 +48,49 @@ def find_modes(
     """
     if not 1 <= count <= MAX_MODES:
         raise ValueError(f"{count} modes were asked for; 1 to {MAX_MODES} can be: beams say nothing of higher ones")
-    wanted = _ModeRequest(spindle, count, tuple(places), tuple(held), spin)
+    shaft = ShaftRequest(spindle, tuple(map(float, places)), tuple(held), spin=spin)
     try:
-        return _solve_modes(wanted, links=False)
+        return _solve_modes(shaft, count)
     except _RoundingError:
-        return _solve_modes(wanted, links=True)
+        return _solve_modes(shaft._replace(links=True), count)
 
 
 class _RoundingError(ArithmeticError):
     """Raised if rounding makes modes uncertain."""
 
-    def __init__(self) -> None:
-        super().__init__(ROUNDING_MESSAGE)
+    def __str__(self) -> str:
+        return (
+            "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the "
+            "others, and for bearings, masses or joints far too close to each other or to the end of a segment"
+        )
 
 
-class _ModeRequest(NamedTuple):
-    """Arguments of find_modes."""
-
-    spindle: Spindle
-    number: int
-    places: tuple[float, ...]
-    held: tuple[HeldDof, ...]
-    spin: float | None
-
-
-def _solve_modes(wanted: _ModeRequest, links: bool) -> Modes:
+def _solve_modes(shaft: ShaftRequest, count: int) -> Modes:
     try:
-        model, eigenvalue, shape = _start_values(wanted, links)
+        model, eigenvalue, shape = _start_values(shaft, count)
         size = quadratic_form(np.abs(model.dense(eigenvalue)), np.abs(shape))
         width = MODE_INTERVAL_WIDTH * eigenvalue + MODE_ROUNDING * size
         eigenvalue, shape = _refine_modes(model, eigenvalue, shape, width)
-        _require_small_rounding(wanted, eigenvalue, width, MAX_MODE_INTERVAL if links else MAX_DIRECT_INTERVAL)
+        _require_small_rounding(shaft, eigenvalue, width)
         eigenvalue, shape = _verify_modes(model, eigenvalue, shape, width)
     except np.linalg.LinAlgError as exc:
         raise _RoundingError from exc
     node = np.flatnonzero(~model.is_link)
     deflection, slope = shape[:, 2 * node], shape[:, 2 * node + 1]
-    frequency, spin = model.to_frequency(eigenvalue), wanted.spin or 0.0
-    return Modes(frequency, model.position[node], deflection, slope, wanted.spindle, spin)
+    frequency = model.to_frequency(eigenvalue)
+    return Modes(frequency, model.position[node], deflection, slope, shaft.spindle, shaft.spin or 0.0)
 
 
-def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, Floats, Floats]:
+def _start_values(shaft: ShaftRequest, count: int) -> tuple[DynamicStiffness, Floats, Floats]:
     """Return a matrix exact up to the last mode, and the modes of its finite elements."""
-    spindle, count, places, held, spin = wanted
-    top = _first_guess(spindle, np.pi * (count + 2))
+    top = _first_guess(shaft.spindle, np.pi * (count + 2))
     for _ in range(8):
-        model = assemble(spindle, top, places, held, spin=spin, links=links)
-        eigenvalue, shape = _finite_element_start(model, wanted, top, links)
+        model = assemble_request(shaft, top)
+        if shaft.spin is None:
+            eigenvalue, shape = finite_element_modes(model, count)
+        else:
+            shared = shaft._replace(spin=shared_spin_limit(abs(shaft.spin), top))
+            eigenvalue, shape = whirling_modes(model, *_modes_at_rest(shared, count + EXTRA_WHIRL_MODES, top), count)
         highest = float(model.to_frequency(eigenvalue[-1:])[0])
         if highest <= model.top_frequency:
             return model, eigenvalue, shape
@@ -108,23 +98,10 @@ def _start_values(wanted: _ModeRequest, links: bool) -> tuple[DynamicStiffness, 
     raise _RoundingError
 
 
-def _finite_element_start(
-    model: DynamicStiffness, wanted: _ModeRequest, top: float, links: bool
-) -> tuple[Floats, Floats]:
-    spindle, count, places, held, spin = wanted
-    if spin is None:
-        return finite_element_modes(model, count)
-    fastest = shared_spin_limit(abs(spin), top)
-    w2, shape = _modes_at_rest(spindle, count + EXTRA_WHIRL_MODES, top, places, held, fastest, links)
-    return whirling_modes(model, w2, shape, count)
-
-
 @lru_cache(maxsize=4)
-def _modes_at_rest(
-    spindle: Spindle, n: int, top: float, places: tuple[float, ...], held: tuple[HeldDof, ...], spin: float, links: bool
-) -> tuple[Floats, Floats]:
-    """Return the start values for all speeds that share nodes with `spin`."""
-    model = assemble(spindle, top, places, held, spin=spin, links=links)
+def _modes_at_rest(shaft: ShaftRequest, n: int, top: float) -> tuple[Floats, Floats]:
+    """Return the start values for all speeds that share nodes with that of the shaft."""
+    model = assemble_request(shaft, top)
     return finite_element_modes(model, min(n, int(np.count_nonzero(~model.held[~model.is_link]))))
 
 
@@ -161,11 +138,12 @@ def _iterate_once(model: DynamicStiffness, eigenvalue: Floats, shape: Floats, wi
     return improved, moved / np.sqrt(-energy)[:, np.newaxis]
 
 
-def _require_small_rounding(wanted: _ModeRequest, eigenvalue: Floats, width: Floats, widest: float) -> None:
+def _require_small_rounding(shaft: ShaftRequest, eigenvalue: Floats, width: Floats) -> None:
     """Raise _RoundingError if rounding makes modes uncertain, or takes them for motions without bending."""
     moving = eigenvalue > width
     still = int(np.sum(~moving))
-    doubtful = still > 0 and still > _count_rigid_motions(wanted.spindle, wanted.held, float(np.min(width)))
+    doubtful = still > 0 and still > _count_rigid_motions(shaft.spindle, shaft.held, float(np.min(width)))
+    widest = MAX_MODE_INTERVAL if shaft.links else MAX_DIRECT_INTERVAL
     if doubtful or np.any(width[moving] > widest * eigenvalue[moving]):
         raise _RoundingError
 

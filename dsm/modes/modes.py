@@ -9,9 +9,9 @@ import numpy as np
 
 from dsm.arrays import Floats, Indices
 from dsm.elements.element_series import count_series_terms, transfer_series
-from dsm.spindle.sections import Sections, sections
+from dsm.spindle.sections import sections
 from dsm.spindle.segment import SAME_PLACE, nearest_index
-from dsm.spindle.spindle import Spindle, Theory
+from dsm.spindle.spindle import Spindle
 
 
 class StateVectors(NamedTuple):
@@ -27,27 +27,18 @@ class StateVectors(NamedTuple):
     """Bending moment M."""
 
 
-def evaluate_between_nodes(
-    shaft: Sections,
-    theory: Theory,
-    frequency: Floats,
-    position: Floats,
-    shape: tuple[Floats, Floats],
-    places: Floats,
-    left: Indices,
-) -> StateVectors:
+def evaluate_between_nodes(modes: Modes, places: Floats, left: Indices) -> StateVectors:
     """Evaluate the modes of a shaft at rest inside its elements, exactly.
 
-    frequency (Hz), shape (n_modes,); position of the nodes (m) and the shape (deflection, slope) there, (n_modes,
-    n_nodes) each; places (m), shape (n_places,), and the node left of each. The state (u, t, Q, M)' = T (u1, t1, Q1,
-    M1)
+    places (m), shape (n_places,), and the node left of each. The state (u, t, Q, M)' = T (u1, t1, Q1, M1)
     from the left node of the element must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
     """
-    start, end = position[left], position[left + 1]
+    shaft, start, end = sections(modes.spindle), modes.position[left], modes.position[left + 1]
     segment = shaft.segment_at((start + end) / 2)
-    powers = np.vander((2 * np.pi * frequency) ** 2, count_series_terms(apart=False), increasing=True)
-    transfer = (transfer_series(shaft, theory, segment, start, to) for to in (end, places))
+    powers = np.vander((2 * np.pi * modes.frequency) ** 2, count_series_terms(apart=False), increasing=True)
+    transfer = (transfer_series(shaft, modes.spindle.theory, segment, start, to) for to in (end, places))
     whole, part = (np.moveaxis(series @ powers.T, 3, 0) for series in transfer)
+    shape = modes.deflection, modes.slope
     near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
     strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]
     forces = np.linalg.solve(whole[..., :2, 2:], strain)
@@ -108,9 +99,8 @@ class Modes:
             For a spinning shaft: its modes have no modal mass of 1 kg.
         """
         if self.spin:
-            raise ValueError(
-                f"the shaft spins at {self.spin:g} rad/s; shapes and stiffness are those of a shaft at rest"
-            )
+            still = "shapes and stiffness are those of a shaft at rest"
+            raise ValueError(f"the shaft spins at {self.spin:g} rad/s; {still}")
         left = np.clip(np.searchsorted(self.position, places, side="right") - 1, 0, self.position.size - 2)
         slack = SAME_PLACE * self.spindle.length
         from_left, from_right = places - self.position[left], self.position[left + 1] - places
@@ -118,9 +108,7 @@ class Modes:
         deflection, slope = self.deflection[:, node], self.slope[:, node]
         inside = np.minimum(from_left, from_right) > slack
         if np.any(inside):
-            nodes = self.frequency, self.position, (self.deflection, self.slope)
-            shaft, theory = sections(self.spindle), self.spindle.theory
-            state = evaluate_between_nodes(shaft, theory, *nodes, places[inside], left[inside])
+            state = evaluate_between_nodes(self, places[inside], left[inside])
             deflection[:, inside], slope[:, inside] = state.deflection, state.slope
         return replace(self, position=places, deflection=deflection, slope=slope)
 

@@ -162,10 +162,8 @@ def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -
     [0.707, 1.0, 0.707]
     """
     modes = find_modes(spindle, count)
-    return modes if places is None else modes.at(_check_places(spindle, places))
-
-
-def _check_places(spindle: Spindle, places: ArrayLike) -> Floats:
+    if places is None:
+        return modes
     position = np.asarray(places, dtype=np.float64)
     if position.ndim != 1:
         raise ValueError(f"places has shape {position.shape}; a 1-D array (m) is needed")
@@ -173,4 +171,4 @@ def _check_places(spindle: Spindle, places: ArrayLike) -> Floats:
     off = position[~((position >= -slack) & (position <= spindle.length + slack))]
     if off.size:
         raise ValueError(f"places holds {off[0]} m, which is off the shaft, 0 to {spindle.length:g} m")
-    return np.clip(position, 0.0, spindle.length)
+    return modes.at(np.clip(position, 0.0, spindle.length))

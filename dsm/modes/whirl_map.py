@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats
+from dsm.arrays import Floats, check_numbers
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -134,27 +134,14 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     [[406.2, 606.2]]
     """
     require_support(spindle)
-    speed = _check_speeds(speed_rpm)
+    speed = check_numbers("speed_rpm", speed_rpm, " rpm", " of at least one speed (rpm)", least=1)
     spins = speed * np.pi / 30
     # Both senses of a speed one after the other: they share a matrix.
     frequencies = [[find_modes(spindle, count, spin=sense * spin).frequency for sense in (1.0, -1.0)] for spin in spins]
     forward, backward = np.moveaxis(np.reshape(frequencies, (-1, 2, count)), 0, 2)
-    return WhirlMap(speed, forward, backward, _critical_speeds(spindle, speed, forward))
-
-
-def _check_speeds(speed_rpm: ArrayLike) -> Floats:
-    speed = np.asarray(speed_rpm, dtype=np.float64)
-    if speed.ndim != 1 or speed.size == 0:
-        raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
-    bad = speed[~(np.isfinite(speed) & (speed >= 0))]
-    if bad.size:
-        raise ValueError(f"speed_rpm={bad[0]} rpm is not a finite number >= 0")
-    return speed
-
-
-def _critical_speeds(spindle: Spindle, speed: Floats, forward: Floats) -> Floats:
-    """Return the critical speed of each mode ahead of the slowest speed and behind the fastest."""
+    # The critical speeds are those of each mode ahead of the slowest speed and behind the fastest.
     slowest, fastest = np.argmin(speed), np.argmax(speed)
     ahead = forward[:, slowest] >= speed[slowest] / 60
     crossed = np.flatnonzero(ahead & (forward[:, fastest] <= speed[fastest] / 60))
-    return np.array([critical_speed(spindle, int(mode) + 1) for mode in crossed], dtype=np.float64)
+    critical = np.array([critical_speed(spindle, int(mode) + 1) for mode in crossed], dtype=np.float64)
+    return WhirlMap(speed, forward, backward, critical)

@@ -3,20 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, TypeVar, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from dsm.arrays import Complexes, Floats
-from dsm.spindle.segment import require_not_negative, require_positive
+from dsm.arrays import Complexes, Floats, require_number, require_numbers
 
-Stiffness = TypeVar("Stiffness", float, Complexes)
 RollingElements = Literal["balls", "rollers"]
-
-
-def bearing_motion_share(stiffness: Stiffness, softness: Stiffness) -> Stiffness:
-    """Return the share of the shaft motion that strains a bearing (N/m) and not its housing (m/N)."""
-    return 1 / (1 + stiffness * softness)
 
 
 @dataclass(frozen=True)
@@ -51,7 +44,7 @@ class Bearing:
         """Stiffness of bearing and housing in series (N/m)."""
         if math.isinf(self.stiffness):
             return self.housing_stiffness
-        return self.stiffness * bearing_motion_share(self.stiffness, 1 / self.housing_stiffness)
+        return self.stiffness * (1 / (1 + self.stiffness * (1 / self.housing_stiffness)))
 
     def check(self, where: str) -> None:
         """Raise ValueError, beginning with `where`, for an invalid bearing.
@@ -61,13 +54,12 @@ class Bearing:
         where : str
             Beginning of the message.
         """
-        require_positive(where, "stiffness", self.stiffness, "N/m", infinite=True)
-        require_not_negative(where, "damping", self.damping, "N s/m")
+        springs, others = ("stiffness", "housing_stiffness"), {"damping": "N s/m", "rotational_stiffness": "N m/rad"}
+        require_numbers(where, self, dict.fromkeys(springs, "N/m"), positive=True, infinite=True)
+        require_numbers(where, self, others)
         if self.rolling_elements not in get_args(RollingElements):
             known = ", ".join(get_args(RollingElements))
             raise ValueError(f"{where}rolling_elements={self.rolling_elements!r} is none of {known}")
-        require_not_negative(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
-        require_positive(where, "housing_stiffness", self.housing_stiffness, "N/m", infinite=True)
 
 
 @dataclass(frozen=True)
@@ -100,9 +92,7 @@ class LumpedMass:
         where : str
             Beginning of the message.
         """
-        require_not_negative(where, "mass", self.mass, "kg")
-        require_not_negative(where, "diametral_inertia", self.diametral_inertia, "kg m^2")
-        require_not_negative(where, "polar_inertia", self.polar_inertia, "kg m^2")
+        require_numbers(where, self, {"mass": "kg", "diametral_inertia": "kg m^2", "polar_inertia": "kg m^2"})
         if self.polar_inertia > 2 * self.diametral_inertia * (1 + 1e-9):
             raise ValueError(
                 f"{where}polar_inertia={self.polar_inertia} kg m^2 is larger than twice diametral_inertia="
@@ -142,8 +132,7 @@ class Joint:
         where : str
             Beginning of the message.
         """
-        require_positive(where, "stiffness", self.stiffness, "N/m")
-        require_positive(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
+        require_numbers(where, self, {"stiffness": "N/m", "rotational_stiffness": "N m/rad"}, positive=True)
 
 
 class Damping(NamedTuple):
@@ -171,7 +160,7 @@ class Supports(NamedTuple):
     @property
     def motion_share(self) -> Complexes:
         """Share of the shaft motion that strains the bearing and not its housing (-), shape (n, m)."""
-        return np.asarray(bearing_motion_share(self.spring, self.housing_compliance))
+        return np.asarray(1 / (1 + self.spring * self.housing_compliance))
 
     @property
     def stiffness(self) -> Complexes:
@@ -205,6 +194,5 @@ def supports(bearings: Sequence[Bearing], w: Complexes, damping: Damping) -> Sup
 
 def damping_of_bearings(bearings: Sequence[Bearing], loss_factor: float) -> Damping:
     """Return the dampers of bearings with a loss factor; ValueError for a negative one."""
-    if not (math.isfinite(loss_factor) and loss_factor >= 0):
-        raise ValueError(f"loss_factor={loss_factor} is not a finite number >= 0")
+    require_number("loss_factor", loss_factor)
     return Damping(np.array([bearing.damping for bearing in bearings], dtype=np.float64), loss_factor)

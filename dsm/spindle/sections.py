@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +12,7 @@ from dsm.spindle.segment import Material, Segment, ring_area, ring_second_moment
 from dsm.spindle.spindle import Spindle
 
 
-@dataclass(frozen=True, eq=False)
-class CrossSection:
+class CrossSection(NamedTuple):
     """Cross-sections of a beam at some places, all arrays of one shape."""
 
     outer: Floats

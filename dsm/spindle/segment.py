@@ -8,21 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dsm.arrays import Floats, Indices
-
-
-def require_positive(where: str, name: str, value: float, unit: str, infinite: bool = False) -> None:
-    """Raise ValueError unless the value is > 0 and finite; `infinite` lets infinity pass."""
-    if not (value > 0 and (math.isfinite(value) or (infinite and value == math.inf))):
-        rule = "a number > 0" if infinite else "a finite number > 0"
-        raise ValueError(f"{where}{name}={value} is not {rule} ({unit})")
-
-
-def require_not_negative(where: str, name: str, value: float, unit: str) -> None:
-    """Raise ValueError unless the value is finite and >= 0."""
-    if not (math.isfinite(value) and value >= 0):
-        raise ValueError(f"{where}{name}={value} is not a finite number >= 0 ({unit})")
-
+from dsm.arrays import Floats, Indices, require_numbers
 
 SAME_PLACE = 1e-9
 """Largest distance of equal places on the shaft, over its length."""
@@ -39,6 +25,7 @@ def nearest_indices(positions: Floats, places: Sequence[float]) -> Indices:
 
 
 FloatOrArray = TypeVar("FloatOrArray", float, Floats)
+MATERIAL_UNITS = {"youngs_modulus": "Pa", "density": "kg/m^3", "shear_modulus": "Pa"}
 
 
 @dataclass(frozen=True)
@@ -70,9 +57,7 @@ class Material:
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        require_positive("", "youngs_modulus", self.youngs_modulus, "Pa")
-        require_positive("", "density", self.density, "kg/m^3")
-        require_positive("", "shear_modulus", self.shear_modulus, "Pa")
+        require_numbers("", self, MATERIAL_UNITS, positive=True)
         if not -1 < self.poisson_ratio <= 0.5 * (1 + 1e-9):
             raise ValueError(
                 f"shear_modulus={self.shear_modulus:g} Pa gives Poisson's ratio {self.poisson_ratio:.3g} with "
@@ -193,22 +178,17 @@ class Segment:
         where : str
             Beginning of the message.
         """
-        require_positive(where, "length", self.length, "m")
-        require_positive(where, "outer_diameter", self.outer_diameter, "m")
+        require_numbers(where, self, {"length": "m", "outer_diameter": "m", "end_outer_diameter": "m"}, positive=True)
         _check_bore(where, "", self.bore_diameter, self.outer_diameter)
-        if self.end_outer_diameter is not None:
-            require_positive(where, "end_outer_diameter", self.end_outer_diameter, "m")
         if self.is_cone:
             outer, bore = self.diameters_at(1.0)
             _check_bore(where, "end_", bore, outer)
         if self.mass_diameter is not None:
-            self._check_mass_diameter(where, self.mass_diameter)
-
-    def _check_mass_diameter(self, where: str, mass_diameter: float) -> None:
-        if self.is_cone:
-            raise ValueError(f"{where}mass_diameter={mass_diameter} m is for uniform segments; this one is a cone")
-        require_positive(where, "mass_diameter", mass_diameter, "m")
-        _check_bore(where, "", self.bore_diameter, mass_diameter, "mass_diameter")
+            if self.is_cone:
+                text = "is for uniform segments; this one is a cone"
+                raise ValueError(f"{where}mass_diameter={self.mass_diameter} m {text}")
+            require_numbers(where, self, {"mass_diameter": "m"}, positive=True)
+            _check_bore(where, "", self.bore_diameter, self.mass_diameter, "mass_diameter")
 
 
 def ring_area(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray) -> FloatOrArray:
@@ -223,7 +203,5 @@ def ring_second_moment(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray
 
 def _check_bore(where: str, end: str, bore: float, outer: float, outer_name: str = "") -> None:
     if not 0 <= bore < outer:
-        raise ValueError(
-            f"{where}{end}bore_diameter={bore} m is not at least 0 and "
-            f"smaller than {outer_name or end + 'outer_diameter'}={outer} m"
-        )
+        name = outer_name or f"{end}outer_diameter"
+        raise ValueError(f"{where}{end}bore_diameter={bore} m is not at least 0 and smaller than {name}={outer} m")

@@ -8,8 +8,9 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from dsm.arrays import require_numbers
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.segment import SAME_PLACE, STEEL, Material, Segment, nearest_index, require_positive, ring_area
+from dsm.spindle.segment import MATERIAL_UNITS, SAME_PLACE, STEEL, Material, Segment, nearest_index, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
@@ -66,15 +67,11 @@ class Spindle:
             raise ValueError(f"theory={self.theory!r} is none of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
             raise ValueError(f"{len(self.segments)} segments were given; a spindle has 1 to {MAX_SEGMENTS} of them")
-        require_positive("", "youngs_modulus", self.youngs_modulus, "Pa")
-        require_positive("", "density", self.density, "kg/m^3")
-        if self.shear_modulus is not None:
-            require_positive("", "shear_modulus", self.shear_modulus, "Pa")
+        require_numbers("", self, MATERIAL_UNITS, positive=True)
         for number, segment in enumerate(self.segments, 1):
             segment.check(f"segment {number}: ")
-        self._check_parts("bearing", self.bearings)
-        self._check_parts("mass", self.masses)
-        self._check_parts("joint", self.joints)
+        for kind, parts in (("bearing", self.bearings), ("mass", self.masses), ("joint", self.joints)):
+            self._check_parts(kind, parts)
         self._check_joints()
 
     def __hash__(self) -> int:
@@ -118,9 +115,8 @@ class Spindle:
             part.check(where)
             for earlier, other in enumerate(parts[: number - 1], 1):
                 if abs(other.position - part.position) <= slack:
-                    raise ValueError(
-                        f"{where}position={part.position} m is that of {kind} {earlier}; put both into one {kind}"
-                    )
+                    same = f"that of {kind} {earlier}; put both into one {kind}"
+                    raise ValueError(f"{where}position={part.position} m is {same}")
 
     def _check_joints(self) -> None:
         """Check that a joint is inside the shaft and alone at its place, as the side of a part would be unknown."""
@@ -153,8 +149,7 @@ def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | Non
     """Return the spindle beyond `position` from the tool tip (m), with positions from the cut, and the joint there.
 
     A segment at the cut is divided. Bearings, masses and joints nearer to the tool tip are removed; a bearing or a mass
-    at
-    the cut stays. Raises ValueError for a cut off the shaft or at its far end.
+    at the cut stays. Raises ValueError for a cut off the shaft or at its far end.
     """
     slack = SAME_PLACE * spindle.length
     if not 0 <= position < spindle.length - slack:

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dsm.arrays import Floats, Indices
+from dsm.arrays import Floats, Indices, require_number
 from dsm.elements.element_series import MAX_ELEMENT_X, SERIES_TERMS, element_series
 
 SpinningDof = Literal["u", "v", "u'", "v'"]
@@ -78,7 +78,7 @@ class SpinningBeam:
             raise ValueError("a beam without segments was given; at least one is needed")
         for number, segment in enumerate(self.segments, 1):
             for name in ("length", "rigidity_xx", "rigidity_yy", "mass_per_length"):
-                check_positive(f"segment {number}: {name}", getattr(segment, name))
+                require_number(f"segment {number}: {name}", getattr(segment, name), positive=True)
         for number, spring in enumerate(self.springs, 1):
             self._check_spring(f"spring {number}: ", spring)
         for position, dof in self.held:
@@ -103,12 +103,8 @@ class SpinningBeam:
     @property
     def is_supported(self) -> bool:
         """True if nothing moves without bending or straining a spring, in either plane."""
-        for axis in ("u", "v"):
-            supports = self._supports(axis)
-            pins = {position for position, is_slope in supports if not is_slope}
-            if len(pins) < 2 and not (pins and len(supports) > len(pins)):
-                return False
-        return True
+        planes = [self._supports(axis) for axis in ("u", "v")]
+        return all(len(held) > 1 and any(not is_slope for _, is_slope in held) for held in planes)
 
     def stiffness(self, spring: SpinningSpring) -> Iterator[tuple[SpinningDof, float]]:
         """Yield the stiffness that a spring adds to u and to v (N/m).
@@ -130,19 +126,12 @@ class SpinningBeam:
     def _check_spring(self, where: str, spring: SpinningSpring) -> None:
         self._check_place(where, spring.position)
         for dof, value in self.stiffness(spring):
-            if not (math.isfinite(value) and value >= 0):
-                axis = {"u": "x", "v": "y"}[dof]
-                raise ValueError(f"{where}stiffness_{axis}={value} is not a finite number >= 0; hold the dof instead")
+            axis = "x" if dof == "u" else "y"
+            require_number(f"{where}stiffness_{axis}", value, note="; hold the dof instead")
 
     def _check_place(self, where: str, position: float) -> None:
         if not 0 <= position <= self.length * (1 + 1e-9):
             raise ValueError(f"{where}position={position} m is off the beam, 0 to {self.length:g} m")
-
-
-def check_positive(name: str, value: float) -> None:
-    """Raise ValueError unless the value is a finite number > 0."""
-    if not (math.isfinite(value) and value > 0):
-        raise ValueError(f"{name}={value} is not a finite number > 0")
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,11 +184,8 @@ class SpinningChain:
     def hermite(self) -> tuple[Floats, Floats, Floats]:
         """Return static stiffness S, consistent mass M and coupling C: K is nearly S - (w^2 + W^2) M - 2 w W C."""
         mass = self.mass_per_length[:, np.newaxis, np.newaxis]
-        inner = (
-            (self._planar[0], self._rigidity_matrix),
-            (-self._planar[1], mass * np.eye(2)),
-            (-self._planar[1], mass * np.eye(2)[::-1]),
-        )
+        by_mass = ((-self._planar[1], mass * np.eye(2)[::step]) for step in (1, -1))
+        inner = (self._planar[0], self._rigidity_matrix), *by_mass
         stiffness, inertia, coupling = (self._joined(np.einsum("ekl,eab->ekalb", *p)[np.newaxis])[0] for p in inner)
         return stiffness + self._springs, inertia, coupling
 
@@ -287,7 +273,7 @@ def spinning_element(
     """
     numbers = {"rigidity_xx": rigidity_xx, "rigidity_yy": rigidity_yy, "mass_per_length": mass_per_length}
     for name, value in {**numbers, "length": length}.items():
-        check_positive(name, value)
+        require_number(name, value, positive=True)
     spin = angular_speed(speed_rpm)
     w = 2 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
     if w.ndim != 1 or not np.all(np.isfinite(w) & (w >= 0)):
@@ -305,8 +291,7 @@ def spinning_element(
 
 def angular_speed(speed_rpm: float) -> float:
     """Return the speed of spin (rad/s). Raises ValueError for a negative speed."""
-    if not (math.isfinite(speed_rpm) and speed_rpm >= 0):
-        raise ValueError(f"speed_rpm={speed_rpm} is not a finite number >= 0")
+    require_number("speed_rpm", speed_rpm)
     return speed_rpm * math.pi / 30
 
 

@@ -1,5 +1,7 @@
 """Natural frequencies of a spinning beam, proved complete by counting."""
 
+from typing import get_args
+
 import numpy as np
 from scipy.linalg import eig, eigh
 
@@ -19,24 +21,21 @@ MAX_SPINNING_INTERVAL = 1e-3
 """Half-width, relative to w + W, beyond which a mode is not proved."""
 SAME_BEAM_PLACE = 1e-6
 """Largest distance of equal places, over the length."""
-DOF_OFFSETS: dict[SpinningDof, int] = {"u": 0, "v": 1, "u'": 2, "v'": 3}
 
 
 def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats, int, int]:
     """Return the `count` lowest steady w (rad/s) in the rotating frame, and the numbers of growing modes.
 
-    The growing modes are counted twice: proved, and all. If the two numbers are equal, no mode is
-    missed. Let n(w) be the number of negative eigenvalues of K(w). A mode phi steps it by +1 if its energy,
-    -phi^T (dK/dw) phi, is positive, and by -1 if it is negative, which needs w < W (`spin`, rad/s). n(0) = n_u + n_v,
-    the
-    numbers of planar natural frequencies of the two planes below W. Of these n(0) negative squares of the energy each
-    mode
-    of negative energy takes two and each growing mode one, and at least |n_u - n_v| modes grow (with u = U exp(st),
-    v = V exp(st) the count goes from that of the one plane to that of the other as s rises from 0). So min(n_u, n_v)
-    modes of negative energy, each proved by its step, are all there are, and nothing is missed between the steps.
-    Below all critical speeds n(w) simply is the number of modes below w (Wittrick and Williams). With fewer modes of
-    negative energy the others have met modes of positive energy, and the pairs grow (flutter). That they were not
-    merely overlooked follows from the Hermite start values, not from a proof.
+    The growing modes are counted twice: proved, and all. If the two numbers are equal, no mode is missed. Let n(w) be
+    the number of negative eigenvalues of K(w). A mode phi steps it by +1 if its energy, -phi^T (dK/dw) phi, is
+    positive, and by -1 if it is negative, which needs w < W (`spin`, rad/s). n(0) = n_u + n_v, the numbers of planar
+    natural frequencies of the two planes below W. Of these n(0) negative squares of the energy each mode of negative
+    energy takes two and each growing mode one, and at least |n_u - n_v| modes grow (with u = U exp(st), v = V exp(st)
+    the count goes from that of the one plane to that of the other as s rises from 0). So min(n_u, n_v) modes of
+    negative energy, each proved by its step, are all there are, and nothing is missed between the steps. Below all
+    critical speeds n(w) simply is the number of modes below w (Wittrick and Williams). With fewer modes of negative
+    energy the others have met modes of positive energy, and the pairs grow (flutter). That they were not merely
+    overlooked follows from the Hermite start values, not from a proof.
 
     Raises ArithmeticError at a critical speed and if the steps do not prove the modes.
     """
@@ -96,7 +95,7 @@ def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> Spinning
 
 
 def _dof_index(position: Floats, place: float, dof: SpinningDof) -> int:
-    return 4 * nearest_index(position, place) + DOF_OFFSETS[dof]
+    return 4 * nearest_index(position, place) + get_args(SpinningDof).index(dof)
 
 
 def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[Floats, Floats]:

@@ -1,7 +1,6 @@
 """The paper's spinning element A B^-1, equations (13) to (25), compared with the pole-free one."""
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -22,13 +21,12 @@ def printed_element(
     one_sign: end forces have one sign at both ends, as (23) is printed; the opposite one at z = 0 is right. Not finite
     if B cannot be inverted: at speed 0, at frequency 0, and if the two are equal.
     """
-    w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
     length, exx, eyy = segment.length, segment.rigidity_xx, segment.rigidity_yy
-    same, other = segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin * coupling
+    same, other = _inertia_forces(segment, frequency, speed_rpm)
     q = fourth_powers(segment, frequency, speed_rpm)
     with np.errstate(all="ignore"):
         root = np.repeat(q + 0j, 4) ** 0.25 * np.tile(1j ** np.arange(4), 2)
-        shape = np.array([np.ones(8), -(eyy * np.repeat(q, 4) - same) / other])
+        shape = np.array([np.ones(8), -(eyy * np.repeat(q, 4) - same) / (other * coupling)])
         displaced, forced = [], []
         for end, outward in ((0.0, 1.0 if one_sign else -1.0), (length, 1.0)):
             wave = shape * np.exp(root * end)
@@ -41,11 +39,16 @@ def printed_element(
             return np.full((8, 8), np.nan)
 
 
+def _inertia_forces(segment: SpinningSegment, frequency: float, speed_rpm: float) -> tuple[float, float]:
+    """Return m (w^2 + Omega^2) and 2 m w Omega, of one length and deflection (N/m^2)."""
+    w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
+    return segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin
+
+
 def fourth_powers(segment: SpinningSegment, frequency: float, speed_rpm: float) -> Floats:
     """Return the two fourth powers of the roots of (13) by (14) to (16) (m^-4), shape (2,)."""
-    w, spin = 2 * np.pi * frequency, speed_rpm * np.pi / 30
-    exx, eyy, mass = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length
-    same, other = mass * (w**2 + spin**2), 2 * mass * w * spin
+    exx, eyy = segment.rigidity_xx, segment.rigidity_yy
+    same, other = _inertia_forces(segment, frequency, speed_rpm)
     mean = same * (exx + eyy) / 2
     half = np.sqrt(max(mean**2 - exx * eyy * (same**2 - other**2), 0.0))  # not negative but for rounding
     return np.array([mean + half, mean - half]) / (exx * eyy)
@@ -63,7 +66,9 @@ ROOT_SCAN_FREQUENCIES = np.linspace(0.05, 40.0, 1600)
 
 def element_section(spindle: Spindle) -> NumberGroup:
     """Return the numbers of the element: of the segments of a round shaft, and of a cantilever that is not round."""
-    segments, frequency = list(_spinning_segments(spindle)), printed.FREQUENCY
+    frequency, modulus, density = printed.FREQUENCY, spindle.youngs_modulus, spindle.density
+    sizes = ((segment.length, modulus * segment.second_moment, density * segment.area) for segment in spindle.segments)
+    segments = [SpinningSegment(length, rigidity, rigidity, mass) for length, rigidity, mass in sizes]
     root_error = max(_root_error(segment) for segment in segments)
     speeds = ELEMENT_SPEED_RPM, 60 * frequency * (1 + 1e-6)
     error, critical_error = (max(_element_error(segment, frequency, speed) for segment in segments) for speed in speeds)
@@ -91,12 +96,6 @@ def element_section(spindle: Spindle) -> NumberGroup:
     return NumberGroup("The spinning element: eqs. (5) and (13) to (25)", (), numbers)
 
 
-def _spinning_segments(spindle: Spindle) -> Iterator[SpinningSegment]:
-    for segment in spindle.segments:
-        rigidity = spindle.youngs_modulus * segment.second_moment
-        yield SpinningSegment(segment.length, rigidity, rigidity, spindle.density * segment.area)
-
-
 def _element_error(segment: SpinningSegment, frequency: float, speed_rpm: float) -> float:
     """Return the largest error over the largest entry, moments and slopes scaled by the length."""
     sections = segment.rigidity_xx, segment.rigidity_yy, segment.mass_per_length, segment.length
@@ -107,8 +106,7 @@ def _element_error(segment: SpinningSegment, frequency: float, speed_rpm: float)
 
 
 def _root_error(segment: SpinningSegment) -> float:
-    w, spin = 2 * np.pi * printed.FREQUENCY, ELEMENT_SPEED_RPM * np.pi / 30
-    same, other = segment.mass_per_length * (w**2 + spin**2), 2 * segment.mass_per_length * w * spin
+    same, other = _inertia_forces(segment, printed.FREQUENCY, ELEMENT_SPEED_RPM)
     xx, yy = segment.rigidity_xx, segment.rigidity_yy
     pencil = np.array([[same / yy, other / yy], [other / xx, same / xx]])
     exact = np.sort(np.linalg.eigvals(pencil).real)[::-1]

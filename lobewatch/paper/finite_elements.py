@@ -1,8 +1,7 @@
 """Finite-element validation of the paper, repeated with textbook elements."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -71,18 +70,15 @@ def _matrices(length: Floats, section: Floats, kind: ElementKind) -> tuple[Float
     """Return stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
     rigidity, shear, mass, rotary = section
     point, weight = np.polynomial.legendre.leggauss(4)
-    if kind == "linear":
-        strain_point, strain_weight = np.array([0.5]), np.array([1.0])
-    else:
-        strain_point, strain_weight = (1 + point) / 2, weight / 2
+    everywhere = list(zip((1 + point) / 2, weight / 2, strict=True))
     softness = 12 * rigidity / (shear * length**2) if kind == "timoshenko" else np.zeros(length.size)
     stiff, heavy = np.zeros((length.size, 4, 4)), np.zeros((length.size, 4, 4))
-    for x, share in zip(strain_point, strain_weight, strict=True):
+    for x, share in [(0.5, 1.0)] if kind == "linear" else everywhere:
         bend, slide = _strains(x, length, softness, kind)
         stiff += _weighted_square(bend, share * length * rigidity)
         if kind != "euler-bernoulli":
             stiff += _weighted_square(slide, share * length * shear)
-    for x, share in zip((1 + point) / 2, weight / 2, strict=True):
+    for x, share in everywhere:
         deflection, rotation = _shapes(x, length, softness, kind)
         heavy += _weighted_square(deflection, share * length * mass)
         if kind != "euler-bernoulli":
@@ -96,14 +92,9 @@ def _shapes(x: float, length: Floats, softness: Floats, kind: ElementKind) -> tu
     if kind == "linear":
         return np.array([(1 - x) * one, none, x * one, none]), np.array([none, (1 - x) * one, none, x * one])
     bump = x - x**2
-    deflection = np.array(
-        [
-            1 - 3 * x**2 + 2 * x**3 + softness * (1 - x),
-            length * (x - 2 * x**2 + x**3 + softness * bump / 2),
-            3 * x**2 - 2 * x**3 + softness * x,
-            length * (x**3 - x**2 - softness * bump / 2),
-        ]
-    )
+    near = 1 - 3 * x**2 + 2 * x**3 + softness * (1 - x), length * (x - 2 * x**2 + x**3 + softness * bump / 2)
+    far = 3 * x**2 - 2 * x**3 + softness * x, length * (x**3 - x**2 - softness * bump / 2)
+    deflection = np.array([*near, *far])
     ends = 1 - 4 * x + 3 * x**2 + softness * (1 - x), 3 * x**2 - 2 * x + softness * x
     rotation = np.array([-6 * bump / length, ends[0], 6 * bump / length, ends[1]])
     return deflection / (1 + softness), rotation / (1 + softness)
@@ -138,8 +129,7 @@ ELEMENT_COUNTS = (26, 39, 52, 77, 110, printed.FEM_ELEMENTS, 220, 308)
 """Numbers of elements: one per segment, the paper's, twice the paper's, and between."""
 
 
-@dataclass(frozen=True, eq=False)
-class FiniteElementStudy:
+class FiniteElementStudy(NamedTuple):
     """First natural frequency with rigid bearings by finite elements."""
 
     exact: Mapping[ElementKind, float]

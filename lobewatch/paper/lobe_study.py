@@ -1,7 +1,7 @@
 """Stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ POCKET_DEPTH_RATIO = 20.0
 """Largest pocket depth over the lowest limit."""
 
 
-@dataclass(frozen=True, eq=False)
-class LobeStudy:
+class LobeStudy(NamedTuple):
     """Lobes of one mode, new and old, and of more modes."""
 
     new: StabilityLobes
@@ -34,7 +33,7 @@ class LobeStudy:
     """Lobes of six modes of the surrogate."""
     by_zero_order: tuple[StabilityLobes, StabilityLobes]
     """Lobes of one and of all modes, equal in x and y, by the zero-order approximation."""
-    masses: tuple[float, float, float]
+    masses: tuple[float, ...]
     """Modal mass of mode 1 (kg): measured, old by the rule, old by the model."""
 
     def share(self, lobes: StabilityLobes) -> float:
@@ -64,23 +63,30 @@ def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -
     """Compare lobes of the paper's mode, of the model's K old over new, and of the modes of the surrogate."""
     ratio = printed.OLD_FREQUENCY / printed.FREQUENCY
     aged = age_mode(measured, 0.9, "paper"), age_mode(measured, ratio, "model", stiffness_ratio)
-    first = modes[:1]
+    tips = [measured], [aged[0]], [aged[1]], modes[:1], modes
     new, by_rule, by_model, one_mode, six_modes = (
-        average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM)
-        for tip in ([measured], [aged[0]], [aged[1]], first, modes)
+        average_angle_lobes(tip, None, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in tips
     )
-    narrow, full = (zero_order_lobes(tip, tip, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in (first, modes))
-    masses = (_modal_mass(measured), _modal_mass(aged[0]), _modal_mass(aged[1]))
+    narrow, full = (zero_order_lobes(tip, tip, STUDY_CUT, LOBE_SPEEDS_RPM) for tip in tips[-2:])
+    masses = tuple(float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2) for mode in (measured, *aged))
     return LobeStudy(new, by_rule, by_model, one_mode, six_modes, (narrow, full), masses)
-
-
-def _modal_mass(mode: Mode) -> float:
-    return float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2)
 
 
 def lobe_section(study: LobeStudy) -> NumberGroup:
     """Return the numbers of the lobes."""
-    numbers = (*_limit_numbers(study), *_pocket_numbers(study), *_further_numbers(study))
+    before, after = study.pocket
+    deepest = f"the deepest below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two teeth"
+    moved = f"x {after / before:.3f}: goes with f_1, whatever K does"
+    text = "limit at the speed of that pocket over what it was: a cut that sat in it"
+    rule, model = study.pocket_limit_ratio(study.by_rule), study.pocket_limit_ratio(study.by_model)
+    numbers = (
+        *_limit_numbers(study),
+        Comparison("a pocket, new", "Fig. 10", None, before, "rpm", 5, deepest),
+        Comparison("the same pocket, old", "Fig. 10", None, after, "rpm", 5, moved),
+        Comparison("left at the speed of the first", "Fig. 10", None, rule, "-", 3, text),
+        Comparison("the same, the model's K", "", None, model, "-", 3, text),
+        *_further_numbers(study),
+    )
     return NumberGroup("Stability lobes, new and old: Fig. 10", ("fig-10",), numbers)
 
 
@@ -103,20 +109,6 @@ def _limit_numbers(study: LobeStudy) -> list[Comparison]:
             Comparison(f"modal mass, {name}", "", None, mass, "kg", 4, reason)
             for (name, reason), mass in zip(named, study.masses, strict=True)
         ),
-    ]
-
-
-def _pocket_numbers(study: LobeStudy) -> list[Comparison]:
-    before, after = study.pocket
-    deepest = f"the deepest below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two teeth"
-    moved = f"x {after / before:.3f}: goes with f_1, whatever K does"
-    text = "limit at the speed of that pocket over what it was: a cut that sat in it"
-    rule, model = study.pocket_limit_ratio(study.by_rule), study.pocket_limit_ratio(study.by_model)
-    return [
-        Comparison("a pocket, new", "Fig. 10", None, before, "rpm", 5, deepest),
-        Comparison("the same pocket, old", "Fig. 10", None, after, "rpm", 5, moved),
-        Comparison("left at the speed of the first", "Fig. 10", None, rule, "-", 3, text),
-        Comparison("the same, the model's K", "", None, model, "-", 3, text),
     ]
 
 

@@ -1,8 +1,9 @@
 """Shaft of Figs. 3 and 7 to 9: frequencies, calibrated bearings, critical speeds, tip stiffness."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import resources
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,7 @@ OPERATING_SPEED_RPM = 24000.0
 """Highest speed of the machine in the example (rpm)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShaftStudy:
+class ShaftStudy(NamedTuple):
     """Frequencies and bearings of the surrogate, by one beam theory."""
 
     rigid: Spindle
@@ -89,7 +89,9 @@ def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     same = "as many; dimensions are not public: those of the surrogate are fitted to the frequencies"
     excess = (plain.rigid_frequency / printed.FREQUENCY - 1) * 100
     rounded = f"the paper rounds {(printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100:.1f} %; the rest is the fit"
-    new, old = plain.printed_frequencies
+    theory = "a stiffness calibrated to a frequency is an equivalent number of the beam theory"
+    left = "a quotient of the two above"
+    (new, old), stiff, soft = plain.printed_frequencies, printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
     return [
         Comparison("segments", "Fig. 3", printed.SEGMENTS, len(plain.rigid.segments), "", 2, same),
         Comparison("bearings", "Fig. 3", printed.BEARINGS, len(plain.rigid.bearings), "", 2, same),
@@ -97,20 +99,11 @@ def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         Comparison("it is above f_1 measured by", "", printed.RIGID_EXCESS, excess, "%", 3, rounded),
         Comparison("f_1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
         Comparison("f_1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
-        *_bearing_numbers(plain, shear, fitted),
-    ]
-
-
-def _bearing_numbers(plain: ShaftStudy, shear: ShaftStudy, fitted: str) -> list[Comparison]:
-    theory = "a stiffness calibrated to a frequency is an equivalent number of the beam theory"
-    new, old = printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
-    left = "a quotient of the two above"
-    return [
-        Comparison("each bearing, for 1722 Hz", "Fig. 8", new, plain.new.bearing_stiffness, "N/m", 5, fitted),
+        Comparison("each bearing, for 1722 Hz", "Fig. 8", stiff, plain.new.bearing_stiffness, "N/m", 5, fitted),
         Comparison("the same with shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
-        Comparison("each bearing, for 1550 Hz", "Fig. 8", old, plain.old.bearing_stiffness, "N/m", 5, fitted),
+        Comparison("each bearing, for 1550 Hz", "Fig. 8", soft, plain.old.bearing_stiffness, "N/m", 5, fitted),
         Comparison("the same with shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
-        Comparison("stiffness that is left", "Fig. 8", round(old / new, 3), plain.old.factor, "-", 3, left),
+        Comparison("stiffness that is left", "Fig. 8", round(soft / stiff, 3), plain.old.factor, "-", 3, left),
         Comparison("the same with shear", "", None, shear.old.factor, "-", 3, theory),
     ]
 
@@ -141,8 +134,7 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class StiffnessStudy:
+class StiffnessStudy(NamedTuple):
     """Stiffness at the tool tip of the surrogate, new and old."""
 
     static: tuple[float, float]

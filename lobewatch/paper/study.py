@@ -2,29 +2,12 @@
 
 from dataclasses import dataclass
 
-from lobewatch.paper import printed
+from lobewatch.paper import printed, shaft_study
 from lobewatch.paper.comparison import Claim, NumberGroup, format_share
 from lobewatch.paper.element_study import element_section
 from lobewatch.paper.finite_elements import FiniteElementStudy, mesh_section, study_meshes
 from lobewatch.paper.lobe_study import LobeStudy, lobe_section, study_lobes
-from lobewatch.paper.shaft_study import (
-    OPERATING_SPEED_RPM,
-    ShaftStudy,
-    StiffnessStudy,
-    shaft_sections,
-    stiffness_section,
-    study_shaft,
-    study_stiffness,
-)
 from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
-
-
-def evaluate_claims(
-    plain: ShaftStudy, shear: ShaftStudy, meshes: FiniteElementStudy, stiffness: StiffnessStudy, lobes: LobeStudy
-) -> tuple[Claim, ...]:
-    """Evaluate the claims in the order of the paper; plain is Euler-Bernoulli, shear Timoshenko theory."""
-    of_shaft = _validation_claim(meshes), *_bearing_claims(plain, shear), _spin_claim(shear)
-    return (*of_shaft, *_decay_claims(stiffness, lobes), _mode_claim(lobes))
 
 
 def _validation_claim(meshes: FiniteElementStudy) -> Claim:
@@ -39,7 +22,7 @@ def _validation_claim(meshes: FiniteElementStudy) -> Claim:
     )
 
 
-def _bearing_claims(plain: ShaftStudy, shear: ShaftStudy) -> tuple[Claim, Claim]:
+def _bearing_claims(plain: shaft_study.ShaftStudy, shear: shaft_study.ShaftStudy) -> tuple[Claim, Claim]:
     high, sheared = plain.rigid_frequency / printed.FREQUENCY - 1, shear.rigid_frequency / printed.FREQUENCY - 1
     stiffness, stiffer = plain.new.bearing_stiffness / 1e6, shear.new.bearing_stiffness / 1e6
     return (
@@ -58,18 +41,18 @@ def _bearing_claims(plain: ShaftStudy, shear: ShaftStudy) -> tuple[Claim, Claim]
     )
 
 
-def _spin_claim(shear: ShaftStudy) -> Claim:
+def _spin_claim(shear: shaft_study.ShaftStudy) -> Claim:
     backward, forward = shear.at_speed
     return Claim(
         "f_1 falls with the speed of the spindle and vanishes at the critical speed.",
         "holds in part",
         "Seen from the shaft. From the housing, where hammer, sensor and workpiece are, f_1 of the paper's theory does "
         f"not change at all; with rotary inertia it parts into {backward:.0f} and {forward:.0f} Hz at "
-        f"{OPERATING_SPEED_RPM:.0f} rpm. Without it the critical speed is 60 f_1, and no search is needed.",
+        f"{shaft_study.OPERATING_SPEED_RPM:.0f} rpm. Without it the critical speed is 60 f_1, and no search is needed.",
     )
 
 
-def _decay_claims(stiffness: StiffnessStudy, lobes: LobeStudy) -> tuple[Claim, Claim]:
+def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tuple[Claim, Claim]:
     static, modal = (1 - old / new for new, old in (stiffness.static, stiffness.modal))
     before, after = lobes.pocket
     return (
@@ -105,9 +88,9 @@ def _mode_claim(lobes: LobeStudy) -> Claim:
 class PaperStudy:
     """Results of the comparison with the paper."""
 
-    plain: ShaftStudy
+    plain: shaft_study.ShaftStudy
     """Shaft by Euler-Bernoulli theory, as in the paper."""
-    shear: ShaftStudy
+    shear: shaft_study.ShaftStudy
     """Shaft by Timoshenko theory."""
     meshes: FiniteElementStudy
     """Finite elements."""
@@ -115,7 +98,7 @@ class PaperStudy:
     """Numbers of the spinning element as printed."""
     tap: TapStudy
     """Tap test."""
-    stiffness: StiffnessStudy
+    stiffness: shaft_study.StiffnessStudy
     """Tip stiffness, new and old."""
     lobes: LobeStudy
     """Stability lobes, new and old."""
@@ -123,14 +106,15 @@ class PaperStudy:
     @property
     def sections(self) -> tuple[NumberGroup, ...]:
         """Every number of the paper with ours, in the order of the paper."""
-        at_rest, spinning = shaft_sections(self.plain, self.shear)
-        of_shaft = self.element, at_rest, mesh_section(self.meshes), spinning
-        return (*of_shaft, tap_section(self.tap), stiffness_section(self.stiffness), lobe_section(self.lobes))
+        at_rest, spinning = shaft_study.shaft_sections(self.plain, self.shear)
+        of_tip = tap_section(self.tap), shaft_study.stiffness_section(self.stiffness), lobe_section(self.lobes)
+        return (self.element, at_rest, mesh_section(self.meshes), spinning, *of_tip)
 
     @property
     def claims(self) -> tuple[Claim, ...]:
         """Claims of the paper, and whether they hold."""
-        return evaluate_claims(self.plain, self.shear, self.meshes, self.stiffness, self.lobes)
+        shaft = _validation_claim(self.meshes), *_bearing_claims(self.plain, self.shear), _spin_claim(self.shear)
+        return (*shaft, *_decay_claims(self.stiffness, self.lobes), _mode_claim(self.lobes))
 
 
 def study_paper() -> PaperStudy:
@@ -141,15 +125,9 @@ def study_paper() -> PaperStudy:
     PaperStudy
         All studies, with their numbers and claims.
     """
-    plain, shear = study_shaft("euler-bernoulli"), study_shaft("timoshenko")
+    plain, shear = shaft_study.study_shaft("euler-bernoulli"), shaft_study.study_shaft("timoshenko")
     tap = study_tap(plain.new.spindle)
-    stiffness = study_stiffness(plain.old)
-    return PaperStudy(
-        plain,
-        shear,
-        study_meshes(plain.rigid, shear.rigid, (plain.rigid_frequency, shear.rigid_frequency)),
-        element_section(plain.rigid),
-        tap,
-        stiffness,
-        study_lobes(tap.measured, stiffness.modal[1] / stiffness.modal[0], tap.surrogate_modes),
-    )
+    stiffness = shaft_study.study_stiffness(plain.old)
+    meshes = study_meshes(plain.rigid, shear.rigid, (plain.rigid_frequency, shear.rigid_frequency))
+    lobes = study_lobes(tap.measured, stiffness.modal[1] / stiffness.modal[0], tap.surrogate_modes)
+    return PaperStudy(plain, shear, meshes, element_section(plain.rigid), tap, stiffness, lobes)

@@ -1,23 +1,13 @@
 """Tap test of Figs. 5 and 6: the mode of the paper, peak picking by (28) and (29), emulated hits."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import (
-    Channel,
-    Frf,
-    HammeredStructure,
-    Hammering,
-    SimulatedSource,
-    Structure,
-    Trigger,
-    capture_hits,
-    check_hit,
-    estimate_frf,
-)
+import acquisition
+from acquisition import Channel, Frf, HammeredStructure, Hammering, SimulatedSource, Structure, Trigger
 from dsm import Spindle, mode_shapes
 from lobewatch.paper import printed
 from lobewatch.paper.comparison import Comparison, NumberGroup, format_share
@@ -35,15 +25,14 @@ EMULATED_TAP_SECONDS = 10.0
 
 def emulate_taps(modes: Sequence[Mode], tests: int, hits: int = 10) -> Iterator[Frf]:
     """Yield the FRF of each of several tap tests, each with its own random numbers."""
-    values = np.array([(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes])
-    structure = Structure(values[:, 0], values[:, 1], values[:, 2])
+    structure = Structure(*np.array([(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes]).T)
     for seed in range(tests):
         signal = HammeredStructure(structure, EMULATED_TAP_RATE, np.random.default_rng(seed), Hammering())
         n_samples = int(EMULATED_TAP_SECONDS * EMULATED_TAP_RATE)
         source = SimulatedSource(signal, EMULATED_TAP_CHANNELS, EMULATED_TAP_RATE, n_samples)
         source.start()
-        good = (hit for hit in capture_hits(source, EMULATED_TAP_TRIGGER) if not check_hit(hit))
-        yield estimate_frf(list(islice(good, hits)))
+        good = (hit for hit in acquisition.capture_hits(source, EMULATED_TAP_TRIGGER) if not acquisition.check_hit(hit))
+        yield acquisition.estimate_frf(list(islice(good, hits)))
 
 
 TAP_FREQUENCY_LINES = np.arange(1000.0, 2501.0)
@@ -56,8 +45,7 @@ SURROGATE_MODES = 6
 """Number of modes of the surrogate."""
 
 
-@dataclass(frozen=True, eq=False)
-class TapStudy:
+class TapStudy(NamedTuple):
     """FRFs and the modes identified from them."""
 
     measured: Mode

@@ -35,9 +35,9 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
     contents = read_contents(file_format, path, description)
     if not isinstance(contents, Contents):
         raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
-    report = ImportReport()
-    signals = resolve_cut_signals(contents, description, report)
-    if signals is None or not report.is_clean:
+    report = ImportReport(description)
+    signals = report.attempt(_resolve_cut_signals, contents)
+    if signals is None:
         raise DataError(f"{path}: {report.format_problems()}")
     values, rate, speed = signals
     if not np.all(np.isfinite(values)):
@@ -45,51 +45,41 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
     return CutSignal(values, rate, sensor=description.sensor, speed_rpm=speed)
 
 
-def resolve_cut_signals(
-    contents: Contents, description: Description, report: ImportReport
-) -> tuple[Floats, float, Floats | None] | None:
+def _resolve_cut_signals(contents: Contents, report: ImportReport) -> tuple[Floats, float, Floats | None]:
     """Return signal, sample rate (Hz) and spindle speed (rpm, shape (n,), None without one) of a cut.
 
     The signal is an acceleration (m/s^2), or what a microphone recorded: shape (n,), or (responses, n) where there are
-    several and the description chooses none. None where the report says what is missing or wrong.
+    several and the description chooses none.
     """
-    named = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
-    signals, speed_signal = split_speed_column(named, description, report)
+    description = report.description
+    signals, speed_signal = split_speed_column(assign_columns(contents.signals, report), report)
     is_microphone = description.sensor == MICROPHONE_SENSOR
     needs_scale = not is_microphone or description.full_scale
-    full_scale = apply_full_scale(signals, description, report) if needs_scale else signals
-    scaled = convert_to_sensor_units(full_scale, description, report)
-    if scaled is None or not report.is_clean:
-        return None
+    scaled = convert_to_sensor_units(apply_full_scale(signals, report) if needs_scale else signals, report)
+    report.require_clean()
     over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
     responses = [signal for signal in over_time if infer_kind(signal) == "response"]
     candidates = responses or [signal for signal in over_time if not infer_kind(signal)]
     if not candidates:
         fact = f"which of its columns is the acceleration ({format_signal_names(signals)})"
-        report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
-        return None
+        raise report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
     if description.response is not None:
-        one = choose_signal(candidates, description.response, "responses", report)
+        one = report.attempt(choose_signal, candidates, "responses")
         candidates = [] if one is None else [one]
-    factors = [1.0 if is_microphone else _resolve_factor(signal, description, report) for signal in candidates]
+    factors = [1.0 if is_microphone else report.attempt(_resolve_factor, signal) for signal in candidates]
     speed_signals = [speed_signal] if speed_signal is not None and candidates else []
-    rate, used = resolve_rate(scaled, [*candidates, *speed_signals], description, report)
+    rate, used = resolve_rate(scaled, [*candidates, *speed_signals], report)
     if is_microphone and responses:
-        report.faults.append(f"{responses[0].name} moves; leave Description.sensor microphone out")
-    if not candidates or not report.is_clean:
-        return None
-    speed = resolve_speed(used[-1], rate, description, report) if speed_signals else None
-    if not report.is_clean:
-        return None
+        report.add_fault(f"{responses[0].name} moves; leave Description.sensor microphone out")
+    report.require_clean()
+    speed = resolve_speed(used[-1], rate, report) if speed_signals else None
     values = np.stack([signal.values * factor for signal, factor in zip(used, factors, strict=False)])
     return np.asarray(values if len(factors) > 1 else values[0], dtype=np.float64), rate, speed
 
 
-def _resolve_factor(signal: Signal, description: Description, report: ImportReport) -> float:
-    """Return the factor of an acceleration to m/s^2; 0 where it is none, or its unit is unknown."""
-    unit = resolve_response_unit(signal, description, report)
-    if unit is None:
-        return 0.0
-    if unit[0] != "acceleration":
-        report.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
-    return unit[1]
+def _resolve_factor(signal: Signal, report: ImportReport) -> float:
+    """Return the factor of an acceleration to m/s^2."""
+    quantity, factor = resolve_response_unit(signal, report)
+    if quantity != "acceleration":
+        raise report.add_fault(f"{signal.name} is a {quantity}; a cut is heard by an accelerometer")
+    return factor

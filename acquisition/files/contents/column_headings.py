@@ -121,22 +121,24 @@ def infer_role(name: str, unit: str) -> Role:
     return by_name  # type: ignore[return-value]
 
 
-def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: ImportReport) -> tuple[Signal, ...]:
-    """Return the signals with the roles and units that `columns` gives them, in its order, without the others.
+def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[Signal, ...]:
+    """Return the signals with the roles and units that `Description.columns` gives them, in its order, only these.
 
     "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
-    second column of H.
+    second column of H. Without `columns` all signals are left as they are.
     """
-    named = list[Signal]()
+    named, columns = list[Signal](), report.description.columns
+    if not columns:
+        return signals
     in_order = not any("=" in text for text in columns)
     if in_order and len(columns) < len(signals):
         names = format_signal_names(signals)
         cure = 'name all in their order, "-" for what is left out, or each as in "real=2"'
         fault = f"names {len(columns)} of its {len(signals)} columns, which are {names}; {cure}"
-        report.faults.append(f"Description.columns {fault}")
+        report.add_fault(f"Description.columns {fault}")
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
-        signal = _select_signal(signals, name.strip(), number, report)
+        signal = report.attempt(_select_signal, signals, name.strip(), number)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
@@ -149,18 +151,17 @@ def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: Im
     return tuple(named)
 
 
-def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal | None:
+def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal:
     if name:
         return find_column(signals, name, "columns", report)
     if number < len(signals):
         return signals[number]
     fault = f"no column {number + 1} in the file, which holds {format_signal_names(signals)}"
-    report.reject("columns", None, fault)
-    return None
+    raise report.reject("columns", None, fault)
 
 
-def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal | None:
-    """Find the column of a name, heading, unit or number; None where the report says that there is not one."""
+def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal:
+    """Find the one column of a name, heading, unit or number."""
     meant = _match_columns(signals, name)
     if len(meant) == 1:
         return meant[0]
@@ -169,8 +170,7 @@ def find_column(signals: Sequence[Signal], name: str, field_name: str, report: I
         fault = f"{len(meant)} columns are called {name!r}; say which by its number, {numbers}"
     else:
         fault = f"nothing called {name!r} in the file, which holds {format_signal_names(signals)}"
-    report.reject(field_name, None, fault)
-    return None
+    raise report.reject(field_name, None, fault)
 
 
 def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:

@@ -110,7 +110,7 @@ def report_flaws(used: Sequence[Signal], report: ImportReport, first: int = 0) -
         flaw = next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), "")
         if flaw:
             remedy = f"mend it there, or leave {column.name} out of Description.columns"
-            report.faults.append(f"{column.name} {flaw}; {remedy}")
+            report.add_fault(f"{column.name} {flaw}; {remedy}")
 
 
 def _is_in_same_table(one: Signal, other: Signal) -> bool:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from acquisition.tap_test import UNKNOWN_CONDITIONS, Conditions
 
+Result = TypeVar("Result")
 _LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
 
 
@@ -87,10 +89,19 @@ class Fact:
     """Origin: the file, an option of the user, or a default."""
 
 
+class UnresolvedError(Exception):
+    """Raised where a recording cannot be resolved; its report says what is missing or wrong."""
+
+
 @dataclass
 class ImportReport:
-    """Facts, gaps and faults of a recording, collected while its contents are resolved."""
+    """Facts, gaps and faults of a recording, collected while its contents are resolved.
 
+    The methods that add a gap or a fault return an UnresolvedError, to raise where the rest needs what is missing.
+    """
+
+    description: Description
+    """Description that a user gives of the recording."""
     facts: list[Fact] = field(default_factory=list)
     """Known facts."""
     missing: list[str] = field(default_factory=list)
@@ -102,14 +113,26 @@ class ImportReport:
         """Add a known fact."""
         self.facts.append(Fact(name, value, origin))
 
-    def add_missing(self, fact: str, field_name: str, example: str = "") -> None:
+    def add_missing(self, fact: str, field_name: str, example: str = "") -> UnresolvedError:
         """Add a fact that is missing, and the field of the description that states it, with an example."""
         self.missing.append(f"{fact} (Description.{field_name}{example})")
+        return UnresolvedError()
 
-    def reject(self, field_name: str, value: object, fault: str) -> None:
+    def add_fault(self, fault: str) -> UnresolvedError:
+        """Add a fault of the file."""
+        self.faults.append(fault)
+        return UnresolvedError()
+
+    def reject(self, field_name: str, value: object, fault: str) -> UnresolvedError:
         """Add the fault of a field of the description and its value; None leaves the value out."""
-        shown = "" if value is None else f" {value}"
-        self.faults.append(f"Description.{field_name}{shown}: {fault}")
+        return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}")
+
+    def attempt(self, resolve: Callable[..., Result], *arguments: object) -> Result | None:
+        """Return the result of a function of these arguments and this report; None where it cannot be resolved."""
+        try:
+            return resolve(*arguments, self)
+        except UnresolvedError:
+            return None
 
     def merge(self, other: ImportReport) -> None:
         """Add all entries of another report."""
@@ -117,14 +140,19 @@ class ImportReport:
         self.missing += other.missing
         self.faults += other.faults
 
-    def add_contradiction(self, field_name: str, given: object, in_file: object) -> None:
+    def add_contradiction(self, field_name: str, given: object, in_file: object) -> UnresolvedError:
         """Add the fault of a field that differs from the file."""
-        self.reject(field_name, given, f"the file says {in_file}; leave the option out")
+        return self.reject(field_name, given, f"the file says {in_file}; leave the option out")
 
     @property
     def is_clean(self) -> bool:
         """True if nothing is missing or wrong."""
         return not self.missing and not self.faults
+
+    def require_clean(self) -> None:
+        """Raise UnresolvedError where something is missing or wrong."""
+        if not self.is_clean:
+            raise UnresolvedError
 
     def format_problems(self) -> str:
         """Return all that is missing and wrong; empty where nothing is."""

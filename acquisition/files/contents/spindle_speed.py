@@ -7,7 +7,7 @@ import numpy as np
 from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import find_column
 from acquisition.files.contents.contents import Signal
-from acquisition.files.contents.description import Description, ImportReport
+from acquisition.files.contents.description import ImportReport
 from acquisition.files.contents.units import parse_unit
 
 PULSE_ON_LEVEL, PULSE_OFF_LEVEL = 0.6, 0.4
@@ -91,49 +91,41 @@ SPEED_ROLES = ("speed", "tacho")
 """Roles of a column of the spindle speed."""
 
 
-def split_speed_column(
-    signals: Sequence[Signal], description: Description, report: ImportReport
-) -> tuple[list[Signal], Signal | None]:
+def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple[list[Signal], Signal | None]:
     """Return the signals without the spindle speed, and the signal of the speed; None without one."""
-    columns = [signal for signal in signals if signal.role in SPEED_ROLES]
-    if description.tacho:
-        named = find_column(signals, description.tacho, "tacho", report)
+    columns, pulses = [signal for signal in signals if signal.role in SPEED_ROLES], report.description.pulses
+    if report.description.tacho:
+        named = report.attempt(find_column, signals, report.description.tacho, "tacho")
         columns = [] if named is None else [named]
     if len(columns) > 1:
         names = " and ".join(signal.name for signal in columns)
         report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
     rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
-    if description.pulses is not None and not columns:
-        report.reject("pulses", description.pulses, "no column is a tachometer; name it with Description.tacho")
+    if pulses is not None and not columns:
+        report.reject("pulses", pulses, "no column is a tachometer; name it with Description.tacho")
     return rest, columns[0] if columns else None
 
 
-def resolve_speed(signal: Signal, sample_rate: float, description: Description, report: ImportReport) -> Floats | None:
-    """Return the spindle speed at each sample (rpm), NaN where unknown; None where the report says what is wrong."""
+def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> Floats:
+    """Return the spindle speed at each sample (rpm), NaN where unknown."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
     if unit is not None and unit.quantity == "frequency":
-        return _convert_speed(signal, values, 60 * unit.factor, description, report)
+        return _convert_speed(signal, values, 60 * unit.factor, report)
     if signal.role == "speed":
-        report.add_missing(f"the unit of the speed in {signal.name}", "columns", f' "speed [rpm]={signal.name}"')
-        return None
+        raise report.add_missing(f"the unit of the speed in {signal.name}", "columns", f' "speed [rpm]={signal.name}"')
+    pulses = report.description.pulses
     try:
-        return compute_speed_from_pulses(values, sample_rate, 1 if description.pulses is None else description.pulses)
+        return compute_speed_from_pulses(values, sample_rate, 1 if pulses is None else pulses)
     except ValueError as error:
-        report.faults.append(f"{signal.name}: {error}")
-        return None
+        raise report.add_fault(f"{signal.name}: {error}") from error
 
 
-def _convert_speed(
-    signal: Signal, values: Floats, factor: float, description: Description, report: ImportReport
-) -> Floats | None:
+def _convert_speed(signal: Signal, values: Floats, factor: float, report: ImportReport) -> Floats:
     """Convert a speed with a factor (rpm per unit)."""
-    if description.pulses is not None:
-        fault = f"{signal.name} is the speed itself ({signal.unit}); leave it out"
-        report.reject("pulses", description.pulses, fault)
-        return None
-    speed = np.abs(values) * factor
+    pulses, speed = report.description.pulses, np.abs(values) * factor
+    if pulses is not None:
+        raise report.reject("pulses", pulses, f"{signal.name} is the speed itself ({signal.unit}); leave it out")
     if not np.any(speed > 0):
         fault = f"stands at 0 {signal.unit} all along; name another column, or leave it out"
-        report.faults.append(f"{signal.name}: {fault}")
-        return None
+        raise report.add_fault(f"{signal.name}: {fault}")
     return np.where(speed > 0, speed, np.nan)

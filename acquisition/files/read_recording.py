@@ -3,11 +3,11 @@
 import functools
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TypeVar
 
 from acquisition.errors import DataError, Remark
 from acquisition.file_io import open_regular_file
@@ -48,8 +48,6 @@ EMPTY_DESCRIPTION = Description()
 """Description that states nothing."""
 DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
 """Decimal signs of a text by their names."""
-Result = TypeVar("Result")
-
 _log = logging.getLogger(__name__)
 
 
@@ -102,12 +100,11 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     file_format = detect_format(path)
     held = read_contents(file_format, path, description)
     if isinstance(held, Contents):
-        contents = held
         if description.force is not None:
             force = _read_force_contents(description.force, description)
-            contents = append_force_signals(held, force, description.force)
-        title = file_format.title
-        return _convert_errors(file_format, path, lambda: resolve_recording(path, title, contents, description))
+            held = append_force_signals(held, force, description.force)
+        with _convert_errors(file_format, path):
+            return resolve_recording(path, file_format.title, held, description)
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = ", ".join(description.list_signal_options())
@@ -251,13 +248,15 @@ def read_contents(file_format: Format, path: Path, description: Description) -> 
     """Read a file of this format, with the skipped lines and the decimal sign of the description for a text."""
     read_from, skip, decimal = file_format.read_from, description.skip, description.decimal
     if not skip and not decimal:
-        return _convert_errors(file_format, path, lambda: file_format.read(path))
+        with _convert_errors(file_format, path):
+            return file_format.read(path)
     option = f"{path}: Description.skip {skip}" if skip else f"{path}: Description.decimal {decimal}"
     if read_from is None:
         raise DataError(f"{option}: a {file_format.title} is no text of lines; leave the option out")
     if decimal not in DECIMAL_SIGNS:
         raise DataError(f"{option}: is no decimal sign; give comma or point")
-    return _convert_errors(file_format, path, lambda: read_from(path, skip or 0, DECIMAL_SIGNS[decimal]))
+    with _convert_errors(file_format, path):
+        return read_from(path, skip or 0, DECIMAL_SIGNS[decimal])
 
 
 def _read_force_contents(path: Path, description: Description) -> Contents:
@@ -268,10 +267,11 @@ def _read_force_contents(path: Path, description: Description) -> Contents:
     return held
 
 
-def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
-    """Return the result of some work on a file; raise DataError for any failure."""
+@contextmanager
+def _convert_errors(file_format: Format, path: Path) -> Iterator[None]:
+    """Convert any failure of some work on a file to a DataError."""
     try:
-        return work()
+        yield
     except DataError as error:
         raise DataError(f"{error}{_describe_broken_formats()}") from error
     except OSError:

@@ -132,10 +132,9 @@ def parse_columns(columns: Sequence[Sequence[str]], lines: Sequence[int], decima
 
     decimal_sign: a comma or a point where it is known; the other one separates thousands then.
     """
-    by_sign: dict[str, NumberFormat] = {
-        sign: {sign: "decimal", other: "thousands"} for sign, other in _OTHER_SIGN.items()
-    }
-    written = [by_sign[decimal_sign]] * len(columns) if decimal_sign in by_sign else _infer_formats(columns)
+    written = _infer_formats(columns)
+    if decimal_sign in _OTHER_SIGN:
+        written = [{decimal_sign: "decimal", _OTHER_SIGN[decimal_sign]: "thousands"}] * len(columns)
     return [_parse_column(cells, lines, numerals) for cells, numerals in zip(columns, written, strict=True)]
 
 

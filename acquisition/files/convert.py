@@ -127,7 +127,7 @@ def encode_sep005_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     return json.dumps(channels, allow_nan=False).encode("utf-8")
 
 
-_AxisPair = tuple[tuple[int, str, str], tuple[int, str, str]]
+_UffAxis = tuple[int, str, str]
 _UFF_NO_QUANTITY = (0, "NONE", "NONE")
 _UFF_FORCE = (13, "Force", "N")
 _UFF_TIME = (17, "Time", "s")
@@ -146,13 +146,11 @@ def encode_uff_frf(frf: Frf, labels: ExportLabels) -> bytes:
     Values have 12 digits, the abscissa 6 as the format demands. All digits of its step are in a line of identification,
     from which lobewatch reads it. Source: SDRC Universal File Formats 58, 151, 164.
     """
-    values, _ = convert_to_measured_form(frf)
-    ordinate = _UFF_ORDINATES[frf.measured_as]
-    axis = _Abscissa(frf.frequency, (18, "Frequency", "Hz"))
-    averages = f"averages={frf.n_averages}"
-    sets = [_format_data_set_58(4, axis, values, (ordinate, _UFF_FORCE), labels, averages)]
+    axis, averages = _Abscissa(frf.frequency, (18, "Frequency", "Hz")), f"averages={frf.n_averages}"
+    axes = (_UFF_ORDINATES[frf.measured_as], _UFF_FORCE)
+    sets = [_format_data_set_58(4, axis, convert_to_measured_form(frf)[0], axes, labels, averages)]
     if frf.coherence is not None:
-        sets.append(_format_data_set_58(6, axis, frf.coherence, (_UFF_NO_QUANTITY, _UFF_NO_QUANTITY), labels, averages))
+        sets.append(_format_data_set_58(6, axis, frf.coherence, (), labels, averages))
     return _encode_uff(sets, labels)
 
 
@@ -162,7 +160,7 @@ def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     for number, hit in enumerate(hits, 1):
         axis = _Abscissa(np.arange(hit.force.size) / hit.sample_rate, _UFF_TIME, 1 / hit.sample_rate)
         for values, ordinate in ((hit.force, _UFF_FORCE), (hit.acceleration, _UFF_ORDINATES["accelerance"])):
-            sets.append(_format_data_set_58(1, axis, values, (ordinate, _UFF_NO_QUANTITY), labels, f"hit={number}"))
+            sets.append(_format_data_set_58(1, axis, values, (ordinate,), labels, f"hit={number}"))
     return _encode_uff(sets, labels)
 
 
@@ -177,7 +175,7 @@ class _Abscissa:
 
 
 def _format_data_set_58(
-    kind: int, axis: _Abscissa, values: Floats | Complexes, ordinates: _AxisPair, labels: ExportLabels, extra: str
+    kind: int, axis: _Abscissa, values: Floats | Complexes, axes: Sequence[_UffAxis], labels: ExportLabels, extra: str
 ) -> list[str]:
     node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
     exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
@@ -191,10 +189,9 @@ def _format_data_set_58(
     start, step = (axis.values[0], axis.step) if axis.is_even else (0.0, 0.0)
     spacing = int(axis.is_even)
     lines.append(f"{6 if is_complex else 4:10d}{n:10d}{spacing:10d}{start:13.5E}{step:13.5E}{0.0:13.5E}")
-    for t, name, unit in (axis.what, *ordinates, _UFF_NO_QUANTITY):
+    for t, name, unit in [axis.what, *axes, *3 * [_UFF_NO_QUANTITY]][:4]:
         lines.append(f"{t:10d}{0:5d}{0:5d}{0:5d} {name:20s} {unit:20s}")
-    lines += _format_values(axis, values)
-    return lines
+    return [*lines, *_format_values(axis, values)]
 
 
 def _check_identification_line(text: str) -> str:

@@ -41,10 +41,22 @@ def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
         )
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
-    if sum(sizes) > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
+    if sum(sizes) > get_unpacked_limit(packed):
         limits = f"at most {MIN_UNPACKED_LIMIT / 1e6:g} MB or {MAX_UNPACKED_RATIO} times the file are read"
         fault = f"{packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; {limits}; no tap test is like that"
         raise DataError(f"{path}: {fault}: take it again from where it was recorded")
+
+
+def get_unpacked_limit(packed: int) -> int:
+    """Return the largest unpacked size of a file (bytes)."""
+    return max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed)
+
+
+def check_unpacked_ratio(unpacked: int, path: Path) -> None:
+    """Raise DataError for a file that unpacks to too many bytes."""
+    packed = path.stat().st_size
+    if unpacked > get_unpacked_limit(packed):
+        raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
 
 
 def _measure_unpacked_size(data: h5py.Dataset) -> int:

@@ -4,11 +4,11 @@ import re
 import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import get_args
+from typing import cast, get_args
 
 from acquisition.files.contents.contents import FrfRole, Role, Signal
 from acquisition.files.contents.description import ImportReport
-from acquisition.files.contents.units import VOLTAGE_UNITS, parse_unit
+from acquisition.files.contents.units import VOLTAGE_UNITS, get_motion, parse_unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _PART_OF_FRF = re.compile(
@@ -42,27 +42,13 @@ _ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
     (r"tacho", "tacho"),
 )
 """Role of a column by the beginning of its name in lower case and without accents, in seven languages."""
-COLUMN_ROLES: dict[str, tuple[Role, str]] = {
-    "time": ("time", ""),
-    "frequency": ("frequency", ""),
-    "force": ("force", "force"),
-    "response": ("response", ""),
-    "acceleration": ("response", "acceleration"),
-    "velocity": ("response", "velocity"),
-    "displacement": ("response", "displacement"),
-    "frf": ("frf", ""),
-    "receptance": ("frf", "displacement"),
-    "mobility": ("frf", "velocity"),
-    "accelerance": ("frf", "acceleration"),
-    "real": ("real", ""),
-    "imag": ("imag", ""),
-    "magnitude": ("magnitude", ""),
-    "db": ("magnitude", ""),
-    "phase": ("phase", ""),
-    "coherence": ("coherence", ""),
-    "speed": ("speed", ""),
-    "tacho": ("tacho", ""),
-    "-": ("ignored", ""),
+_MOTIONS, _FORMS = ("acceleration", "velocity", "displacement"), ("receptance", "mobility", "accelerance")
+_OTHER_ROLES = {"db": "magnitude", "-": "ignored"} | dict.fromkeys(_MOTIONS, "response") | dict.fromkeys(_FORMS, "frf")
+_QUANTITY_WORDS = ("time", "frequency", "force", "response", *_MOTIONS, "frf", *_FORMS)
+_PART_WORDS = ("real", "imag", "magnitude", "db", "phase", "coherence", "speed", "tacho", "-")
+COLUMN_ROLES = {
+    word: (cast(Role, _OTHER_ROLES.get(word, word)), get_motion(word) if word in ("force", *_MOTIONS, *_FORMS) else "")
+    for word in (*_QUANTITY_WORDS, *_PART_WORDS)
 }
 """Role and quantity of a column, by its word in `Description.columns`."""
 
@@ -130,12 +116,10 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
     named, columns = list[Signal](), report.description.columns
     if not columns:
         return signals
-    in_order = not any("=" in text for text in columns)
-    if in_order and len(columns) < len(signals):
-        names = format_signal_names(signals)
+    if len(columns) < len(signals) and not any("=" in text for text in columns):
+        fault = f"names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}"
         cure = 'name all in their order, "-" for what is left out, or each as in "real=2"'
-        fault = f"names {len(columns)} of its {len(signals)} columns, which are {names}; {cure}"
-        report.add_fault(f"Description.columns {fault}")
+        report.add_fault(f"Description.columns {fault}; {cure}")
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = report.attempt(_select_signal, signals, name.strip(), number)
@@ -156,8 +140,8 @@ def _select_signal(signals: Sequence[Signal], name: str, number: int, report: Im
         return find_column(signals, name, "columns", report)
     if number < len(signals):
         return signals[number]
-    fault = f"no column {number + 1} in the file, which holds {format_signal_names(signals)}"
-    raise report.reject("columns", None, fault)
+    held = format_signal_names(signals)
+    raise report.reject("columns", None, f"no column {number + 1} in the file, which holds {held}")
 
 
 def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal:

@@ -92,9 +92,9 @@ def cut_to_shortest(
     by_size = sorted([*used, *sorted(axes, key=_count_values)[-1:]], key=_count_values)
     if not by_size or not all(_is_in_same_table(column, by_size[0]) for column in by_size):
         return list(used), list(axes)
-    shortest, n = by_size[0], _count_values(by_size[0])
-    if _count_values(by_size[-1]) > n:
-        report.add_fact("rows", f"{n} of {_count_values(by_size[-1])}, as {shortest.name} ends there", "default")
+    n, longest = _count_values(by_size[0]), _count_values(by_size[-1])
+    if longest > n:
+        report.add_fact("rows", f"{n} of {longest}, as {by_size[0].name} ends there", "default")
     cut = [[replace(column, values=column.values[:n]) for column in columns] for columns in (used, axes)]
     return cut[0], cut[1]
 
@@ -107,8 +107,7 @@ def has_same_axis(one: Signal, other: Signal) -> bool:
 def report_flaws(used: Sequence[Signal], report: ImportReport, first: int = 0) -> None:
     """Report a fault for each column with a flaw from this index on."""
     for column in used:
-        flaw = next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), "")
-        if flaw:
+        if flaw := next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), ""):
             remedy = f"mend it there, or leave {column.name} out of Description.columns"
             report.add_fault(f"{column.name} {flaw}; {remedy}")
 

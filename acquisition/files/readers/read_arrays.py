@@ -14,7 +14,7 @@ import numpy as np
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import infer_role
 from acquisition.files.contents.contents import Contents, Format, Signal, list_array_signals, list_distinct_names
-from acquisition.files.hdf5_file import HDF5_SIGNATURE, MAX_UNPACKED_RATIO, MIN_UNPACKED_LIMIT
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_ratio
 from acquisition.files.readers.mat_layouts import find_window, recognize_layout
 from acquisition.files.readers.mat_variables import MAT_V73_SIGNATURE, read_mat_variables
 
@@ -26,10 +26,7 @@ _MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
 def read_mat(path: Path) -> Contents:
     """Read the arrays of a MATLAB file; raise DataError where it is damaged or unpacks out of proportion."""
     variables = read_mat_variables(path)
-    contents = recognize_layout(variables)
-    if contents is not None:
-        return contents
-    return Contents(tuple(list_array_signals(variables)), window=find_window(variables))
+    return recognize_layout(variables) or Contents(tuple(list_array_signals(variables)), window=find_window(variables))
 
 
 def _is_mat(head: bytes, _path: Path) -> bool:
@@ -67,7 +64,8 @@ def read_numpy(path: Path) -> Contents:
 
 def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     if zipfile.is_zipfile(file):
-        _check_zip_size(file, path)
+        with zipfile.ZipFile(file) as archive:
+            check_unpacked_ratio(sum(member.file_size for member in archive.infolist()), path)
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
@@ -75,14 +73,6 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
         return _make_array_contents({"array": loaded} if fields is None else {name: loaded[name] for name in fields})
     with loaded:
         return _make_array_contents({name: loaded[name][()] for name in loaded.files})
-
-
-def _check_zip_size(file: BinaryIO, path: Path) -> None:
-    packed = path.stat().st_size
-    with zipfile.ZipFile(file) as archive:
-        unpacked = sum(member.file_size for member in archive.infolist())
-    if unpacked > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
-        raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
 
 
 def read_hdf5(path: Path) -> Contents:
@@ -134,9 +124,9 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
             time = None if rate is not None else np.asarray(channel["time"], dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise DataError(f"{where}: {error}") from error
-        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         if rate is not None and not rate > 0:
             raise DataError(f"{where}: fs={rate} Hz is not > 0")
+        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}

@@ -91,9 +91,10 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
         ends.append(end + 1)
     lines = [decode_utf8_or_latin1(content[a:b]).rstrip("\r\n") for a, b in pairwise(ends)]
     try:
-        kind, n, spacing, start, step = _parse_row_seven(lines[7])
-        per_value = _NUMBERS_PER_VALUE[kind]
-    except (ValueError, KeyError, IndexError) as error:
+        kind, n, spacing = map(int, lines[7].split()[:3])
+        start, step = map(float, lines[7].split()[3:5])
+        per_value = _NUMBERS_PER_VALUE[kind if n > 0 else 0]
+    except (ValueError, KeyError) as error:
         raise DataError(f"{place}: line 7 of its header cannot be read ({lines[7].strip()!r})") from error
     even, width = bool(spacing), per_value + (0 if spacing else 1)
     if lines[0].split()[0] == "58":
@@ -104,14 +105,6 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
     abscissa = start + step * np.arange(n, dtype=np.float64) if even else table[:, 0]
     values = table[:, -1] if per_value == 1 else table[:, -2] + 1j * table[:, -1]
     return _make_function(lines, abscissa, step if even else 0.0, values), after
-
-
-def _parse_row_seven(line: str) -> tuple[int, int, int, float, float]:
-    words = line.split()
-    kind, n, spacing = map(int, words[:3])
-    if n < 1:
-        raise ValueError(line)
-    return kind, n, spacing, float(words[3]), float(words[4])
 
 
 def _make_function(lines: list[str], abscissa: Floats, step: float, values: Floats | Complexes) -> UffFunction:

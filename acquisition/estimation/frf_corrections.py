@@ -8,7 +8,7 @@ import numpy as np
 from acquisition.arrays import Floats
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, find_pulse
+from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, require_pulse
 
 
 def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
@@ -44,7 +44,7 @@ def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
     """
     if not time_constant > 0:
         raise ValueError(f"time_constant={time_constant} s is not > 0")
-    pulse = _require_pulse(hit)
+    pulse = require_pulse(hit)
     after = np.maximum(np.arange(hit.force.size) - pulse.start, 0) / hit.sample_rate
     window = np.exp(-after / time_constant)
     still = hit.acceleration - np.mean(extract_baseline(hit.acceleration, count_pre_hit_samples(hit)))
@@ -109,7 +109,7 @@ def find_hit_time(hit: Hit) -> float:
     >>> round(find_hit_time(hit) * 1e3, 2)  # ms
     10.45
     """
-    pulse = _require_pulse(hit)
+    pulse = require_pulse(hit)
     part = slice(max(pulse.start, 0), pulse.end)
     return float(np.average(np.arange(hit.force.size)[part], weights=pulse.force[part])) / hit.sample_rate
 
@@ -141,13 +141,6 @@ def measure_time_after_hit(hit: Hit) -> float:
     89.55
     """
     return hit.force.size / hit.sample_rate - find_hit_time(hit)
-
-
-def _require_pulse(hit: Hit) -> Pulse:
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; check hits with check_hit first")
-    return pulse
 
 
 def remove_sensor_mass(frf: Frf, mass: float) -> Frf:

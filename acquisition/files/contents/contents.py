@@ -1,5 +1,6 @@
 """Signals of a recorded file, and the record of functions that reads a format."""
 
+import contextlib
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -125,6 +126,14 @@ def append_force_signals(response: Contents, force: Contents, force_file: Path) 
     names, file = {signal.name for signal in response.signals}, force_file.name
     added = (replace(one, name=f"{one.name} of {file}") if one.name in names else one for one in force.signals)
     return replace(response, signals=(*response.signals, *added))
+
+
+def parse_local_time(text: str, *patterns: str) -> datetime | None:
+    """Parse a time by the first pattern that fits, local where it has no zone; None where it cannot be read."""
+    for pattern in patterns:
+        with contextlib.suppress(ValueError, OverflowError, OSError):
+            return datetime.strptime(text, pattern).astimezone()
+    return None
 
 
 _NO_WINDOW = re.compile(r"\s*(none|no|off|rect\w*|uniform|boxcar|transient|force.*)?\s*", re.IGNORECASE)

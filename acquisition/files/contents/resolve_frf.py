@@ -1,9 +1,10 @@
 """Resolve the FRF in the contents of a recorded file."""
 
+import itertools
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -12,8 +13,8 @@ from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
 from acquisition.files.contents.description import ImportReport
-from acquisition.files.contents.resolve_unit import MOTION_QUANTITIES, choose_signal, resolve_frf_unit
-from acquisition.files.contents.units import parse_unit
+from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
+from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
 FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
@@ -28,49 +29,30 @@ _ROUND_STEP_DIGITS, _ROUND_STEP_TOLERANCE = 5, 3e-7
 """Digits of a round step, and its relative tolerance: the last of seven printed digits."""
 
 
-@dataclass(frozen=True, eq=False)
-class FrfCandidate:
-    """One FRF of a file, in the unit of the file."""
-
-    signal: Signal
-    """Signal that names it: the complex values, the real part or the magnitude."""
-    partner: Signal | None = None
-    """Imaginary part or phase."""
-
-    def format_columns_option(self) -> str:
-        """Return its columns as `Description.columns` names them."""
-        return ",".join(f"{part.role}={part.name}" for part in self.parts)
-
-    @property
-    def parts(self) -> list[Signal]:
-        """The one or two signals."""
-        return [self.signal] if self.partner is None else [self.signal, self.partner]
-
-
-def find_frf_candidates(signals: Sequence[Signal]) -> list[FrfCandidate]:
-    """Find the FRFs among signals: complex ones, and pairs in their order."""
-    listed = [FrfCandidate(signal) for signal in signals if signal.role == "frf"]
+def find_frf_candidates(signals: Sequence[Signal]) -> list[list[Signal]]:
+    """Find the FRFs among signals: complex ones, then real part or magnitude with its partner, in their order."""
+    listed = [[signal] for signal in signals if signal.role == "frf"]
     for first, second in (("real", "imag"), ("magnitude", "phase")):
-        seconds: Iterator[Signal | None] = iter([part for part in signals if part.role == second])
-        listed += [FrfCandidate(part, next(seconds, None)) for part in signals if part.role == first]
+        seconds = (part for part in signals if part.role == second)
+        listed += [[part, *itertools.islice(seconds, 1)] for part in signals if part.role == first]
     return listed
 
 
 def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
     """Return the FRF of contents with one or more; None where the report says what is missing or wrong."""
     listed = find_frf_candidates(contents.signals)
-    signal = report.attempt(choose_signal, [candidate.signal for candidate in listed], "FRFs")
+    signal = report.attempt(choose_signal, [parts[0] for parts in listed], "FRFs")
     n_averages = _resolve_averages(contents, report)
-    candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
-    coherence = _find_coherence(contents, listed.index(candidate), candidate.signal)
-    axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == candidate.signal.record]
-    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, report)
-    candidate = FrfCandidate(*used[: len(candidate.parts)])
-    values = report.attempt(_compute_complex_values, candidate)
-    unit = report.attempt(resolve_frf_unit, candidate.signal)
-    frequency = report.attempt(_resolve_frequency, contents, candidate, axes)
+    parts = next((parts for parts in listed if parts[0] is signal), listed[0])
+    coherence = _find_coherence(contents, listed.index(parts), parts[0])
+    axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == parts[0].record]
+    used, axes = cut_to_shortest([*parts, *([coherence] if coherence else [])], axes, report)
+    parts = used[: len(parts)]
+    values = report.attempt(_compute_complex_values, parts)
+    unit = report.attempt(resolve_frf_unit, parts[0])
+    frequency = report.attempt(_resolve_frequency, contents, parts, axes)
     shares = _resolve_coherence(used[-1] if coherence else None, report)
-    report_flaws(candidate.parts, report, int(frequency is None or frequency[0] == 0))
+    report_flaws(parts, report, int(frequency is None or frequency[0] == 0))
     if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
@@ -92,9 +74,9 @@ def _make_frf(
     return replace(from_accelerance(frequency, accelerance, coherence, n_averages), measured_as=form)
 
 
-def _compute_complex_values(candidate: FrfCandidate, report: ImportReport) -> Complexes:
+def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Complexes:
     """Return the complex values in the unit of the file."""
-    first, second = candidate.signal, candidate.partner
+    first, second = parts[0], parts[1] if len(parts) > 1 else None
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
             report.add_fault(f"{first.name} holds real numbers; an FRF is complex")
@@ -123,9 +105,11 @@ def _is_same_unit(one: str, other: str) -> bool:
     return one == other if unit is None else unit == parse_unit(other)
 
 
-def _resolve_frequency(contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], report: ImportReport) -> Floats:
+def _resolve_frequency(
+    contents: Contents, frf: Sequence[Signal], axes: Sequence[Signal], report: ImportReport
+) -> Floats:
     """Return the frequencies of the lines (Hz)."""
-    axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
+    axis = next((signal for signal in axes if signal.values.size == frf[0].values.size), None)
     if axis is None:
         return _make_even_frequency(contents.signals, frf, report)
     report_flaws([axis], report)
@@ -156,16 +140,16 @@ def _is_round(step: float) -> bool:
     return step > 0 and abs(float(f"{step:.{_ROUND_STEP_DIGITS - 1}e}") / step - 1) < _ROUND_STEP_TOLERANCE
 
 
-def _make_even_frequency(signals: Sequence[Signal], frf: FrfCandidate, report: ImportReport) -> Floats:
+def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], report: ImportReport) -> Floats:
     """Return the frequencies of the lines by the spacing in the description (Hz)."""
-    n, step, start = frf.signal.values.size, report.description.spacing, report.description.start or 0.0
+    n, step, start = frf[0].values.size, report.description.spacing, report.description.start or 0.0
     if step is None:
         fact, by_spacing = "the frequencies of its lines", "spacing 0.5 Description.start 0 in Hz"
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         if axis is None:
             raise report.add_missing(fact, by_spacing)
-        columns = f'"frequency [Hz]={axis},{frf.format_columns_option()}", or [rad/s]'
-        raise report.add_missing(fact, "columns", f" {columns}; or Description.{by_spacing}")
+        columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
+        raise report.add_missing(fact, "columns", f' "{columns}", or [rad/s]; or Description.{by_spacing}')
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         fault = "give a spacing > 0 Hz and a start >= 0 Hz"
         raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)

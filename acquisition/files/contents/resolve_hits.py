@@ -7,17 +7,11 @@ from decimal import Decimal
 import numpy as np
 
 from acquisition.arrays import Floats
+from acquisition.files.contents import resolve_unit
 from acquisition.files.contents.column_headings import format_signal_names
 from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, report_flaws
 from acquisition.files.contents.description import ImportReport, UnresolvedError
-from acquisition.files.contents.resolve_unit import (
-    MOTION_QUANTITIES,
-    choose_signal,
-    convert_to_sensor_units,
-    resolve_force_unit,
-    resolve_response_unit,
-)
-from acquisition.files.contents.units import STANDARD_GRAVITY, parse_unit
+from acquisition.files.contents.units import MOTION_QUANTITIES, STANDARD_GRAVITY, parse_unit
 from acquisition.hit import Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
 from acquisition.hits.capture_hits import split_record
@@ -58,7 +52,7 @@ def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
 
 
 def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
-    scaled = report.attempt(convert_to_sensor_units, apply_full_scale(signals, report))
+    scaled = report.attempt(resolve_unit.convert_to_sensor_units, apply_full_scale(signals, report))
     if scaled is None:
         if sum(signal.role != "time" for signal in signals) > 2 and report.description.response is None:
             report.add_missing("which of its responses is meant", "response", " 1")
@@ -66,12 +60,12 @@ def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
         raise UnresolvedError
     forces, responses = _split_by_kind(scaled, report)
     choice = ImportReport(report.description)
-    response = choice.attempt(choose_signal, responses, "responses") if responses else None
+    response = choice.attempt(resolve_unit.choose_signal, responses, "responses") if responses else None
     rate, used = resolve_rate(scaled, [*forces, *([response] if response else [])], report)
     report.merge(choice)
     forces, response = (used[:-1], used[-1]) if response else (forces, None)
     force = _resolve_force(forces, report)
-    unit = report.attempt(resolve_response_unit, response or responses[0]) if responses else None
+    unit = report.attempt(resolve_unit.resolve_response_unit, response or responses[0]) if responses else None
     _check_gravity_offset([response] if response else responses, report)
     if force is None or response is None or unit is None or not report.is_clean:
         raise UnresolvedError
@@ -104,7 +98,7 @@ def _resolve_force(forces: Sequence[Signal], report: ImportReport) -> Floats | N
     """Return the force (N), empty where none was measured; None where it or its unit is missing."""
     if report.description.without_force:
         return np.empty(0)
-    to_newton = report.attempt(resolve_force_unit, forces[0]) if len(forces) == 1 else None
+    to_newton = report.attempt(resolve_unit.resolve_force_unit, forces[0]) if len(forces) == 1 else None
     return None if to_newton is None else np.asarray(forces[0].values * to_newton)
 
 

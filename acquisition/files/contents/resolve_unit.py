@@ -8,10 +8,8 @@ from typing import cast
 from acquisition.files.contents.column_headings import format_signal_names, is_decibel, parse_decibel_reference
 from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import ImportReport, Origin, UnresolvedError
-from acquisition.files.contents.units import VOLTAGE_UNITS, Unit, get_motion, parse_unit
+from acquisition.files.contents.units import MOTION_QUANTITIES, VOLTAGE_UNITS, Unit, get_motion, parse_unit
 
-MOTION_QUANTITIES = ("displacement", "velocity", "acceleration")
-"""Quantities of a response."""
 _SENSITIVITY_PATTERN = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ]+)\s*(?:/|per)\s*(.+?)\s*")
 _VOLTAGE_RATIO_PATTERN = re.compile(r"\s*\(?([a-zA-Zµ]+)\)?\s*/\s*\(?([a-zA-Zµ]+)\)?\s*")
 _SENSITIVITY_EXAMPLE = ' "2.25 mV/N,10.2 mV/g"'

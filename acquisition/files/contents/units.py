@@ -17,6 +17,8 @@ STANDARD_GRAVITY = 9.80665
 POUND_FORCE = 4.4482216152605
 """Pound-force (N per lbf)."""
 
+MOTION_QUANTITIES = ("displacement", "velocity", "acceleration")
+"""Quantities of a response."""
 VOLTAGE_UNITS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
 """Volts per unit of a voltage in lower case; no part of other units."""
 

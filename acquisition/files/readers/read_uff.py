@@ -15,7 +15,7 @@ import numpy as np
 
 from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Format, Role, Signal
+from acquisition.files.contents.contents import Contents, Format, Role, Signal, parse_local_time
 from acquisition.files.readers.text_file import decode_utf8_or_latin1
 
 _NUMBERS_PER_VALUE = {2: 1, 4: 1, 5: 2, 6: 2}
@@ -93,7 +93,9 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
     try:
         kind, n, spacing = map(int, lines[7].split()[:3])
         start, step = map(float, lines[7].split()[3:5])
-        per_value = _NUMBERS_PER_VALUE[kind if n > 0 else 0]
+        per_value = _NUMBERS_PER_VALUE[kind]
+        if n < 1:
+            raise ValueError(n)
     except (ValueError, KeyError) as error:
         raise DataError(f"{place}: line 7 of its header cannot be read ({lines[7].strip()!r})") from error
     even, width = bool(spacing), per_value + (0 if spacing else 1)
@@ -304,13 +306,7 @@ def _list_notes(frfs: Sequence[UffFunction]) -> Iterator[str]:
 
 def _parse_date(function: UffFunction) -> datetime | None:
     """Return the date of the third line, or that of lobewatch's own files; local time where it has no zone."""
-    text = function.keys.get("recorded") or function.lines[2].strip()
-    for form in _DATE_FORMATS:
-        try:
-            return datetime.strptime(text, form).astimezone()
-        except (ValueError, OverflowError, OSError):
-            continue
-    return None
+    return parse_local_time(function.keys.get("recorded") or function.lines[2].strip(), *_DATE_FORMATS)
 
 
 def _is_uff(head: bytes, _path: Path) -> bool:

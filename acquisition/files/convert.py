@@ -130,7 +130,6 @@ def encode_sep005_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
 _UffAxis = tuple[int, str, str]
 _UFF_NO_QUANTITY = (0, "NONE", "NONE")
 _UFF_FORCE = (13, "Force", "N")
-_UFF_TIME = (17, "Time", "s")
 _UFF_ORDINATES = {
     "receptance": (8, "Displacement", "m"),
     "mobility": (11, "Velocity", "m/s"),
@@ -158,7 +157,7 @@ def encode_uff_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode force and acceleration of each hit as function type 1."""
     sets = []
     for number, hit in enumerate(hits, 1):
-        axis = _Abscissa(np.arange(hit.force.size) / hit.sample_rate, _UFF_TIME, 1 / hit.sample_rate)
+        axis = _Abscissa(np.arange(hit.force.size) / hit.sample_rate, (17, "Time", "s"), 1 / hit.sample_rate)
         for values, ordinate in ((hit.force, _UFF_FORCE), (hit.acceleration, _UFF_ORDINATES["accelerance"])):
             sets.append(_format_data_set_58(1, axis, values, (ordinate,), labels, f"hit={number}"))
     return _encode_uff(sets, labels)

@@ -5,7 +5,6 @@ import logging
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -14,33 +13,20 @@ from acquisition.file_io import open_regular_file
 from acquisition.files.contents.contents import Contents, Format, append_force_signals
 from acquisition.files.contents.description import Description, Fact
 from acquisition.files.contents.recording import Recording, resolve_recording
-from acquisition.files.readers.read_arrays import FOREIGN_HDF5_FORMAT, MAT_FORMAT, NUMPY_FORMAT, SEP005_FORMAT
+from acquisition.files.readers.read_arrays import ARRAY_FORMATS, MAT_FORMAT
 from acquisition.files.readers.read_audio import AUDIO_FORMAT
-from acquisition.files.readers.read_labview import LVM_FORMAT, TDMS_FORMAT
-from acquisition.files.readers.read_text_tables import PULSE_FORMAT, TEXT_TABLE_FORMAT
+from acquisition.files.readers.read_labview import LABVIEW_FORMATS
+from acquisition.files.readers.read_text_tables import TEXT_FORMATS
 from acquisition.files.readers.read_uff import UFF_FORMAT
-from acquisition.files.tap_file import TAP_FILE_FORMAT
+from acquisition.files.tap_file import TAP_FORMAT
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_quality.evaluate_hit import average_good_hits
 from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
-from acquisition.tap_test import Circumstances
 
 FORMATS_ENTRY_POINT_GROUP = "lobewatch.formats"
 """Entry points that each name one Format."""
-BUILT_IN_FORMATS = (
-    TAP_FILE_FORMAT,
-    UFF_FORMAT,
-    MAT_FORMAT,
-    LVM_FORMAT,
-    TDMS_FORMAT,
-    AUDIO_FORMAT,
-    SEP005_FORMAT,
-    NUMPY_FORMAT,
-    FOREIGN_HDF5_FORMAT,
-    PULSE_FORMAT,
-    TEXT_TABLE_FORMAT,
-)
+BUILT_IN_FORMATS = (TAP_FORMAT, UFF_FORMAT, MAT_FORMAT, *LABVIEW_FORMATS, AUDIO_FORMAT, *ARRAY_FORMATS, *TEXT_FORMATS)
 """Formats of this package; the text table is last because it takes any text."""
 FORMAT_HEAD_SIZE = 4096
 """Number of bytes at the start of a file by which formats recognize it."""
@@ -109,8 +95,11 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = ", ".join(description.list_signal_options())
     problems = f"a {file_format.title} says itself what it holds; leave out {options}" if options else ""
-    recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), problems)
-    return recording if about is None else _add_circumstances(recording, about)
+    names = ("created", "tool", "direction", "operator", "device") if about else ()
+    labels = {name: getattr(about, name) for name in names}
+    conditions = about.conditions if about and about.machine else None
+    facts = tuple(_list_facts(hits, frf))
+    return Recording(path, file_format.title, hits, frf, facts, problems, **labels, conditions=conditions)
 
 
 def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
@@ -310,9 +299,3 @@ def _list_facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
         return [Fact("lines", span, "file"), Fact("unit", f"m/N, from {frf.measured_as}", "file")]
     unit, force = Fact("unit", "m/s^2 (acceleration)", "file"), Fact("force", "N", "file")
     return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), *([force] if hits[0].has_force else []), unit]
-
-
-def _add_circumstances(recording: Recording, about: Circumstances) -> Recording:
-    names = ("created", "tool", "direction", "operator", "device")
-    conditions = about.conditions if about.machine else None
-    return replace(recording, conditions=conditions, **{name: getattr(about, name) for name in names})

@@ -322,7 +322,7 @@ def _is_lobewatch_file(head: bytes, path: Path) -> bool:
     return head.startswith(hdf5_file.HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
 
 
-TAP_FILE_FORMAT = Format(
+TAP_FORMAT = Format(
     "tap-file",
     "tap file of lobewatch",
     (".h5",),

@@ -19,10 +19,8 @@ _PART_OF_FRF = re.compile(
 """Pattern such as Re(H), or imag(FRF) [m/N]."""
 _BEFORE_UNIT = re.compile(r"\s*/\s*|\s*,\s*|\s+in\s+")
 """Separator between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
-ANGLE_UNITS = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度"), "deg") | {
-    "rad": "rad",
-    "radians": "rad",
-}
+_DEGREE_NAMES = ("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度")
+ANGLE_UNITS = dict.fromkeys(_DEGREE_NAMES, "deg") | dict.fromkeys(("rad", "radians"), "rad")
 """Units of a phase as written in lower case."""
 _DECIBEL_NAME = re.compile(r"(?<![^\W_])db(?![^\W\d_])", re.IGNORECASE)
 """Pattern of a level in a name: "Magnitude dB", "Mag_dB"."""

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import infer_role, split_heading
 from acquisition.files.contents.contents import Contents, Signal, list_array_signals
 
@@ -45,11 +44,7 @@ def _infer_window(before: Any, behind: Any) -> str:
     ratio = windowed[loud] / raw[loud]
     if ratio.size < 3 or np.any(ratio <= 0):
         return "of unknown form"
-    return _fit_exponential(time[loud], np.log(ratio))
-
-
-def _fit_exponential(time: Floats, level: Floats) -> str:
-    """Fit an exponential to the logarithm of a window."""
+    time, level = time[loud], np.log(ratio)
     slope, start = np.polyfit(time, level, 1)
     if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:
         return "of unknown form"
@@ -252,7 +247,8 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
     role.
     """
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
-    rate = next((float(v[name]) for name in v if _RATE_NAME.fullmatch(name) and _is_number(v[name])), None)
+    rates = (v[name] for name in v if _RATE_NAME.fullmatch(name) and isinstance(v[name], (int, float, np.number)))
+    rate = next((float(value) for value in rates if value > 0), None)
     axis = next((name for name in arrays if _TIME_NAME.fullmatch(name) and _has_equal_length(name, arrays)), None)
     if rate is None and axis is None:
         return None
@@ -272,10 +268,6 @@ def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
     """Return whether it is a vector as long as others: an axis, though its values may be none."""
     axis = arrays[name]
     return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.number)) and bool(value > 0)
 
 
 def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:

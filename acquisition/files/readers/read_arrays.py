@@ -30,14 +30,12 @@ def read_mat(path: Path) -> Contents:
 
 
 def _is_mat(head: bytes, _path: Path) -> bool:
-    return head.startswith((_MAT_V5_SIGNATURE, MAT_V73_SIGNATURE)) or _is_mat_v4(head)
-
-
-def _is_mat_v4(head: bytes) -> bool:
-    """Return whether a file begins with the header of a matrix, in either byte order, and its name.
+    """Return whether a file begins with a signature, or with the header of a matrix in either byte order and its name.
 
     Source: MAT-File Format (The MathWorks), level 4: type, rows, columns, whether complex, length of the name.
     """
+    if head.startswith((_MAT_V5_SIGNATURE, MAT_V73_SIGNATURE)):
+        return True
     for order, least in (("<", 0), (">", 1000)):
         kind, rows, columns, is_complex, length = struct.unpack_from(f"{order}5i", head.ljust(20))
         sizes = rows >= 0 and columns >= 0 and is_complex in (0, 1)
@@ -92,10 +90,6 @@ def _is_hdf5(head: bytes, _path: Path) -> bool:
     return head.startswith(HDF5_SIGNATURE)
 
 
-NUMPY_FORMAT = Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy)
-FOREIGN_HDF5_FORMAT = Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5)
-
-
 _SEP005_KEYS = ("data", "name", "unit_str")
 
 
@@ -146,4 +140,8 @@ def _is_sep005(head: bytes, _path: Path) -> bool:
     return head.lstrip().startswith(b"[") and b"{" in head[:200] and b'"' in head[:200]
 
 
-SEP005_FORMAT = Format("sep005", "SDyPy SEP005 time series", (".json",), _is_sep005, read_sep005)
+ARRAY_FORMATS = (
+    Format("sep005", "SDyPy SEP005 time series", (".json",), _is_sep005, read_sep005),
+    Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy),
+    Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5),
+)

@@ -93,9 +93,6 @@ def _is_lvm(head: bytes, _path: Path) -> bool:
     return decode_text(head).startswith(LVM_MAGIC)
 
 
-LVM_FORMAT = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm)
-
-
 def read_tdms(path: Path) -> Contents:
     """Read the channels of numbers, a record per group; raise DataError for a damaged file or without npTDMS."""
     try:
@@ -134,4 +131,7 @@ def _get_tdms_start(channel: Any) -> datetime | None:
     return datetime.fromtimestamp(float(seconds), UTC)
 
 
-TDMS_FORMAT = Format("tdms", "TDMS file", (".tdms",), lambda head, _path: head.startswith(b"TDSm"), read_tdms)
+LABVIEW_FORMATS = (
+    Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm),
+    Format("tdms", "TDMS file", (".tdms",), lambda head, _path: head.startswith(b"TDSm"), read_tdms),
+)

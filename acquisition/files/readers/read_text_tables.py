@@ -174,12 +174,6 @@ def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[
     return Contents(signals, n_averages, created, direction, tool, window=keys.get("window", ""))
 
 
-_TABLE_EXTENSIONS = (".csv", ".txt", ".frf", ".dat", ".asc")
-TEXT_TABLE_FORMAT = Format(
-    "table", "text table", _TABLE_EXTENSIONS, lambda head, _path: is_text(head), read_table, read_from=read_table
-)
-
-
 PULSE_MAGIC = "Header Size:"
 _PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), ("M", "%m"), ("dd", "%d"), ("d", "%d"))
 
@@ -188,7 +182,8 @@ def read_pulse(path: Path) -> Contents:
     """Read the function of every block; raise DataError where it is cut short or its header states too little."""
     lines, _ = number_lines(read_text(path), 0)
     blocks = _find_pulse_blocks(lines)
-    header = _parse_pulse_header(lines.texts[: blocks[0][0]]) if blocks else {}
+    pairs = (line.partition(":") for line in (lines.texts[: blocks[0][0]] if blocks else []))
+    header = {key.strip().lower(): value.strip() for key, _, value in pairs if value.strip()}
     try:
         is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
         form, sign = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
@@ -218,12 +213,6 @@ def _find_pulse_blocks(lines: NumberedLines) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _parse_pulse_header(lines: Sequence[str]) -> dict[str, str]:
-    """Return the values by their keys in lower case."""
-    parts = (line.partition(":") for line in lines)
-    return {key.strip().lower(): value.strip() for key, _, value in parts if value.strip()}
-
-
 def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
     function = header.get("function", "").lower()
     if "response" in function:
@@ -244,4 +233,13 @@ def _is_pulse(head: bytes, _path: Path) -> bool:
     return decode_text(head).startswith(PULSE_MAGIC)
 
 
-PULSE_FORMAT = Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse)
+def _is_table(head: bytes, _path: Path) -> bool:
+    return is_text(head)
+
+
+_TABLE_EXTENSIONS = (".csv", ".txt", ".frf", ".dat", ".asc")
+TEXT_FORMATS = (
+    Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse),
+    Format("table", "text table", _TABLE_EXTENSIONS, _is_table, read_table, read_from=read_table),
+)
+"""Formats of text; the table is last because it takes any text."""

@@ -32,8 +32,7 @@ from .estimation.frf_corrections import (
     remove_sensor_mass,
 )
 from .file_io import atomic_write
-from .files.contents.contents import Contents, Format, Signal
-from .files.contents.description import Description, Fact
+from .files.contents.contents import Contents, Description, Fact, Format, Signal
 from .files.contents.recording import Recording
 from .files.contents.units import STANDARD_GRAVITY
 from .files.convert import Conversion, convert

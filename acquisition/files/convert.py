@@ -13,8 +13,7 @@ import numpy as np
 from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
 from acquisition.file_io import atomic_write
-from acquisition.files.contents.contents import format_window
-from acquisition.files.contents.description import Description
+from acquisition.files.contents.contents import Description, format_window
 from acquisition.files.contents.recording import Recording
 from acquisition.files.read_recording import inspect_file, read_frf
 from acquisition.frf import Frf
@@ -48,8 +47,7 @@ FRF_UNITS = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
 
 def convert_to_measured_form(frf: Frf) -> tuple[Complexes, str]:
     """Return the values of an FRF in the form that was measured, which keeps them exact, and their unit."""
-    values = {"receptance": frf.receptance, "mobility": frf.mobility, "accelerance": frf.accelerance}
-    return values[frf.measured_as], FRF_UNITS[frf.measured_as]
+    return getattr(frf, frf.measured_as), FRF_UNITS[frf.measured_as]
 
 
 def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:

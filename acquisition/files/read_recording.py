@@ -10,8 +10,7 @@ from pathlib import Path
 
 from acquisition.errors import DataError, Remark
 from acquisition.file_io import open_regular_file
-from acquisition.files.contents.contents import Contents, Format, append_force_signals
-from acquisition.files.contents.description import Description, Fact
+from acquisition.files.contents.contents import Contents, Description, Fact, Format, append_force_signals
 from acquisition.files.contents.recording import Recording, resolve_recording
 from acquisition.files.readers.read_arrays import ARRAY_FORMATS, MAT_FORMAT
 from acquisition.files.readers.read_audio import AUDIO_FORMAT
@@ -228,9 +227,8 @@ def detect_format(path: Path) -> Format:
             reason = format_exception_line(error)
             _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, reason)
     titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
-    raise DataError(
-        f"{path}: of no format that is known here; export it as one of these: {titles}{_describe_broken_formats()}"
-    )
+    fault = f"of no format that is known here; export it as one of these: {titles}"
+    raise DataError(f"{path}: {fault}{_describe_broken_formats()}")
 
 
 def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:

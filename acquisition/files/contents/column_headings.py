@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import cast, get_args
 
-from acquisition.files.contents.contents import FrfRole, Role, Signal
-from acquisition.files.contents.description import ImportReport
+from acquisition.files.contents.contents import FrfRole, ImportReport, Role, Signal
 from acquisition.files.contents.units import VOLTAGE_UNITS, get_motion, parse_unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")

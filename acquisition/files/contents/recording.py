@@ -9,8 +9,7 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
-from acquisition.files.contents.contents import Contents, Signal, parse_time_constant
-from acquisition.files.contents.description import Description, Fact, ImportReport
+from acquisition.files.contents.contents import Contents, Description, Fact, ImportReport, Signal, parse_time_constant
 from acquisition.files.contents.resolve_frf import FRF_COLUMNS_EXAMPLE, find_frf_candidates, resolve_frf
 from acquisition.files.contents.resolve_hits import HIT_COLUMNS_EXAMPLE, resolve_hits
 from acquisition.frf import Frf

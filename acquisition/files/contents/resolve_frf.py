@@ -11,8 +11,7 @@ import numpy as np
 
 from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
-from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
-from acquisition.files.contents.description import ImportReport
+from acquisition.files.contents.contents import Contents, ImportReport, Signal, cut_to_shortest, has_same_axis
 from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
 from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
@@ -52,7 +51,7 @@ def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
     unit = report.attempt(resolve_frf_unit, parts[0])
     frequency = report.attempt(_resolve_frequency, contents, parts, axes)
     shares = _resolve_coherence(used[-1] if coherence else None, report)
-    report_flaws(parts, report, int(frequency is None or frequency[0] == 0))
+    report.add_flaws(parts, int(frequency is None or frequency[0] == 0))
     if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
@@ -112,7 +111,7 @@ def _resolve_frequency(
     axis = next((signal for signal in axes if signal.values.size == frf[0].values.size), None)
     if axis is None:
         return _make_even_frequency(contents.signals, frf, report)
-    report_flaws([axis], report)
+    report.add_flaws([axis])
     if report.description.spacing is not None or report.description.start is not None:
         fault = f"the file holds its frequencies, {axis.name}; leave them out"
         raise report.add_fault(f"Description.spacing, Description.start: {fault}")

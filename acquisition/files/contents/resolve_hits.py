@@ -9,8 +9,7 @@ import numpy as np
 from acquisition.arrays import Floats
 from acquisition.files.contents import resolve_unit
 from acquisition.files.contents.column_headings import format_signal_names
-from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, report_flaws
-from acquisition.files.contents.description import ImportReport, UnresolvedError
+from acquisition.files.contents.contents import Contents, ImportReport, Signal, UnresolvedError, cut_to_shortest
 from acquisition.files.contents.units import MOTION_QUANTITIES, STANDARD_GRAVITY, parse_unit
 from acquisition.hit import Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
@@ -149,7 +148,7 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
         report.add_fault(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
         return 0.0, used
     times = [time for time in times if time.values.size == of_one_length[0].values.size]
-    report_flaws([*used, *times], report)
+    report.add_flaws([*used, *times])
     by_axis = _compute_rate_from_time(times, report)
     return _agree_on_rate(rates[0] if rates else by_axis, report), used
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import cast
 
 from acquisition.files.contents.column_headings import format_signal_names, is_decibel, parse_decibel_reference
-from acquisition.files.contents.contents import Signal
-from acquisition.files.contents.description import ImportReport, Origin, UnresolvedError
+from acquisition.files.contents.contents import ImportReport, Origin, Signal, UnresolvedError
 from acquisition.files.contents.units import MOTION_QUANTITIES, VOLTAGE_UNITS, Unit, get_motion, parse_unit
 
 _SENSITIVITY_PATTERN = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ]+)\s*(?:/|per)\s*(.+?)\s*")

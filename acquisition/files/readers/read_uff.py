@@ -6,7 +6,7 @@ Cincinnati, SDRL).
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -121,8 +121,7 @@ def _make_function(lines: list[str], abscissa: Floats, step: float, values: Floa
     exact = function.keys.get("step")
     if exact and step and abs(float(exact) / step - 1) < 1e-4:
         start = float(function.keys.get("start", abscissa[0]))
-        object.__setattr__(function, "abscissa", start + float(exact) * np.arange(values.size))
-        object.__setattr__(function, "step", float(exact))
+        return replace(function, abscissa=start + float(exact) * np.arange(values.size), step=float(exact))
     return function
 
 

@@ -36,6 +36,12 @@ class ExportLabels:
     """Window over the response: "exponential 0.05 s"."""
 
     @property
+    def texts(self) -> dict[str, str]:
+        """Time, direction, tool and window by the names in files."""
+        recorded = self.created.isoformat() if self.created else ""
+        return {"recorded": recorded, "direction": self.direction, "tool": self.tool, "window": self.window}
+
+    @property
     def plain_tool(self) -> str:
         """Name of the tool without line ends and semicolons."""
         return " ".join(self.tool.replace(";", ",").split())
@@ -69,15 +75,9 @@ def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
 
 
 def _encode_table(columns: dict[str, Floats], labels: ExportLabels, averages: int | None = None) -> bytes:
-    keys = {
-        "written by": "lobewatch",
-        "recorded": labels.created.isoformat() if labels.created else "",
-        "direction": labels.direction,
-        "tool": labels.plain_tool,
-        "window": labels.window.replace("none", ""),
-        "averages": "" if averages is None else str(averages),
-        "rows": str(next(iter(columns.values())).size),
-    }
+    keys = {"written by": "lobewatch", **labels.texts, "tool": labels.plain_tool}
+    keys["window"] = labels.window.replace("none", "")
+    keys |= {"averages": str(averages or ""), "rows": str(next(iter(columns.values())).size)}
     lines = [f"# {key}: {value}" for key, value in keys.items() if value]
     lines.append(",".join(columns))
     lines += [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
@@ -104,11 +104,8 @@ def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
 def _encode_mat(variables: dict[str, Any], labels: ExportLabels) -> bytes:
     import scipy.io  # it takes a while, and few files need it
 
-    recorded = labels.created.isoformat() if labels.created else ""
-    texts = {"written_by": "lobewatch", "recorded": recorded, "direction": labels.direction}
-    texts |= {"tool": labels.tool, "window": labels.window}
     buffer = io.BytesIO()
-    scipy.io.savemat(buffer, texts | variables, oned_as="column")
+    scipy.io.savemat(buffer, {"written_by": "lobewatch", **labels.texts, **variables}, oned_as="column")
     return buffer.getvalue()
 
 

@@ -244,10 +244,8 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
     machine, tool, operator = (str(file.attrs[name]) for name in ("machine", "tool", "operator"))
-    direction = parse_direction(str(file.attrs["direction"]))
-    created = datetime.fromisoformat(file.attrs["created"])
-    device = str(file.attrs.get("device", ""))
-    text = file["machine_toml"][()].decode()
+    direction, created = parse_direction(str(file.attrs["direction"])), datetime.fromisoformat(file.attrs["created"])
+    text, device = file["machine_toml"][()].decode(), str(file.attrs.get("device", ""))
     under = Conditions.from_mapping(raw_hits.convert_to_plain(file.attrs))  # none in the first files
     return Circumstances(machine, created, tool, direction, operator, text, device, under)
 

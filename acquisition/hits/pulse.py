@@ -82,20 +82,17 @@ def count_pre_hit_samples(hit: Hit) -> int:
     if hit.pre_trigger:
         return hit.pre_trigger
     if hit not in _pre_hit_counts:
-        has_force = hit.has_force
-        _pre_hit_counts[hit] = _count_before_force(hit.force) if has_force else _count_before_response(hit.acceleration)
+        _pre_hit_counts[hit] = _find_rise(hit)
     return _pre_hit_counts[hit]
 
 
-def _count_before_force(force: Floats) -> int:
-    above = force[: int(np.argmax(force)) + 1] - np.median(force)
+def _find_rise(hit: Hit) -> int:
+    if not hit.has_force:
+        size = np.abs(hit.acceleration - np.median(hit.acceleration))
+        return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
-
-
-def _count_before_response(response: Floats) -> int:
-    size = np.abs(response - np.median(response))
-    return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
 
 
 _pre_hit_counts: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()

@@ -68,14 +68,8 @@ def parse_unit(text: str) -> Unit | None:
 
     Hz, rad/s and rpm are frequencies, in Hz; g is standard gravity.
     """
-    plain = (
-        re.sub(r"_?\bper\b_?|_per_", "/", text.strip())
-        .replace("⁻", "-")
-        .translate(_ASCII_EQUIVALENTS)
-        .replace("-^", "^-")
-        .replace("**", "^")
-    )
-    plain = _METERS_PER_SECOND.sub(r"m/s^\1", plain)
+    plain = re.sub(r"_?\bper\b_?|_per_", "/", text.strip()).replace("⁻", "-").translate(_ASCII_EQUIVALENTS)
+    plain = _METERS_PER_SECOND.sub(r"m/s^\1", plain.replace("-^", "^-").replace("**", "^"))
     plain = "rpm" if _TURNS_PER_MINUTE.fullmatch(plain) else plain
     try:
         tokens = _tokenize(plain)

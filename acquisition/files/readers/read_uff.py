@@ -120,8 +120,8 @@ def _make_function(lines: list[str], abscissa: Floats, step: float, values: Floa
     function = UffFunction(tuple(lines[1:6]), int(six[:5]), name, *points, abscissa, step, values, *axes)
     exact = function.keys.get("step")
     if exact and step and abs(float(exact) / step - 1) < 1e-4:
-        start = float(function.keys.get("start", abscissa[0]))
-        return replace(function, abscissa=start + float(exact) * np.arange(values.size), step=float(exact))
+        even = float(exact) * np.arange(values.size, dtype=np.float64)
+        return replace(function, abscissa=float(function.keys.get("start", abscissa[0])) + even, step=float(exact))
     return function
 
 

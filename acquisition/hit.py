@@ -90,7 +90,7 @@ class Hit:
             Sample rate (Hz).
         pre_trigger
             Number of samples before the trigger.
-        **fields
+        fields
             Other fields of the hit: `lost_scans`, `overload`, `cross_hit`.
         """
         raw = np.asarray(codes, dtype=np.int32)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import enum
 from collections import deque
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ class DeviceAddress:
     """Description by the operating system."""
 
 
-class Device(Source, AbstractContextManager["Device"], Protocol):
+class Device(Source, Protocol):
     """Connected source that reports its identity and state. A context manager."""
 
     sample_rate: float
@@ -126,3 +126,9 @@ class Device(Source, AbstractContextManager["Device"], Protocol):
 
     def close(self) -> None:
         """Stop, and release the port."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...

@@ -3,8 +3,6 @@
 A format is the record of functions that read such a file.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re
@@ -145,7 +143,7 @@ class ImportReport:
         except UnresolvedError:
             return None
 
-    def merge(self, other: ImportReport) -> None:
+    def merge(self, other: "ImportReport") -> None:
         """Add all entries of another report."""
         self.facts += other.facts
         self.missing += other.missing
@@ -155,7 +153,7 @@ class ImportReport:
         """Add the fault of a field that differs from the file."""
         return self.reject(field_name, given, f"the file says {in_file}; leave the option out")
 
-    def add_flaws(self, used: Sequence[Signal], first: int = 0) -> None:
+    def add_flaws(self, used: Sequence["Signal"], first: int = 0) -> None:
         """Add a fault for each column with a flaw from this index on."""
         for column in used:
             if flaw := next((flaw for i, flaw in column.flaws.items() if first <= i < _count_values(column)), ""):

@@ -24,13 +24,15 @@ from .estimation.frf_corrections import (
     apply_exponential_window,
     correct_windowed_receptance,
     find_hit_time,
+    infer_averages,
+    infer_recorded_share,
+    infer_window,
+    is_smoothed,
     measure_time_after_hit,
     remove_sensor_mass,
 )
-from .estimation.infer_processing import infer_averages, infer_recorded_share, infer_window, is_smoothed
 from .file_io import atomic_write
-from .files.contents.contents import Contents, Format, Signal
-from .files.contents.description import Description, Fact
+from .files.contents.contents import Contents, Description, Fact, Format, Signal
 from .files.contents.recording import Recording
 from .files.contents.units import STANDARD_GRAVITY
 from .files.convert import Conversion, convert

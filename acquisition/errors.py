@@ -13,13 +13,9 @@ from dataclasses import dataclass, replace
 
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
 """Error numbers of a place without write permission or without any."""
-DISK_FULL_REMEDY = "make room on that disk"
-TOO_MANY_FILES_REMEDY = "close other programs, too many files are open"
 REMEDY_BY_ERRNO = {
-    errno.ENOSPC: DISK_FULL_REMEDY,
-    errno.EDQUOT: DISK_FULL_REMEDY,
-    errno.EMFILE: TOO_MANY_FILES_REMEDY,
-    errno.ENFILE: TOO_MANY_FILES_REMEDY,
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room on that disk"),
+    **dict.fromkeys((errno.EMFILE, errno.ENFILE), "close other programs, too many files are open"),
     errno.ESTALE: "the network drive has lost it: mount it anew, then give the same command again",
     errno.EIO: "the disk fails: copy the folder to another one",
 }

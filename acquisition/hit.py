@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from acquisition.arrays import Codes, Floats
 from acquisition.channel import Channel, ChannelQuantity
@@ -76,14 +76,7 @@ class Hit:
 
     @classmethod
     def from_codes(
-        cls,
-        codes: ArrayLike,
-        channels: tuple[Channel, ...],
-        sample_rate: float,
-        pre_trigger: int = 0,
-        lost_scans: int = 0,
-        overload: int = 0,
-        cross_hit: Hit | None = None,
+        cls, codes: ArrayLike, channels: tuple[Channel, ...], sample_rate: float, pre_trigger: int = 0, **fields: Any
     ) -> Hit:
         """Return a hit from ADC codes, scaled by the sensitivities of its channels.
 
@@ -97,17 +90,13 @@ class Hit:
             Sample rate (Hz).
         pre_trigger
             Number of samples before the trigger.
-        lost_scans
-            Number of scans missing inside the record.
-        overload
-            Overloads that the device reports, a bit per row.
-        cross_hit
-            Same impact as a second sensor measured it.
+        fields
+            Other fields of the hit: `lost_scans`, `overload`, `cross_hit`.
         """
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
-        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, cross_hit)
+        return cls(force, response, sample_rate, pre_trigger, channels=channels, codes=raw, **fields)
 
     @property
     def has_force(self) -> bool:
@@ -144,7 +133,8 @@ class TapInputs:
     def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
         """Select the inputs of a tap test in one direction.
 
-        A hit in x is also recorded by a second sensor along y, if there is one. It comes before the last input.
+        Of several responses that of the direction is used, of "xy" that of y. A hit in x is also recorded by a second
+        sensor along y, if there is one. It comes before the last input.
 
         Parameters
         ----------
@@ -160,19 +150,23 @@ class TapInputs:
         DataError
             Where the needed inputs do not exist.
         """
-        first, *last = select_input_channels(channels, quantity, direction)
-        kinds = [(channel.quantity, channel.direction) for channel in channels]
-        cross = [i for i, kind in enumerate(kinds) if kind == ("acceleration", "y") and i not in last]
-        rows = (first, *(cross[:1] if direction == "x" and last else ()), *last)
+        forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
+        found = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
+        axis, several = direction[-1:] or "x", len(found) > 1
+        responses = [i for i in found if not several or (direction and channels[i].direction == axis)]
+        if len(responses) != 1 or (quantity == "force" and len(forces) != 1):
+            listed = ", ".join(channel.name for channel in channels) or "nothing"
+            needed = "one force and one acceleration channel are needed"
+            if quantity == "acceleration":
+                needed = "one acceleration channel is needed to tap without a force sensor"
+            which = f', of several that with direction = "{axis}"' if several else ""
+            raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
+        cross = [i for i in found if direction == "x" and channels[i].direction == "y" and i not in responses]
+        rows = (*forces, *cross[:1], *responses) if quantity == "force" else (*responses,)
         return cls(rows, tuple(channels[row] for row in rows))
 
     def make_hit(
-        self,
-        codes: NDArray[np.integer[Any]],
-        sample_rate: float,
-        pre_trigger: int = 0,
-        lost_scans: int = 0,
-        overload: int = 0,
+        self, codes: Codes, sample_rate: float, pre_trigger: int = 0, lost_scans: int = 0, overload: int = 0
     ) -> Hit:
         """Return the hit of some ADC codes.
 
@@ -194,30 +188,8 @@ class TapInputs:
             rows = [0, response] if len(self.rows) > 1 else [response]
             mask = (overload >> response & 1) << 1 | (overload & 1 if len(rows) > 1 else 0)
             sensors = tuple(self.channels[row] for row in rows)
-            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, cross_hit)
+            more = {"lost_scans": lost_scans, "overload": mask, "cross_hit": cross_hit}
+            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, **more)
 
         last = len(self.rows) - 1
         return make_of(last, make_of(1) if last > 1 else None)
-
-
-def select_input_channels(
-    channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
-) -> tuple[int, ...]:
-    """Return the index of the force channel and of the acceleration channel; only the latter where it triggers.
-
-    direction: of the hit. With several accelerations, that of this direction is used (of "xy", that of y). Raises
-    DataError unless there is exactly one of each that is needed.
-    """
-    forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
-    responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
-    several, axis = len(responses) > 1, direction[-1:] or "x"
-    if several:
-        responses = [i for i in responses if direction and channels[i].direction == axis]
-    if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
-        return (*forces, *responses) if quantity == "force" else (*responses,)
-    listed = ", ".join(channel.name for channel in channels) or "nothing"
-    needed = "one force and one acceleration channel are needed"
-    if quantity == "acceleration":
-        needed = "one acceleration channel is needed to tap without a force sensor"
-    which = f', of several that with direction = "{axis}"' if several else ""
-    raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")

@@ -73,9 +73,8 @@ def estimate_frf_from_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: 
         "Hv": lambda: np.sqrt(_divide_where_excited(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
     }
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    coherence = (
-        np.minimum(_divide_where_excited(np.abs(s_fx) ** 2, s_ff * s_xx, excited), 1.0) if len(hits) > 1 else None
-    )
+    shares = _divide_where_excited(np.abs(s_fx) ** 2, s_ff * s_xx, excited) if len(hits) > 1 else None
+    coherence = None if shares is None else np.minimum(shares, 1.0)
     return from_accelerance(frequency, forms[estimator](), coherence, len(hits), find_usable_band(frequency, s_ff))
 
 
@@ -229,10 +228,8 @@ class RunningMean:
         """
         size = hit.acceleration.size
         if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
-            raise ValueError(
-                f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
-                f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
-            )
+            mean = f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
+            raise ValueError(f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of {mean}")
         if not hit.has_force:
             self.hits = (*self.hits, hit)
             return

@@ -16,14 +16,7 @@ from acquisition.arrays import Codes, Flags, Floats
 from acquisition.channel import Channel
 from acquisition.errors import DataError
 from acquisition.file_io import atomic_write, read_regular_file
-from acquisition.files.hdf5_file import (
-    HDF5_SIGNATURE,
-    append_checksum,
-    check_unpacked_size,
-    has_valid_checksum,
-    open_hdf5,
-)
-from acquisition.files.raw_hits import HDF5_COMPRESSION, choose_code_type, read_channel, write_channel, write_dataset
+from acquisition.files import hdf5_file, raw_hits
 
 if TYPE_CHECKING:
     import h5py
@@ -98,25 +91,25 @@ def _find_runs_of_three(extreme: Flags) -> Flags:
 def is_cut_file(path: Path) -> bool:
     """Return whether a file is a recorded cut of lobewatch, even a damaged one."""
     content = read_regular_file(path)
-    return content.startswith(HDF5_SIGNATURE) and CUT_FORMAT_NAME.encode() in content
+    return content.startswith(hdf5_file.HDF5_SIGNATURE) and CUT_FORMAT_NAME.encode() in content
 
 
 def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:
     """Write a recorded cut with what is known of it (JSON); return the bytes, which are then on the disk."""
     memory = io.BytesIO()
-    with open_hdf5(memory, "w") as file:
+    with hdf5_file.open_hdf5(memory, "w") as file:
         file.attrs.update(format=CUT_FORMAT_NAME, version=CUT_FORMAT_VERSION, sample_rate_hz=signal.sample_rate)
         file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
         if signal.codes is not None and signal.channel is not None:
-            codes = signal.codes.astype(choose_code_type([signal.channel]))
+            codes = signal.codes.astype(raw_hits.choose_code_type([signal.channel]))
             _write_compressed(file, "codes", codes, "ADC code")
-            write_channel(file["codes"].attrs, signal.channel)
+            raw_hits.write_channel(file["codes"].attrs, signal.channel)
         else:
             _write_compressed(file, "acceleration", signal.acceleration, "m/s^2")
         if signal.speed_rpm is not None:
             _write_compressed(file, "speed", signal.speed_rpm, "rpm")
-    content = append_checksum(memory.getvalue())
+    content = hdf5_file.append_checksum(memory.getvalue())
     atomic_write(path, content)
     return content
 
@@ -124,13 +117,13 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
 def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
     """Read what `write_cut_signal` wrote; raise DataError for another or a damaged file."""
     content = read_regular_file(path)
-    if not has_valid_checksum(content):  # HDF5 could hang on it
+    if not hdf5_file.has_valid_checksum(content):  # HDF5 could hang on it
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        with open_hdf5(io.BytesIO(content), "r") as file:
+        with hdf5_file.open_hdf5(io.BytesIO(content), "r") as file:
             if file.attrs.get("format") != CUT_FORMAT_NAME or int(file.attrs["version"]) > CUT_FORMAT_VERSION:
                 raise DataError(f"{path}: no recording of a cut that this lobewatch reads")
-            check_unpacked_size(file, len(content), path)
+            hdf5_file.check_unpacked_size(file, len(content), path)
             return _read_signal(file), json.loads(file["about"][()])
     except (OSError, KeyError) as error:
         raise DataError(f"{path}: no readable recording of a cut ({error}); take it again from a backup") from error
@@ -143,10 +136,11 @@ def _read_signal(file: h5py.File) -> CutSignal:
         sensor = str(file.attrs.get("sensor", "accelerometer"))
         speed = file["speed"][()] if "speed" in file else None
         return CutSignal(file["acceleration"][()], rate, None, None, lost, overload, sensor, speed)
-    channel = read_channel(file["codes"].attrs)
+    channel = raw_hits.read_channel(file["codes"].attrs)
     codes = file["codes"][()].astype(np.int32)
     return CutSignal(codes * channel.scale, rate, codes, channel, lost, overload)
 
 
 def _write_compressed(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
-    write_dataset(file, name, values, unit, **HDF5_COMPRESSION | {"chunks": True} if values.size else {})
+    options = raw_hits.HDF5_COMPRESSION | {"chunks": True} if values.size else {}
+    raw_hits.write_dataset(file, name, values, unit, **options)

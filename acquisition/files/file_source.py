@@ -94,18 +94,16 @@ class FileSource(ClosedOnExit):
         """Yield blocks without their index."""
         pause = round(REPLAY_QUIET_TIME * self.sample_rate)
         for hit in self._hits:
-            codes = self._codes(hit)
+            codes = hit.codes
+            if codes is None:
+                coded = zip(self.channels, hit.signals, strict=True)
+                codes = np.stack([channel.encode(values) for channel, values in coded])
             quiet = _extract_quiet_scans(hit, codes)
             yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
             middle = codes.shape[1] // 2
             yield from _split_blocks(codes[:, :middle], hit.overload)
             yield from _split_blocks(codes[:, middle:], hit.overload, hit.lost_scans)
         yield from _split_blocks(np.resize(quiet, (pause, len(self.channels))).T)
-
-    def _codes(self, hit: Hit) -> Codes:
-        if hit.codes is not None:
-            return hit.codes
-        return np.stack([channel.encode(values) for channel, values in zip(self.channels, hit.signals, strict=True)])
 
 
 def _make_channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:

@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from acquisition.errors import DataError
 
@@ -32,24 +32,32 @@ MAX_UNPACKED_RATIO = 20
 
 def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
     """Raise DataError for a file of `packed` bytes whose data sets are too large; no data set is read."""
-    import h5py  # here already: the file is open
-
     sizes: list[int] = []
     try:
-        file.visititems(
-            lambda _, node: sizes.append(_measure_unpacked_size(node)) if isinstance(node, h5py.Dataset) else None
-        )
+        file.visititems(lambda _, node: sizes.append(_measure_unpacked_size(node)))
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
-    if sum(sizes) > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
+    if sum(sizes) > get_unpacked_limit(packed):
         limits = f"at most {MIN_UNPACKED_LIMIT / 1e6:g} MB or {MAX_UNPACKED_RATIO} times the file are read"
         fault = f"{packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; {limits}; no tap test is like that"
         raise DataError(f"{path}: {fault}: take it again from where it was recorded")
 
 
-def _measure_unpacked_size(data: h5py.Dataset) -> int:
-    """Return the size in memory (bytes), in whole chunks as they are unpacked."""
-    if data.shape is None:
+def get_unpacked_limit(packed: int) -> int:
+    """Return the largest unpacked size of a file (bytes)."""
+    return max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed)
+
+
+def check_unpacked_ratio(unpacked: int, path: Path) -> None:
+    """Raise DataError for a file that unpacks to too many bytes."""
+    packed = path.stat().st_size
+    if unpacked > get_unpacked_limit(packed):
+        raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
+
+
+def _measure_unpacked_size(data: Any) -> int:
+    """Return the size of a data set in memory (bytes), in whole chunks as they are unpacked; 0 of other nodes."""
+    if getattr(data, "shape", None) is None:
         return 0
     chunks = data.chunks or (1,) * len(data.shape)
     length = math.prod(math.ceil(n / chunk) * chunk for n, chunk in zip(data.shape, chunks, strict=True))

@@ -100,11 +100,12 @@ def read_raw_hits(file: h5py.Group) -> tuple[tuple[Hit, ...], tuple[HitFlags, ..
     lost = raw["lost_scans"][()].tolist()
     overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
     flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
+    states = [{"lost_scans": n, "overload": mask} for n, mask in zip(lost, overload, strict=True)]
+    rows = raw["codes" if "codes" in raw else "samples"][()]
     if "codes" in raw:
-        rows = raw["codes"][()]
         channels = tuple(read_channel(raw[f"channel_{i}"].attrs) for i in range(rows.shape[1]))
-        coded = zip(rows, lost, overload, strict=True)
-        return tuple(Hit.from_codes(codes, channels, rate, before, n, mask) for codes, n, mask in coded), flags
-    sampled = zip(raw["samples"][()], lost, overload, strict=True)
-    forces = ((signals, signals[0] if len(signals) > 1 else np.empty(0), n, mask) for signals, n, mask in sampled)
-    return tuple(Hit(force, signals[-1], rate, before, n, overload=mask) for signals, force, n, mask in forces), flags
+        coded = zip(rows, states, strict=True)
+        return tuple(Hit.from_codes(codes, channels, rate, before, **state) for codes, state in coded), flags
+    forces = rows[:, 0] if rows.shape[1] > 1 else rows[:, :0, 0]
+    sampled = zip(forces, rows[:, -1], states, strict=True)
+    return tuple(Hit(force, response, rate, before, **state) for force, response, state in sampled), flags

@@ -1,19 +1,136 @@
-"""Read the recording of a cut by accelerometers or a microphone."""
+"""Read the recording of a cut by accelerometers or a microphone, and of its spindle speed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.arrays import Floats
 from acquisition.errors import DataError
-from acquisition.files.contents.column_headings import assign_columns, format_signal_names
-from acquisition.files.contents.contents import Contents, Signal
-from acquisition.files.contents.description import Description, ImportReport
+from acquisition.files.contents.column_headings import assign_columns, find_column, format_signal_names
+from acquisition.files.contents.contents import Contents, Description, ImportReport, Signal
 from acquisition.files.contents.resolve_hits import apply_full_scale, infer_kind, resolve_rate
 from acquisition.files.contents.resolve_unit import choose_signal, convert_to_sensor_units, resolve_response_unit
-from acquisition.files.contents.spindle_speed import resolve_speed, split_speed_column
+from acquisition.files.contents.units import parse_unit
 from acquisition.files.cut_file import CutSignal, is_cut_file, read_cut_signal
 from acquisition.files.read_recording import EMPTY_DESCRIPTION, detect_format, read_contents
+
+PULSE_ON_LEVEL, PULSE_OFF_LEVEL = 0.6, 0.4
+"""Levels of the signal, as shares of its range, above which a pulse begins and below which it ends; chosen."""
+MAX_TURN_RATIO = 1.4
+"""Ratio of the time of a turn to that of its neighbours, or its inverse, from which pulses are missing or too many."""
+MIN_REGULAR_TURNS_SHARE = 0.8
+"""Smallest share of turns that are as long as their neighbours."""
+NEIGHBOR_TURNS = 5
+"""Number of turns on each side to compare with."""
+_TACHOMETER_QUESTION = "is the tachometer connected, and is this its column?"
+
+
+def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
+    """Return the spindle speed at each sample (rpm), shape (n,), from a tachometer signal of any unit, shape (n,).
+
+    The speed is constant from one turn to the next. It is NaN before the first turn, after the last, and where a pulse
+    is missing. Its mean over time is the number of turns over their time.
+
+    Parameters
+    ----------
+    signal : ndarray, shape (n,)
+        Signal of the tachometer in any unit.
+    sample_rate
+        Sample rate (Hz).
+    pulses
+        Number of pulses per turn.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Spindle speed (rpm).
+
+    Raises
+    ------
+    ValueError
+        For less than two turns, for irregular pulses, and for pulses < 1.
+
+    Examples
+    --------
+    A pulse of 2 ms every 20 ms.
+
+    >>> pulse = np.where(np.arange(2000) % 200 < 20, 5.0, 0.0)
+    >>> np.unique(compute_speed_from_pulses(pulse, 10e3)[200:1600].round(3)).tolist()
+    [3000.0]
+    """
+    if pulses < 1:
+        raise ValueError(f"{pulses} pulses a turn; give 1 or more")
+    begins = _find_rising_edges(signal)
+    marks = begins[::pulses]
+    if marks.size < 3:
+        found = f"{begins.size} pulses in {signal.size / sample_rate:.3g} s, less than two turns of {pulses}"
+        raise ValueError(f"{found}; {_TACHOMETER_QUESTION}")
+    turn = np.diff(marks)
+    usual = np.array([np.median(turn[max(i - NEIGHBOR_TURNS, 0) : i + NEIGHBOR_TURNS + 1]) for i in range(turn.size)])
+    is_even = np.maximum(turn / usual, usual / turn) < MAX_TURN_RATIO
+    if np.mean(is_even) < MIN_REGULAR_TURNS_SHARE:
+        raise ValueError(f"{begins.size} pulses at no even times; {_TACHOMETER_QUESTION}")
+    speed = np.full(signal.size, np.nan)
+    edges = np.ceil(marks).astype(int)
+    for first, last, time in zip(edges[:-1][is_even], edges[1:][is_even], turn[is_even], strict=True):
+        speed[first:last] = 60 * sample_rate / time
+    return speed
+
+
+def _find_rising_edges(signal: Floats) -> Floats:
+    """Find the starts of pulses, in samples and fractions of them."""
+    low, high = float(np.min(signal)), float(np.max(signal))
+    if not high > low:
+        return np.empty(0)
+    level = (signal - low) / (high - low)
+    state = np.where(level > PULSE_ON_LEVEL, 1, np.where(level < PULSE_OFF_LEVEL, -1, 0))
+    known = np.flatnonzero(state)
+    rises = (state[known[1:]] > 0) & (state[known[:-1]] < 0)
+    after, before = known[1:][rises], known[:-1][rises]
+    share = (PULSE_ON_LEVEL - level[before]) / (level[after] - level[before])
+    return np.asarray(before + share * (after - before), dtype=np.float64)
+
+
+SPEED_ROLES = ("speed", "tacho")
+"""Roles of a column of the spindle speed."""
+
+
+def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple[list[Signal], Signal | None]:
+    """Return the signals without the spindle speed, and the signal of the speed; None without one."""
+    columns, pulses = [signal for signal in signals if signal.role in SPEED_ROLES], report.description.pulses
+    if report.description.tacho:
+        named = report.attempt(find_column, signals, report.description.tacho, "tacho")
+        columns = [] if named is None else [named]
+    if len(columns) > 1:
+        names = " and ".join(signal.name for signal in columns)
+        report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
+    rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
+    if pulses is not None and not columns:
+        report.reject("pulses", pulses, "no column is a tachometer; name it with Description.tacho")
+    return rest, columns[0] if columns else None
+
+
+def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> Floats:
+    """Return the spindle speed at each sample (rpm), NaN where unknown."""
+    unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
+    pulses = report.description.pulses
+    if unit is None or unit.quantity != "frequency":
+        if signal.role == "speed":
+            example = f' "speed [rpm]={signal.name}"'
+            raise report.add_missing(f"the unit of the speed in {signal.name}", "columns", example)
+        try:
+            return compute_speed_from_pulses(values, sample_rate, 1 if pulses is None else pulses)
+        except ValueError as error:
+            raise report.add_fault(f"{signal.name}: {error}") from error
+    speed = np.abs(values) * (60 * unit.factor)
+    if pulses is not None:
+        raise report.reject("pulses", pulses, f"{signal.name} is the speed itself ({signal.unit}); leave it out")
+    if not np.any(speed > 0):
+        fault = f"stands at 0 {signal.unit} all along; name another column, or leave it out"
+        raise report.add_fault(f"{signal.name}: {fault}")
+    return np.where(speed > 0, speed, np.nan)
+
 
 CUT_COLUMNS_EXAMPLE = ' "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
 """Example of the columns of a cut."""
@@ -35,9 +152,9 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
     contents = read_contents(file_format, path, description)
     if not isinstance(contents, Contents):
         raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
-    report = ImportReport()
-    signals = resolve_cut_signals(contents, description, report)
-    if signals is None or not report.is_clean:
+    report = ImportReport(description)
+    signals = report.attempt(_resolve_cut_signals, contents)
+    if signals is None:
         raise DataError(f"{path}: {report.format_problems()}")
     values, rate, speed = signals
     if not np.all(np.isfinite(values)):
@@ -45,51 +162,41 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
     return CutSignal(values, rate, sensor=description.sensor, speed_rpm=speed)
 
 
-def resolve_cut_signals(
-    contents: Contents, description: Description, report: ImportReport
-) -> tuple[Floats, float, Floats | None] | None:
+def _resolve_cut_signals(contents: Contents, report: ImportReport) -> tuple[Floats, float, Floats | None]:
     """Return signal, sample rate (Hz) and spindle speed (rpm, shape (n,), None without one) of a cut.
 
     The signal is an acceleration (m/s^2), or what a microphone recorded: shape (n,), or (responses, n) where there are
-    several and the description chooses none. None where the report says what is missing or wrong.
+    several and the description chooses none.
     """
-    named = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
-    signals, speed_signal = split_speed_column(named, description, report)
+    description = report.description
+    signals, speed_signal = split_speed_column(assign_columns(contents.signals, report), report)
     is_microphone = description.sensor == MICROPHONE_SENSOR
     needs_scale = not is_microphone or description.full_scale
-    full_scale = apply_full_scale(signals, description, report) if needs_scale else signals
-    scaled = convert_to_sensor_units(full_scale, description, report)
-    if scaled is None or not report.is_clean:
-        return None
+    scaled = convert_to_sensor_units(apply_full_scale(signals, report) if needs_scale else signals, report)
+    report.require_clean()
     over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
     responses = [signal for signal in over_time if infer_kind(signal) == "response"]
     candidates = responses or [signal for signal in over_time if not infer_kind(signal)]
     if not candidates:
         fact = f"which of its columns is the acceleration ({format_signal_names(signals)})"
-        report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
-        return None
+        raise report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
     if description.response is not None:
-        one = choose_signal(candidates, description.response, "responses", report)
+        one = report.attempt(choose_signal, candidates, "responses")
         candidates = [] if one is None else [one]
-    factors = [1.0 if is_microphone else _resolve_factor(signal, description, report) for signal in candidates]
+    factors = [1.0 if is_microphone else report.attempt(_resolve_factor, signal) for signal in candidates]
     speed_signals = [speed_signal] if speed_signal is not None and candidates else []
-    rate, used = resolve_rate(scaled, [*candidates, *speed_signals], description, report)
+    rate, used = resolve_rate(scaled, [*candidates, *speed_signals], report)
     if is_microphone and responses:
-        report.faults.append(f"{responses[0].name} moves; leave Description.sensor microphone out")
-    if not candidates or not report.is_clean:
-        return None
-    speed = resolve_speed(used[-1], rate, description, report) if speed_signals else None
-    if not report.is_clean:
-        return None
+        report.add_fault(f"{responses[0].name} moves; leave Description.sensor microphone out")
+    report.require_clean()
+    speed = resolve_speed(used[-1], rate, report) if speed_signals else None
     values = np.stack([signal.values * factor for signal, factor in zip(used, factors, strict=False)])
     return np.asarray(values if len(factors) > 1 else values[0], dtype=np.float64), rate, speed
 
 
-def _resolve_factor(signal: Signal, description: Description, report: ImportReport) -> float:
-    """Return the factor of an acceleration to m/s^2; 0 where it is none, or its unit is unknown."""
-    unit = resolve_response_unit(signal, description, report)
-    if unit is None:
-        return 0.0
-    if unit[0] != "acceleration":
-        report.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
-    return unit[1]
+def _resolve_factor(signal: Signal, report: ImportReport) -> float:
+    """Return the factor of an acceleration to m/s^2."""
+    quantity, factor = resolve_response_unit(signal, report)
+    if quantity != "acceleration":
+        raise report.add_fault(f"{signal.name} is a {quantity}; a cut is heard by an accelerometer")
+    return factor

@@ -3,44 +3,29 @@
 import functools
 import logging
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TypeVar
 
 from acquisition.errors import DataError, Remark
 from acquisition.file_io import open_regular_file
-from acquisition.files.contents.contents import Contents, Format, append_force_signals
-from acquisition.files.contents.description import Description, Fact
+from acquisition.files.contents.contents import Contents, Description, Fact, Format, append_force_signals
 from acquisition.files.contents.recording import Recording, resolve_recording
-from acquisition.files.readers.read_arrays import FOREIGN_HDF5_FORMAT, MAT_FORMAT, NUMPY_FORMAT, SEP005_FORMAT
+from acquisition.files.readers.read_arrays import ARRAY_FORMATS, MAT_FORMAT
 from acquisition.files.readers.read_audio import AUDIO_FORMAT
-from acquisition.files.readers.read_labview import LVM_FORMAT, TDMS_FORMAT
-from acquisition.files.readers.read_text_tables import PULSE_FORMAT, TEXT_TABLE_FORMAT
+from acquisition.files.readers.read_labview import LABVIEW_FORMATS
+from acquisition.files.readers.read_text_tables import TEXT_FORMATS
 from acquisition.files.readers.read_uff import UFF_FORMAT
-from acquisition.files.tap_file import TAP_FILE_FORMAT
+from acquisition.files.tap_file import TAP_FORMAT
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_quality.evaluate_hit import average_good_hits
 from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
-from acquisition.tap_test import Circumstances
 
 FORMATS_ENTRY_POINT_GROUP = "lobewatch.formats"
 """Entry points that each name one Format."""
-BUILT_IN_FORMATS = (
-    TAP_FILE_FORMAT,
-    UFF_FORMAT,
-    MAT_FORMAT,
-    LVM_FORMAT,
-    TDMS_FORMAT,
-    AUDIO_FORMAT,
-    SEP005_FORMAT,
-    NUMPY_FORMAT,
-    FOREIGN_HDF5_FORMAT,
-    PULSE_FORMAT,
-    TEXT_TABLE_FORMAT,
-)
+BUILT_IN_FORMATS = (TAP_FORMAT, UFF_FORMAT, MAT_FORMAT, *LABVIEW_FORMATS, AUDIO_FORMAT, *ARRAY_FORMATS, *TEXT_FORMATS)
 """Formats of this package; the text table is last because it takes any text."""
 FORMAT_HEAD_SIZE = 4096
 """Number of bytes at the start of a file by which formats recognize it."""
@@ -48,8 +33,6 @@ EMPTY_DESCRIPTION = Description()
 """Description that states nothing."""
 DECIMAL_SIGNS = {"": "", "comma": ",", "point": "."}
 """Decimal signs of a text by their names."""
-Result = TypeVar("Result")
-
 _log = logging.getLogger(__name__)
 
 
@@ -102,18 +85,20 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     file_format = detect_format(path)
     held = read_contents(file_format, path, description)
     if isinstance(held, Contents):
-        contents = held
         if description.force is not None:
             force = _read_force_contents(description.force, description)
-            contents = append_force_signals(held, force, description.force)
-        title = file_format.title
-        return _convert_errors(file_format, path, lambda: resolve_recording(path, title, contents, description))
+            held = append_force_signals(held, force, description.force)
+        with _convert_errors(file_format, path):
+            return resolve_recording(path, file_format.title, held, description)
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = ", ".join(description.list_signal_options())
     problems = f"a {file_format.title} says itself what it holds; leave out {options}" if options else ""
-    recording = Recording(path, file_format.title, hits, frf, tuple(_list_facts(hits, frf)), problems)
-    return recording if about is None else _add_circumstances(recording, about)
+    names = ("created", "tool", "direction", "operator", "device") if about else ()
+    labels = {name: getattr(about, name) for name in names}
+    conditions = about.conditions if about and about.machine else None
+    facts = tuple(_list_facts(hits, frf))
+    return Recording(path, file_format.title, hits, frf, facts, problems, **labels, conditions=conditions)
 
 
 def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
@@ -242,22 +227,23 @@ def detect_format(path: Path) -> Format:
             reason = format_exception_line(error)
             _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, reason)
     titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
-    raise DataError(
-        f"{path}: of no format that is known here; export it as one of these: {titles}{_describe_broken_formats()}"
-    )
+    fault = f"of no format that is known here; export it as one of these: {titles}"
+    raise DataError(f"{path}: {fault}{_describe_broken_formats()}")
 
 
 def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:
     """Read a file of this format, with the skipped lines and the decimal sign of the description for a text."""
     read_from, skip, decimal = file_format.read_from, description.skip, description.decimal
     if not skip and not decimal:
-        return _convert_errors(file_format, path, lambda: file_format.read(path))
+        with _convert_errors(file_format, path):
+            return file_format.read(path)
     option = f"{path}: Description.skip {skip}" if skip else f"{path}: Description.decimal {decimal}"
     if read_from is None:
         raise DataError(f"{option}: a {file_format.title} is no text of lines; leave the option out")
     if decimal not in DECIMAL_SIGNS:
         raise DataError(f"{option}: is no decimal sign; give comma or point")
-    return _convert_errors(file_format, path, lambda: read_from(path, skip or 0, DECIMAL_SIGNS[decimal]))
+    with _convert_errors(file_format, path):
+        return read_from(path, skip or 0, DECIMAL_SIGNS[decimal])
 
 
 def _read_force_contents(path: Path, description: Description) -> Contents:
@@ -268,10 +254,11 @@ def _read_force_contents(path: Path, description: Description) -> Contents:
     return held
 
 
-def _convert_errors(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
-    """Return the result of some work on a file; raise DataError for any failure."""
+@contextmanager
+def _convert_errors(file_format: Format, path: Path) -> Iterator[None]:
+    """Convert any failure of some work on a file to a DataError."""
     try:
-        return work()
+        yield
     except DataError as error:
         raise DataError(f"{error}{_describe_broken_formats()}") from error
     except OSError:
@@ -310,9 +297,3 @@ def _list_facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
         return [Fact("lines", span, "file"), Fact("unit", f"m/N, from {frf.measured_as}", "file")]
     unit, force = Fact("unit", "m/s^2 (acceleration)", "file"), Fact("force", "N", "file")
     return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), *([force] if hits[0].has_force else []), unit]
-
-
-def _add_circumstances(recording: Recording, about: Circumstances) -> Recording:
-    names = ("created", "tool", "direction", "operator", "device")
-    conditions = about.conditions if about.machine else None
-    return replace(recording, conditions=conditions, **{name: getattr(about, name) for name in names})

@@ -18,29 +18,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition.channel import parse_direction
 from acquisition.errors import DataError
 from acquisition.file_io import atomic_write, read_regular_file
+from acquisition.files import hdf5_file, raw_hits
 from acquisition.files.contents.contents import Format
-from acquisition.files.hdf5_file import (
-    HDF5_SIGNATURE,
-    append_checksum,
-    check_unpacked_size,
-    has_wrong_checksum,
-    open_hdf5,
-)
-from acquisition.files.raw_hits import (
-    HDF5_COMPRESSION,
-    HitSettings,
-    convert_to_plain,
-    read_raw_hits,
-    write_dataset,
-    write_hit_settings,
-    write_hits,
-    write_raw_hits,
-)
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
@@ -96,16 +79,16 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
 def encode_tap(tap: TapTest) -> bytes:
     """Encode the file of a tap test."""
     memory = io.BytesIO()
-    with open_hdf5(memory, "w") as file:
+    with hdf5_file.open_hdf5(memory, "w") as file:
         file.attrs.update(format=TAP_FORMAT_NAME, version=_choose_version(tap.hits))
         file.attrs.update(software=_get_software_name(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
-        write_raw_hits(file, tap.hits, tap.flags)
+        raw_hits.write_raw_hits(file, tap.hits, tap.flags)
         if tap.frf is not None:
             _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
             _write_source(file, tap.source)
-    return append_checksum(memory.getvalue())
+    return hdf5_file.append_checksum(memory.getvalue())
 
 
 def _choose_version(hits: Sequence[Hit]) -> int:
@@ -145,7 +128,7 @@ def read_tap(path: Path | str) -> TapTest:
     """
     with _open_tap_file(Path(path)) as file:
         try:
-            hits, flags = read_raw_hits(file)
+            hits, flags = raw_hits.read_raw_hits(file)
             tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
             return TapTest(tap_id, about, frf, hits, flags, _read_source(file))
         except KeyError as error:
@@ -173,23 +156,23 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     OSError
         Where the file cannot be written.
     """
-    memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), HitSettings.from_hit(hit)))
-    with open_hdf5(memory, "r+") as file:
+    memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), raw_hits.HitSettings.from_hit(hit)))
+    with hdf5_file.open_hdf5(memory, "r+") as file:
         file.attrs["file"] = Path(path).name
-        write_hits(file["raw"], [hit], [flags])
+        raw_hits.write_hits(file["raw"], [hit], [flags])
         if hit.cross_hit is not None:
-            write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags])
-    atomic_write(Path(path), append_checksum(memory.getvalue()))
+            raw_hits.write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags])
+    atomic_write(Path(path), hdf5_file.append_checksum(memory.getvalue()))
 
 
 @functools.lru_cache(maxsize=1)
-def _encode_without_hit(about: Circumstances, version: int, set_up: HitSettings) -> bytes:
+def _encode_without_hit(about: Circumstances, version: int, set_up: raw_hits.HitSettings) -> bytes:
     """Encode the file of a hit of this test before the hit is in it, which is a third of the work."""
     memory = io.BytesIO()
-    with open_hdf5(memory, "w") as file:
+    with hdf5_file.open_hdf5(memory, "w") as file:
         file.attrs.update(format=TAP_FORMAT_NAME, version=version)
         _write_circumstances(file, about)
-        write_hit_settings(file.create_group("raw"), set_up)
+        raw_hits.write_hit_settings(file.create_group("raw"), set_up)
     return memory.getvalue()
 
 
@@ -216,9 +199,9 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
         For another or a damaged file.
     """
     with _open_tap_file(Path(path)) as file:
-        hits, flags = read_raw_hits(file)
+        hits, flags = raw_hits.read_raw_hits(file)
         if "beside" in file:
-            pairs = zip(hits, read_raw_hits(file["beside"])[0], strict=True)
+            pairs = zip(hits, raw_hits.read_raw_hits(file["beside"])[0], strict=True)
             hits = tuple(replace(hit, cross_hit=cross) for hit, cross in pairs)
         return hits, _read_circumstances(file), flags
 
@@ -231,11 +214,11 @@ def read_hit_name(path: Path | str) -> str:
 
 def _open_tap_file(path: Path) -> h5py.File:
     content = read_regular_file(path)
-    if has_wrong_checksum(content):
+    if hdf5_file.has_wrong_checksum(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     with contextlib.ExitStack() as closed_on_error:
         try:
-            file = closed_on_error.enter_context(open_hdf5(io.BytesIO(content), "r"))
+            file = closed_on_error.enter_context(hdf5_file.open_hdf5(io.BytesIO(content), "r"))
             if file.attrs.get("format") != TAP_FORMAT_NAME:
                 fault = f"no tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
                 raise DataError(f"{path}: an HDF5 file, but {fault}")
@@ -243,7 +226,7 @@ def _open_tap_file(path: Path) -> h5py.File:
             if version > newest:
                 versions = f"a tap file of version {version}, this lobewatch reads up to {newest}"
                 raise DataError(f"{path}: {versions}; update lobewatch")
-            check_unpacked_size(file, len(content), path)
+            hdf5_file.check_unpacked_size(file, len(content), path)
         except (OSError, LookupError, RuntimeError) as error:
             raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
         closed_on_error.pop_all()
@@ -261,11 +244,9 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
     machine, tool, operator = (str(file.attrs[name]) for name in ("machine", "tool", "operator"))
-    direction = parse_direction(str(file.attrs["direction"]))
-    created = datetime.fromisoformat(file.attrs["created"])
-    device = str(file.attrs.get("device", ""))
-    text = file["machine_toml"][()].decode()
-    under = Conditions.from_mapping(convert_to_plain(file.attrs))  # none in the first files
+    direction, created = parse_direction(str(file.attrs["direction"])), datetime.fromisoformat(file.attrs["created"])
+    text, device = file["machine_toml"][()].decode(), str(file.attrs.get("device", ""))
+    under = Conditions.from_mapping(raw_hits.convert_to_plain(file.attrs))  # none in the first files
     return Circumstances(machine, created, tool, direction, operator, text, device, under)
 
 
@@ -276,18 +257,11 @@ def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> 
     if frf.usable_band is not None:
         group.attrs["usable_band_hz"] = frf.usable_band
     coherence = None if frf.coherence is None else frf.coherence.astype(precision)
-    _write_lines(group, frf.frequency, receptance=(frf.receptance, "m/N"), coherence=(coherence, "1"))
-
-
-def _write_lines(
-    group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
-) -> None:
-    """Write arrays over frequency, which becomes their dimension scale."""
-    write_dataset(group, "frequency", frequency, "Hz", **HDF5_COMPRESSION)
+    raw_hits.write_dataset(group, "frequency", frf.frequency, "Hz", **raw_hits.HDF5_COMPRESSION)
     group["frequency"].make_scale("frequency")
-    for name, (data, units) in arrays.items():
-        if data is not None:
-            write_dataset(group, name, data, units, **HDF5_COMPRESSION)
+    for name, values, units in (("receptance", frf.receptance, "m/N"), ("coherence", coherence, "1")):
+        if values is not None:
+            raw_hits.write_dataset(group, name, values, units, **raw_hits.HDF5_COMPRESSION)
             group[name].dims[0].attach_scale(group["frequency"])
 
 
@@ -305,7 +279,7 @@ def _read_frf(file: h5py.File) -> Frf | None:
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
     content = np.frombuffer(source.content, np.uint8)
-    packed = HDF5_COMPRESSION | {"chunks": (min(content.size, SOURCE_CHUNK_SIZE),), "shuffle": False}
+    packed = raw_hits.HDF5_COMPRESSION | {"chunks": (min(content.size, SOURCE_CHUNK_SIZE),), "shuffle": False}
     stored = file.create_dataset("source", data=content, **packed if content.size else {})
     stored.attrs.update(name=source.name, sha256=source.sha256, units="byte")
 
@@ -335,7 +309,7 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
 
 def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
     """Return whether a file is a live tap test of lobewatch and these are all its hits."""
-    if not hits or not read_regular_file(path).startswith(HDF5_SIGNATURE):
+    if not hits or not read_regular_file(path).startswith(hdf5_file.HDF5_SIGNATURE):
         return False
     tap = read_tap(path)
     return tap.source is None and len(tap.hits) == len(hits)
@@ -343,10 +317,10 @@ def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
 
 def _is_lobewatch_file(head: bytes, path: Path) -> bool:
     """Return whether an HDF5 file is of lobewatch, also where it is damaged or no tap file."""
-    return head.startswith(HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
+    return head.startswith(hdf5_file.HDF5_SIGNATURE) and b"lobewatch" in read_regular_file(path)
 
 
-TAP_FILE_FORMAT = Format(
+TAP_FORMAT = Format(
     "tap-file",
     "tap file of lobewatch",
     (".h5",),

@@ -203,10 +203,8 @@ def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:
     if error is None:
         raise ValueError(f"a mean of {n} hits (with its coherence) cannot tell how far hits scatter; 3 are needed")
     if not np.array_equal(frf.frequency, mean.frequency):
-        raise ValueError(
-            f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean "
-            f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz; compare hits of one set-up only"
-        )
+        of_mean = f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz; compare hits of one set-up only"
+        raise ValueError(f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean {of_mean}")
     reach = min(response.usable_band[1] if response.usable_band else np.inf for response in (frf, mean))
     used = mean.frequency <= reach
     hit, expected = frf.receptance[used], mean.receptance[used]

@@ -182,12 +182,6 @@ class HitSearch:
         """
         if block.lost_before:
             self._gaps.append((self._size, block.lost_before))
-        self._add(block)
-        while (record := self._next_record()) is not None:
-            codes, lost, overload = record
-            yield self._inputs.make_hit(codes, self._rate, self._trigger.pre_trigger, lost, overload)
-
-    def _add(self, block: Block) -> None:
         overload = sum((block.overload >> row & 1) << i for i, row in enumerate(self._inputs.rows))
         end = self._size + block.codes.shape[1]
         if overload:
@@ -195,6 +189,9 @@ class HitSearch:
         is_all = self._inputs.rows == tuple(range(len(block.codes)))
         self._added.append(block.codes if is_all else block.codes[list(self._inputs.rows)])
         self._size = end
+        while (record := self._next_record()) is not None:
+            codes, lost, overload = record
+            yield self._inputs.make_hit(codes, self._rate, self._trigger.pre_trigger, lost, overload)
 
     def _next_record(self) -> tuple[Codes, int, int] | None:
         """Return the next complete record, its lost scans and its overloads; None until more blocks arrive."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from acquisition.arrays import Floats
 from acquisition.hit import Hit
-from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, find_pulse
+from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline, require_pulse
 
 MAX_CONTACT_TIME = 1.5e-3
 """Time after the start of a hit at which the free decay begins (s).
@@ -94,9 +94,7 @@ def _locate_hit(hit: Hit) -> tuple[int, int]:
     if not hit.has_force:
         before = count_pre_hit_samples(hit)
         return int(0.8 * before), before + round(MAX_CONTACT_TIME * hit.sample_rate)
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; its ring-down cannot be seen")
+    pulse = require_pulse(hit, "its ring-down cannot be seen")
     return pulse.start, pulse.end
 
 

@@ -57,6 +57,14 @@ def find_pulse(hit: Hit) -> Pulse | None:
     return Pulse(hit.force, offset, top, peak, start, end, rms)
 
 
+def require_pulse(hit: Hit, remedy: str = "check hits with check_hit first") -> Pulse:
+    """Return the highest force pulse; raise ValueError with the remedy where there is none."""
+    pulse = find_pulse(hit)
+    if pulse is None:
+        raise ValueError(f"a hit has no force pulse; {remedy}")
+    return pulse
+
+
 def _count_above(foot: float, signal: Floats) -> int:
     """Count the samples before the first one below the foot, block by block because pulses are short."""
     for at in range(0, signal.size, SEARCH_BLOCK_SIZE):
@@ -74,20 +82,17 @@ def count_pre_hit_samples(hit: Hit) -> int:
     if hit.pre_trigger:
         return hit.pre_trigger
     if hit not in _pre_hit_counts:
-        has_force = hit.has_force
-        _pre_hit_counts[hit] = _count_before_force(hit.force) if has_force else _count_before_response(hit.acceleration)
+        _pre_hit_counts[hit] = _find_rise(hit)
     return _pre_hit_counts[hit]
 
 
-def _count_before_force(force: Floats) -> int:
-    above = force[: int(np.argmax(force)) + 1] - np.median(force)
+def _find_rise(hit: Hit) -> int:
+    if not hit.has_force:
+        size = np.abs(hit.acceleration - np.median(hit.acceleration))
+        return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
-
-
-def _count_before_response(response: Floats) -> int:
-    size = np.abs(response - np.median(response))
-    return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
 
 
 _pre_hit_counts: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()
@@ -130,9 +135,7 @@ _windowed_forces: WeakKeyDictionary[Hit, WindowedForce] = WeakKeyDictionary()
 
 
 def _compute_windowed_force(hit: Hit) -> WindowedForce:
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
+    pulse = require_pulse(hit, "check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
     corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
     samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from acquisition import DataError, Fact, Remark
-from acquisition.files.contents.description import Origin
+from acquisition.files.contents.contents import Origin
 from dsm import format_rounded
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook

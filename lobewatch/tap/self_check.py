@@ -193,7 +193,7 @@ def _slice_record(record: Hit, start: int, end: int) -> Hit:
         return Hit(record.force[start:end], record.acceleration[start:end], record.sample_rate)
     part = record.codes[:, start:end]
     beside = None if record.cross_hit is None else _slice_record(record.cross_hit, start, end)
-    return Hit.from_codes(part, record.channels, record.sample_rate, 0, record.lost_scans, cross_hit=beside)
+    return Hit.from_codes(part, record.channels, record.sample_rate, lost_scans=record.lost_scans, cross_hit=beside)
 
 
 REFERENCE_HITS = 10

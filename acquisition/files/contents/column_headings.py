@@ -4,11 +4,10 @@ import re
 import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import get_args
+from typing import cast, get_args
 
-from acquisition.files.contents.contents import FrfRole, Role, Signal
-from acquisition.files.contents.description import ImportReport
-from acquisition.files.contents.units import VOLTAGE_UNITS, parse_unit
+from acquisition.files.contents.contents import FrfRole, ImportReport, Role, Signal
+from acquisition.files.contents.units import VOLTAGE_UNITS, get_motion, parse_unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _PART_OF_FRF = re.compile(
@@ -19,10 +18,8 @@ _PART_OF_FRF = re.compile(
 """Pattern such as Re(H), or imag(FRF) [m/N]."""
 _BEFORE_UNIT = re.compile(r"\s*/\s*|\s*,\s*|\s+in\s+")
 """Separator between a name and its unit: "f / Hz", "Force, N", "Time in s"."""
-ANGLE_UNITS = dict.fromkeys(("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度"), "deg") | {
-    "rad": "rad",
-    "radians": "rad",
-}
+_DEGREE_NAMES = ("deg", "degree", "degrees", "degrés", "grad", "gradi", "grados", "°", "度")
+ANGLE_UNITS = dict.fromkeys(_DEGREE_NAMES, "deg") | dict.fromkeys(("rad", "radians"), "rad")
 """Units of a phase as written in lower case."""
 _DECIBEL_NAME = re.compile(r"(?<![^\W_])db(?![^\W\d_])", re.IGNORECASE)
 """Pattern of a level in a name: "Magnitude dB", "Mag_dB"."""
@@ -42,27 +39,13 @@ _ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
     (r"tacho", "tacho"),
 )
 """Role of a column by the beginning of its name in lower case and without accents, in seven languages."""
-COLUMN_ROLES: dict[str, tuple[Role, str]] = {
-    "time": ("time", ""),
-    "frequency": ("frequency", ""),
-    "force": ("force", "force"),
-    "response": ("response", ""),
-    "acceleration": ("response", "acceleration"),
-    "velocity": ("response", "velocity"),
-    "displacement": ("response", "displacement"),
-    "frf": ("frf", ""),
-    "receptance": ("frf", "displacement"),
-    "mobility": ("frf", "velocity"),
-    "accelerance": ("frf", "acceleration"),
-    "real": ("real", ""),
-    "imag": ("imag", ""),
-    "magnitude": ("magnitude", ""),
-    "db": ("magnitude", ""),
-    "phase": ("phase", ""),
-    "coherence": ("coherence", ""),
-    "speed": ("speed", ""),
-    "tacho": ("tacho", ""),
-    "-": ("ignored", ""),
+_MOTIONS, _FORMS = ("acceleration", "velocity", "displacement"), ("receptance", "mobility", "accelerance")
+_OTHER_ROLES = {"db": "magnitude", "-": "ignored"} | dict.fromkeys(_MOTIONS, "response") | dict.fromkeys(_FORMS, "frf")
+_QUANTITY_WORDS = ("time", "frequency", "force", "response", *_MOTIONS, "frf", *_FORMS)
+_PART_WORDS = ("real", "imag", "magnitude", "db", "phase", "coherence", "speed", "tacho", "-")
+COLUMN_ROLES = {
+    word: (cast(Role, _OTHER_ROLES.get(word, word)), get_motion(word) if word in ("force", *_MOTIONS, *_FORMS) else "")
+    for word in (*_QUANTITY_WORDS, *_PART_WORDS)
 }
 """Role and quantity of a column, by its word in `Description.columns`."""
 
@@ -121,22 +104,22 @@ def infer_role(name: str, unit: str) -> Role:
     return by_name  # type: ignore[return-value]
 
 
-def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: ImportReport) -> tuple[Signal, ...]:
-    """Return the signals with the roles and units that `columns` gives them, in its order, without the others.
+def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[Signal, ...]:
+    """Return the signals with the roles and units that `Description.columns` gives them, in its order, only these.
 
     "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
-    second column of H.
+    second column of H. Without `columns` all signals are left as they are.
     """
-    named = list[Signal]()
-    in_order = not any("=" in text for text in columns)
-    if in_order and len(columns) < len(signals):
-        names = format_signal_names(signals)
+    named, columns = list[Signal](), report.description.columns
+    if not columns:
+        return signals
+    if len(columns) < len(signals) and not any("=" in text for text in columns):
+        fault = f"names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}"
         cure = 'name all in their order, "-" for what is left out, or each as in "real=2"'
-        fault = f"names {len(columns)} of its {len(signals)} columns, which are {names}; {cure}"
-        report.faults.append(f"Description.columns {fault}")
+        report.add_fault(f"Description.columns {fault}; {cure}")
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
-        signal = _select_signal(signals, name.strip(), number, report)
+        signal = report.attempt(_select_signal, signals, name.strip(), number)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
@@ -149,18 +132,17 @@ def assign_columns(signals: Sequence[Signal], columns: Sequence[str], report: Im
     return tuple(named)
 
 
-def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal | None:
+def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal:
     if name:
         return find_column(signals, name, "columns", report)
     if number < len(signals):
         return signals[number]
-    fault = f"no column {number + 1} in the file, which holds {format_signal_names(signals)}"
-    report.reject("columns", None, fault)
-    return None
+    held = format_signal_names(signals)
+    raise report.reject("columns", None, f"no column {number + 1} in the file, which holds {held}")
 
 
-def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal | None:
-    """Find the column of a name, heading, unit or number; None where the report says that there is not one."""
+def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal:
+    """Find the one column of a name, heading, unit or number."""
     meant = _match_columns(signals, name)
     if len(meant) == 1:
         return meant[0]
@@ -169,8 +151,7 @@ def find_column(signals: Sequence[Signal], name: str, field_name: str, report: I
         fault = f"{len(meant)} columns are called {name!r}; say which by its number, {numbers}"
     else:
         fault = f"nothing called {name!r} in the file, which holds {format_signal_names(signals)}"
-    report.reject(field_name, None, fault)
-    return None
+    raise report.reject(field_name, None, fault)
 
 
 def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:

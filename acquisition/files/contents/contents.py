@@ -1,20 +1,181 @@
-"""Signals of a recorded file, and the record of functions that reads a format."""
+"""Contents of a recorded file, the user's description of it, and the report of its import.
 
+A format is the record of functions that read such a file.
+"""
+
+import contextlib
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.files.contents.description import ImportReport
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.tap_test import Circumstances
+from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions
+
+Result = TypeVar("Result")
+_LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
+
+
+@dataclass(frozen=True)
+class Description:
+    """User's description of a recording; empty or None: no statement. It completes what the file does not state.
+
+    A contradiction to the file is an error, except for `columns`, which replaces its headings.
+    """
+
+    columns: tuple[str, ...] = ()
+    """Columns, in their order ("time [s]", "force [N]", "-") or by name ("frf [m/N]=H1", "frf=H:2")."""
+    quantity: str = ""
+    """Quantity of the response: displacement, velocity or acceleration."""
+    unit: str = ""
+    """Unit of the response (m/s^2, g, um), or of the FRF (m/N, g/N)."""
+    force_unit: str = ""
+    """Unit of the force (N, lbf)."""
+    skip: int | None = None
+    """Number of lines to skip above the rows of a text."""
+    decimal: str = ""
+    """Decimal sign of the numbers of a text, "comma" or "point"; the other one separates thousands."""
+    spacing: float | None = None
+    """Spacing of the lines of an FRF without frequencies (Hz)."""
+    start: float | None = None
+    """Frequency of its first line (Hz); None: 0."""
+    force: Path | None = None
+    """File with the force, where the recording has only the response; its columns follow those of the response."""
+    rate: float | None = None
+    """Sample rate (Hz)."""
+    averages: int | None = None
+    """Number of hits averaged in an FRF."""
+    response: int | None = None
+    """Number of the response to use where there are several, from 1."""
+    full_scale: tuple[float, ...] = ()
+    """Full scale of each channel in its unit, where values are shares of it."""
+    sensitivity: tuple[str, ...] = ()
+    """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
+    without_force: bool = False
+    """True if no force was measured, so that only a response is needed."""
+    sensor: str = "accelerometer"
+    """Kind of sensor of a recorded cut: accelerometer or microphone."""
+    tacho: str = ""
+    """Name or number of the column of the spindle speed: the speed where its unit is rpm or Hz, else pulses."""
+    pulses: int | None = None
+    """Pulses of the tachometer per turn; None: 1."""
+    date: datetime | None = None
+    """Time of recording; local time where it has no zone."""
+    date_pattern: str = ""
+    """Pattern of the date in the file's name, as for strptime ("%Y%m%d"); with "/" in its path."""
+    tool: str = ""
+    """Name of the tool in the spindle."""
+    direction: str = ""
+    """Direction at the tool tip, x or y."""
+    conditions: Conditions = UNKNOWN_CONDITIONS
+    """Conditions of the test."""
+
+    def list_signal_options(self) -> list[str]:
+        """List the given fields that state something about the signals of the file."""
+        names = [option.name for option in fields(self) if option.name not in _LABEL_FIELDS]
+        return [f"Description.{name}" for name in names if getattr(self, name) not in ("", (), None)]
+
+
+Origin = Literal["file", "option", "default"]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Known fact of a recording."""
+
+    name: str
+    """Name of the fact: "sample rate", "unit", ..."""
+    value: str
+    """Value, as text for people."""
+    origin: Origin
+    """Origin: the file, an option of the user, or a default."""
+
+
+class UnresolvedError(Exception):
+    """Raised where a recording cannot be resolved; its report says what is missing or wrong."""
+
+
+@dataclass
+class ImportReport:
+    """Facts, gaps and faults of a recording, collected while its contents are resolved.
+
+    The methods that add a gap or a fault return an UnresolvedError, to raise where the rest needs what is missing.
+    """
+
+    description: Description
+    """Description that a user gives of the recording."""
+    facts: list[Fact] = field(default_factory=list)
+    """Known facts."""
+    missing: list[str] = field(default_factory=list)
+    """Facts that the file does not state, each with the field of the description that states it."""
+    faults: list[str] = field(default_factory=list)
+    """Faults that prevent the import."""
+
+    def add_fact(self, name: str, value: str, origin: Origin = "file") -> None:
+        """Add a known fact."""
+        self.facts.append(Fact(name, value, origin))
+
+    def add_missing(self, fact: str, field_name: str, example: str = "") -> UnresolvedError:
+        """Add a fact that is missing, and the field of the description that states it, with an example."""
+        self.missing.append(f"{fact} (Description.{field_name}{example})")
+        return UnresolvedError()
+
+    def add_fault(self, fault: str) -> UnresolvedError:
+        """Add a fault of the file."""
+        self.faults.append(fault)
+        return UnresolvedError()
+
+    def reject(self, field_name: str, value: object, fault: str) -> UnresolvedError:
+        """Add the fault of a field of the description and its value; None leaves the value out."""
+        return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}")
+
+    def attempt(self, resolve: Callable[..., Result], *arguments: object) -> Result | None:
+        """Return the result of a function of these arguments and this report; None where it cannot be resolved."""
+        try:
+            return resolve(*arguments, self)
+        except UnresolvedError:
+            return None
+
+    def merge(self, other: "ImportReport") -> None:
+        """Add all entries of another report."""
+        self.facts += other.facts
+        self.missing += other.missing
+        self.faults += other.faults
+
+    def add_contradiction(self, field_name: str, given: object, in_file: object) -> UnresolvedError:
+        """Add the fault of a field that differs from the file."""
+        return self.reject(field_name, given, f"the file says {in_file}; leave the option out")
+
+    def add_flaws(self, used: Sequence["Signal"], first: int = 0) -> None:
+        """Add a fault for each column with a flaw from this index on."""
+        for column in used:
+            if flaw := next((flaw for i, flaw in column.flaws.items() if first <= i < _count_values(column)), ""):
+                self.add_fault(
+                    f"{column.name} {flaw}; mend it there, or leave {column.name} out of Description.columns"
+                )
+
+    @property
+    def is_clean(self) -> bool:
+        """True if nothing is missing or wrong."""
+        return not self.missing and not self.faults
+
+    def require_clean(self) -> None:
+        """Raise UnresolvedError where something is missing or wrong."""
+        if not self.is_clean:
+            raise UnresolvedError
+
+    def format_problems(self) -> str:
+        """Return all that is missing and wrong; empty where nothing is."""
+        missing = [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
+        return "; ".join([*self.faults, *missing])
+
 
 FrfRole = Literal["frf", "real", "imag", "magnitude", "phase", "coherence"]
 """Meaning of a signal that belongs to an FRF."""
@@ -92,9 +253,9 @@ def cut_to_shortest(
     by_size = sorted([*used, *sorted(axes, key=_count_values)[-1:]], key=_count_values)
     if not by_size or not all(_is_in_same_table(column, by_size[0]) for column in by_size):
         return list(used), list(axes)
-    shortest, n = by_size[0], _count_values(by_size[0])
-    if _count_values(by_size[-1]) > n:
-        report.add_fact("rows", f"{n} of {_count_values(by_size[-1])}, as {shortest.name} ends there", "default")
+    n, longest = _count_values(by_size[0]), _count_values(by_size[-1])
+    if longest > n:
+        report.add_fact("rows", f"{n} of {longest}, as {by_size[0].name} ends there", "default")
     cut = [[replace(column, values=column.values[:n]) for column in columns] for columns in (used, axes)]
     return cut[0], cut[1]
 
@@ -102,15 +263,6 @@ def cut_to_shortest(
 def has_same_axis(one: Signal, other: Signal) -> bool:
     """Return whether two signals of a record have a common axis: in one table, or with as many values."""
     return one.record == other.record and (_is_in_same_table(one, other) or one.values.shape == other.values.shape)
-
-
-def report_flaws(used: Sequence[Signal], report: ImportReport, first: int = 0) -> None:
-    """Report a fault for each column with a flaw from this index on."""
-    for column in used:
-        flaw = next((flaw for place, flaw in column.flaws.items() if first <= place < _count_values(column)), "")
-        if flaw:
-            remedy = f"mend it there, or leave {column.name} out of Description.columns"
-            report.faults.append(f"{column.name} {flaw}; {remedy}")
 
 
 def _is_in_same_table(one: Signal, other: Signal) -> bool:
@@ -126,6 +278,14 @@ def append_force_signals(response: Contents, force: Contents, force_file: Path) 
     names, file = {signal.name for signal in response.signals}, force_file.name
     added = (replace(one, name=f"{one.name} of {file}") if one.name in names else one for one in force.signals)
     return replace(response, signals=(*response.signals, *added))
+
+
+def parse_local_time(text: str, *patterns: str) -> datetime | None:
+    """Parse a time by the first pattern that fits, local where it has no zone; None where it cannot be read."""
+    for pattern in patterns:
+        with contextlib.suppress(ValueError, OverflowError, OSError):
+            return datetime.strptime(text, pattern).astimezone()
+    return None
 
 
 _NO_WINDOW = re.compile(r"\s*(none|no|off|rect\w*|uniform|boxcar|transient|force.*)?\s*", re.IGNORECASE)

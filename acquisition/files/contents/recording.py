@@ -9,8 +9,7 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
-from acquisition.files.contents.contents import Contents, Signal, parse_time_constant
-from acquisition.files.contents.description import Description, Fact, ImportReport
+from acquisition.files.contents.contents import Contents, Description, Fact, ImportReport, Signal, parse_time_constant
 from acquisition.files.contents.resolve_frf import FRF_COLUMNS_EXAMPLE, find_frf_candidates, resolve_frf
 from acquisition.files.contents.resolve_hits import HIT_COLUMNS_EXAMPLE, resolve_hits
 from acquisition.frf import Frf
@@ -65,12 +64,12 @@ class Recording:
 
 def resolve_recording(path: Path, title: str, contents: Contents, description: Description) -> Recording:
     """Return the hits where the contents are only signals over time, else the FRF."""
-    report = ImportReport()
-    signals = assign_columns(contents.signals, description.columns, report) if description.columns else contents.signals
+    report = ImportReport(description)
+    signals = assign_columns(contents.signals, report)
     contents = replace(contents, signals=signals)
-    frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, description, report)
+    frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, report)
     if len(contents.machines) > 1:
-        report.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
+        report.add_fault(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
         report.add_fact("window", window)
@@ -81,23 +80,21 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
     return Recording(path, title, tuple(hits), frf, facts, problems, *labels, window=parse_time_constant(window))
 
 
-def _resolve_frf_or_hits(
-    contents: Contents, description: Description, report: ImportReport
-) -> tuple[Frf | None, list[Hit]]:
+def _resolve_frf_or_hits(contents: Contents, report: ImportReport) -> tuple[Frf | None, list[Hit]]:
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
     if find_frf_candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _reject_useless_fields(description, ("rate", "full_scale", "force"), "an FRF", report)
-        return resolve_frf(contents, description, report), []
+        _reject_useless_fields(("rate", "full_scale", "force"), "an FRF", report)
+        return resolve_frf(contents, report), []
     if not signals:
-        report.faults.append("it holds no columns of numbers")
+        report.add_fault("it holds no columns of numbers")
     elif over_frequency or not _is_over_time(signals):
         example = FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE
         report.add_missing(f"what its columns are ({format_signal_names(signals)})", "columns", example)
     else:
-        _reject_useless_fields(description, ("averages",), "hits, and they are counted", report)
-        _reject_useless_fields(description, ("spacing", "start"), "signals over time", report)
-        return None, resolve_hits(contents, description, report)
+        _reject_useless_fields(("averages",), "hits, and they are counted", report)
+        _reject_useless_fields(("spacing", "start"), "signals over time", report)
+        return None, resolve_hits(contents, report)
     return None, []
 
 
@@ -105,7 +102,7 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
     return any(one.role in ("time", "force", "response") or one.rate or one.per_full_scale for one in signals)
 
 
-def _reject_useless_fields(description: Description, names: Sequence[str], content: str, report: ImportReport) -> None:
+def _reject_useless_fields(names: Sequence[str], content: str, report: ImportReport) -> None:
     for name in names:
-        if getattr(description, name) not in ((), None):
+        if getattr(report.description, name) not in ((), None):
             report.reject(name, None, f"the file holds {content}; leave the option out")

@@ -1,19 +1,19 @@
 """Resolve the FRF in the contents of a recorded file."""
 
+import itertools
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
 
 from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
-from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, has_same_axis, report_flaws
-from acquisition.files.contents.description import Description, ImportReport
-from acquisition.files.contents.resolve_unit import MOTION_QUANTITIES, choose_signal, resolve_frf_unit
-from acquisition.files.contents.units import parse_unit
+from acquisition.files.contents.contents import Contents, ImportReport, Signal, cut_to_shortest, has_same_axis
+from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
+from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
 FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
@@ -28,52 +28,30 @@ _ROUND_STEP_DIGITS, _ROUND_STEP_TOLERANCE = 5, 3e-7
 """Digits of a round step, and its relative tolerance: the last of seven printed digits."""
 
 
-@dataclass(frozen=True, eq=False)
-class FrfCandidate:
-    """One FRF of a file, in the unit of the file."""
-
-    signal: Signal
-    """Signal that names it: the complex values, the real part or the magnitude."""
-    partner: Signal | None = None
-    """Imaginary part or phase."""
-
-    def format_columns_option(self) -> str:
-        """Return its columns as `Description.columns` names them."""
-        return ",".join(f"{part.role}={part.name}" for part in self.parts)
-
-    @property
-    def parts(self) -> list[Signal]:
-        """The one or two signals."""
-        return [self.signal] if self.partner is None else [self.signal, self.partner]
-
-
-def find_frf_candidates(signals: Sequence[Signal]) -> list[FrfCandidate]:
-    """Find the FRFs among signals: complex ones, and pairs in their order."""
-    listed = [FrfCandidate(signal) for signal in signals if signal.role == "frf"]
+def find_frf_candidates(signals: Sequence[Signal]) -> list[list[Signal]]:
+    """Find the FRFs among signals: complex ones, then real part or magnitude with its partner, in their order."""
+    listed = [[signal] for signal in signals if signal.role == "frf"]
     for first, second in (("real", "imag"), ("magnitude", "phase")):
-        seconds: Iterator[Signal | None] = iter([part for part in signals if part.role == second])
-        listed += [FrfCandidate(part, next(seconds, None)) for part in signals if part.role == first]
+        seconds = (part for part in signals if part.role == second)
+        listed += [[part, *itertools.islice(seconds, 1)] for part in signals if part.role == first]
     return listed
 
 
-def resolve_frf(contents: Contents, description: Description, report: ImportReport) -> Frf | None:
-    """Return the FRF of some contents; None where the report says what is missing or wrong."""
+def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
+    """Return the FRF of contents with one or more; None where the report says what is missing or wrong."""
     listed = find_frf_candidates(contents.signals)
-    if not listed:
-        report.add_missing("what its columns are", "columns", FRF_COLUMNS_EXAMPLE)
-        return None
-    signal = choose_signal([candidate.signal for candidate in listed], description.response, "FRFs", report)
-    n_averages = _resolve_averages(contents, description, report)
-    candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
-    coherence = _find_coherence(contents, listed.index(candidate), candidate.signal)
-    axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == candidate.signal.record]
-    used, axes = cut_to_shortest([*candidate.parts, *([coherence] if coherence else [])], axes, report)
-    candidate = FrfCandidate(*used[: len(candidate.parts)])
-    values = _compute_complex_values(candidate, report)
-    unit = resolve_frf_unit(candidate.signal, description, report)
-    frequency = _resolve_frequency(contents, candidate, axes, description, report)
+    signal = report.attempt(choose_signal, [parts[0] for parts in listed], "FRFs")
+    n_averages = _resolve_averages(contents, report)
+    parts = next((parts for parts in listed if parts[0] is signal), listed[0])
+    coherence = _find_coherence(contents, listed.index(parts), parts[0])
+    axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == parts[0].record]
+    used, axes = cut_to_shortest([*parts, *([coherence] if coherence else [])], axes, report)
+    parts = used[: len(parts)]
+    values = report.attempt(_compute_complex_values, parts)
+    unit = report.attempt(resolve_frf_unit, parts[0])
+    frequency = report.attempt(_resolve_frequency, contents, parts, axes)
     shares = _resolve_coherence(used[-1] if coherence else None, report)
-    report_flaws(candidate.parts, report, int(frequency is None or frequency[0] == 0))
+    report.add_flaws(parts, int(frequency is None or frequency[0] == 0))
     if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
@@ -81,7 +59,7 @@ def resolve_frf(contents: Contents, description: Description, report: ImportRepo
     try:
         return _make_frf(frequency[first:], values[first:] * unit[1], shares, n_averages, FRF_FORM_BY_MOTION[unit[0]])
     except ValueError as error:
-        report.faults.append(str(error))
+        report.add_fault(str(error))
         return None
 
 
@@ -91,37 +69,31 @@ def _make_frf(
     """Make an FRF from SI values of this form."""
     if form == "receptance":
         return Frf(frequency, values, coherence, n_averages)
-    if form == "mobility":
-        receptance = from_accelerance(frequency, values * (2j * np.pi * frequency), coherence, n_averages)
-        return replace(receptance, measured_as="mobility")
-    return from_accelerance(frequency, values, coherence, n_averages)
+    accelerance = values * (2j * np.pi * frequency) if form == "mobility" else values
+    return replace(from_accelerance(frequency, accelerance, coherence, n_averages), measured_as=form)
 
 
-def _compute_complex_values(candidate: FrfCandidate, report: ImportReport) -> Complexes | None:
+def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Complexes:
     """Return the complex values in the unit of the file."""
-    first, second = candidate.signal, candidate.partner
+    first, second = parts[0], parts[1] if len(parts) > 1 else None
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
-            report.faults.append(f"{first.name} holds real numbers; an FRF is complex")
+            report.add_fault(f"{first.name} holds real numbers; an FRF is complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
         fact = f"the {'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
-        report.add_missing(fact, "columns", ' "frequency,real,imag" or "frequency,magnitude,phase"')
-        return None
+        raise report.add_missing(fact, "columns", ' "frequency,real,imag" or "frequency,magnitude,phase"')
     if first.role == "real":
         if second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
             units = f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}"
-            report.faults.append(f"{units}; they must be the same")
-            return None
+            raise report.add_fault(f"{units}; they must be the same")
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLE_UNITS.get(second.unit.lower(), "")
     if not angle:
-        report.add_missing("the unit of its phase", "columns", ' "frequency,magnitude,phase [deg]"')
-        return None
+        raise report.add_missing("the unit of its phase", "columns", ' "frequency,magnitude,phase [deg]"')
     if not is_decibel(first.unit) and np.any(first.values < 0):
         fact = f"whether {first.name}, which falls below 0, is in dB"
-        report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
-        return None
+        raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
     return np.asarray(size * np.exp(1j * phase))
@@ -133,24 +105,22 @@ def _is_same_unit(one: str, other: str) -> bool:
 
 
 def _resolve_frequency(
-    contents: Contents, frf: FrfCandidate, axes: Sequence[Signal], description: Description, report: ImportReport
-) -> Floats | None:
+    contents: Contents, frf: Sequence[Signal], axes: Sequence[Signal], report: ImportReport
+) -> Floats:
     """Return the frequencies of the lines (Hz)."""
-    axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
+    axis = next((signal for signal in axes if signal.values.size == frf[0].values.size), None)
     if axis is None:
-        return _make_even_frequency(contents.signals, frf, description, report)
-    report_flaws([axis], report)
-    if description.spacing is not None or description.start is not None:
+        return _make_even_frequency(contents.signals, frf, report)
+    report.add_flaws([axis])
+    if report.description.spacing is not None or report.description.start is not None:
         fault = f"the file holds its frequencies, {axis.name}; leave them out"
-        report.faults.append(f"Description.spacing, Description.start: {fault}")
-        return None
+        raise report.add_fault(f"Description.spacing, Description.start: {fault}")
     if not axis.unit and _is_angular(axis):
-        report.add_missing(f"the unit of {axis.name}, Hz or rad/s", "columns", f' "frequency [rad/s]={axis.name},..."')
-        return None
+        example = f' "frequency [rad/s]={axis.name},..."'
+        raise report.add_missing(f"the unit of {axis.name}, Hz or rad/s", "columns", example)
     unit = parse_unit(axis.unit or "Hz")
     if unit is None or unit.quantity != "frequency":
-        report.faults.append(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
-        return None
+        raise report.add_fault(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
     values = np.asarray(axis.values, dtype=np.float64) * unit.factor
     report.add_fact("lines", _format_lines(values.size, *(axis.values[[0, -1]] * unit.factor)))
     if not axis.unit:
@@ -169,24 +139,19 @@ def _is_round(step: float) -> bool:
     return step > 0 and abs(float(f"{step:.{_ROUND_STEP_DIGITS - 1}e}") / step - 1) < _ROUND_STEP_TOLERANCE
 
 
-def _make_even_frequency(
-    signals: Sequence[Signal], frf: FrfCandidate, description: Description, report: ImportReport
-) -> Floats | None:
+def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], report: ImportReport) -> Floats:
     """Return the frequencies of the lines by the spacing in the description (Hz)."""
-    n, step, start = frf.signal.values.size, description.spacing, description.start or 0.0
+    n, step, start = frf[0].values.size, report.description.spacing, report.description.start or 0.0
     if step is None:
         fact, by_spacing = "the frequencies of its lines", "spacing 0.5 Description.start 0 in Hz"
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         if axis is None:
-            report.missing.append(f"{fact} (Description.{by_spacing})")
-        else:
-            columns = f'"frequency [Hz]={axis},{frf.format_columns_option()}", or [rad/s]'
-            report.add_missing(fact, "columns", f" {columns}; or Description.{by_spacing}")
-        return None
+            raise report.add_missing(fact, by_spacing)
+        columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
+        raise report.add_missing(fact, "columns", f' "{columns}", or [rad/s]; or Description.{by_spacing}')
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         fault = "give a spacing > 0 Hz and a start >= 0 Hz"
-        report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)
-        return None
+        raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)
     report.add_fact("lines", _format_lines(n, start, start + step * (n - 1)), "option")
     return np.asarray(start + step * np.arange(n), dtype=np.float64)
 
@@ -224,8 +189,8 @@ def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | 
     return np.where(invalid, 0.0, values)
 
 
-def _resolve_averages(contents: Contents, description: Description, report: ImportReport) -> int:
-    in_file, given = contents.averages, description.averages
+def _resolve_averages(contents: Contents, report: ImportReport) -> int:
+    in_file, given = contents.averages, report.description.averages
     if given is not None and given < 1:
         report.reject("averages", given, "give the number of hits averaged, 1 or more")
     elif in_file is not None and given is not None and given != in_file:

@@ -7,17 +7,10 @@ from decimal import Decimal
 import numpy as np
 
 from acquisition.arrays import Floats
+from acquisition.files.contents import resolve_unit
 from acquisition.files.contents.column_headings import format_signal_names
-from acquisition.files.contents.contents import Contents, Signal, cut_to_shortest, report_flaws
-from acquisition.files.contents.description import Description, ImportReport
-from acquisition.files.contents.resolve_unit import (
-    MOTION_QUANTITIES,
-    choose_signal,
-    convert_to_sensor_units,
-    resolve_force_unit,
-    resolve_response_unit,
-)
-from acquisition.files.contents.units import STANDARD_GRAVITY, parse_unit
+from acquisition.files.contents.contents import Contents, ImportReport, Signal, UnresolvedError, cut_to_shortest
+from acquisition.files.contents.units import MOTION_QUANTITIES, STANDARD_GRAVITY, parse_unit
 from acquisition.hit import Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
 from acquisition.hits.capture_hits import split_record
@@ -39,14 +32,14 @@ MIN_UNEVEN_STEPS = 20
 """Smallest number of uneven steps where few digits are the reason; a lost sample makes one."""
 
 
-def resolve_hits(contents: Contents, description: Description, report: ImportReport) -> list[Hit]:
+def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
     """Return the hits of each record; empty where the report says what is missing or wrong."""
     hits = list[Hit]()
     for record in dict.fromkeys(signal.record for signal in contents.signals):
-        record_report = ImportReport()
+        record_report = ImportReport(report.description)
         signals = [signal for signal in contents.signals if signal.record == record]
-        hit = _resolve_hit(signals, description, record_report)
-        if not record_report.is_clean or hit is None:
+        hit = record_report.attempt(_resolve_hit, signals)
+        if hit is None:
             report.merge(replace(record_report, facts=[]))
             return []
         report.facts += record_report.facts if not hits else []
@@ -57,29 +50,28 @@ def resolve_hits(contents: Contents, description: Description, report: ImportRep
     return hits
 
 
-def _resolve_hit(signals: Sequence[Signal], description: Description, report: ImportReport) -> Hit | None:
-    scaled = convert_to_sensor_units(apply_full_scale(signals, description, report), description, report)
+def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
+    scaled = report.attempt(resolve_unit.convert_to_sensor_units, apply_full_scale(signals, report))
     if scaled is None:
-        if sum(signal.role != "time" for signal in signals) > 2 and description.response is None:
+        if sum(signal.role != "time" for signal in signals) > 2 and report.description.response is None:
             report.add_missing("which of its responses is meant", "response", " 1")
-        resolve_rate(signals, (), description, report)
-        return None
-    forces, responses = _split_by_kind(scaled, description, report)
-    choice = ImportReport()
-    response = choose_signal(responses, description.response, "responses", choice) if responses else None
-    rate, used = resolve_rate(scaled, [*forces, *([response] if response else [])], description, report)
+        resolve_rate(signals, (), report)
+        raise UnresolvedError
+    forces, responses = _split_by_kind(scaled, report)
+    choice = ImportReport(report.description)
+    response = choice.attempt(resolve_unit.choose_signal, responses, "responses") if responses else None
+    rate, used = resolve_rate(scaled, [*forces, *([response] if response else [])], report)
     report.merge(choice)
     forces, response = (used[:-1], used[-1]) if response else (forces, None)
-    force = _resolve_force(forces, description, report)
-    unit = resolve_response_unit(response or responses[0], description, report) if responses else None
+    force = _resolve_force(forces, report)
+    unit = report.attempt(resolve_unit.resolve_response_unit, response or responses[0]) if responses else None
     _check_gravity_offset([response] if response else responses, report)
     if force is None or response is None or unit is None or not report.is_clean:
-        return None
+        raise UnresolvedError
     try:
         hit = make_hit_from_motion(force, response.values * unit[1], rate, unit[0])
     except ValueError as error:
-        report.faults.append(str(error))
-        return None
+        raise report.add_fault(str(error)) from error
     if unit[0] != "acceleration":
         report.add_fact("note", f"its {unit[0]} is differentiated")
     return hit
@@ -101,19 +93,17 @@ def make_hit_from_motion(force: Floats, response: Floats, rate: float, quantity:
     return Hit(recorded.force, acceleration, rate, overload=2 if find_overload(recorded, 1) else 0)
 
 
-def _resolve_force(forces: Sequence[Signal], description: Description, report: ImportReport) -> Floats | None:
+def _resolve_force(forces: Sequence[Signal], report: ImportReport) -> Floats | None:
     """Return the force (N), empty where none was measured; None where it or its unit is missing."""
-    if description.without_force:
+    if report.description.without_force:
         return np.empty(0)
-    to_newton = resolve_force_unit(forces[0], description, report) if len(forces) == 1 else None
+    to_newton = report.attempt(resolve_unit.resolve_force_unit, forces[0]) if len(forces) == 1 else None
     return None if to_newton is None else np.asarray(forces[0].values * to_newton)
 
 
-def _split_by_kind(
-    signals: Sequence[Signal], description: Description, report: ImportReport
-) -> tuple[list[Signal], list[Signal]]:
+def _split_by_kind(signals: Sequence[Signal], report: ImportReport) -> tuple[list[Signal], list[Signal]]:
     """Return forces and responses, and report where neither unit nor name tells them."""
-    needs_force = not description.without_force
+    needs_force = not report.description.without_force
     forces = [signal for signal in signals if needs_force and infer_kind(signal) == "force"]
     responses = [signal for signal in signals if infer_kind(signal) == "response"]
     unclear = [channel for channel in signals if not infer_kind(channel) and channel.role in ("", "real", "magnitude")]
@@ -121,18 +111,18 @@ def _split_by_kind(
     names = format_signal_names(channels)
     if len(channels) < 1 + needs_force:
         needed = f"a force and a response (Description.force FILE; {NO_FORCE_ADVICE})" if needs_force else "a response"
-        report.faults.append(f"it holds {names or 'nothing'} over time; a hit needs {needed}")
+        report.add_fault(f"it holds {names or 'nothing'} over time; a hit needs {needed}")
         return [], []
     if unclear and ((needs_force and not forces) or not responses):
         report.add_missing(f"what its columns are ({format_signal_names(signals)})", "columns", HIT_COLUMNS_EXAMPLE)
         return forces, responses
     if needs_force and not forces:
-        report.faults.append(f"no force channel among {names}; one is needed ({NO_FORCE_ADVICE})")
+        report.add_fault(f"no force channel among {names}; one is needed ({NO_FORCE_ADVICE})")
     if needs_force and len(forces) > 1:
         fact = f"which force of {format_signal_names(forces)} goes with which response"
         report.add_missing(fact, "columns", HIT_COLUMNS_EXAMPLE)
     if not responses:
-        report.faults.append(f"no channel of a response among {names}")
+        report.add_fault(f"no channel of a response among {names}")
     return forces, responses
 
 
@@ -145,24 +135,22 @@ def infer_kind(signal: Signal) -> str:
     return signal.role if signal.role in ("force", "response") else ""
 
 
-def resolve_rate(
-    signals: Sequence[Signal], used: Sequence[Signal], description: Description, report: ImportReport
-) -> tuple[float, list[Signal]]:
+def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: ImportReport) -> tuple[float, list[Signal]]:
     """Return the sample rate (Hz), 0 where it is missing or wrong, and the used signals in one length."""
     times = [signal for signal in signals if signal.role == "time"]
     used, times = cut_to_shortest(used, times, report)
     of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
     if len({signal.values.size for signal in of_one_length}) > 1:
-        report.faults.append(f"its channels differ in length: {format_signal_names(of_one_length)}")
+        report.add_fault(f"its channels differ in length: {format_signal_names(of_one_length)}")
         return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
-        report.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
+        report.add_fault(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
         return 0.0, used
     times = [time for time in times if time.values.size == of_one_length[0].values.size]
-    report_flaws([*used, *times], report)
+    report.add_flaws([*used, *times])
     by_axis = _compute_rate_from_time(times, report)
-    return _agree_on_rate(rates[0] if rates else by_axis, description.rate, report), used
+    return _agree_on_rate(rates[0] if rates else by_axis, report), used
 
 
 def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> float | None:
@@ -171,14 +159,14 @@ def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> fl
         return None
     size = times[0].values.size
     if size < 8:
-        report.faults.append(f"{size} samples; at least 8 are needed")
+        report.add_fault(f"{size} samples; at least 8 are needed")
         return None
     steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), report) for time in times]
     if not all(steps):
         return None
     starts = [time.values[0] for time in times]
     if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * size > steps[0]:
-        report.faults.append(f"its time axes differ: they begin at {starts} with steps of {steps}")
+        report.add_fault(f"its time axes differ: they begin at {starts} with steps of {steps}")
         return None
     unit = parse_unit(times[0].unit)
     return 1 / (steps[0] * unit.factor) if unit is not None and unit.quantity == "time" else None
@@ -192,7 +180,7 @@ def _resolve_step(time: Floats, report: ImportReport) -> float:
     printed = infer_printed_step(time) if step > 0 else None
     if printed is None:
         remedy = "where the time alone is wrong leave it out of Description.columns and give Description.rate"
-        report.faults.append(f"{fault}; {remedy}")
+        report.add_fault(f"{fault}; {remedy}")
         return 0.0
     if not any(fact.value == FEW_DIGITS for fact in report.facts):
         report.add_fact("note", FEW_DIGITS)
@@ -239,7 +227,8 @@ def _get_last_digit_exponent(value: float) -> int:
     return exponent if isinstance(exponent, int) else 0
 
 
-def _agree_on_rate(in_file: float | None, given: float | None, report: ImportReport) -> float:
+def _agree_on_rate(in_file: float | None, report: ImportReport) -> float:
+    given = report.description.rate
     if given is not None and not (np.isfinite(given) and given > 0):
         report.reject("rate", f"{given:g}", "give the samples a second, > 0 Hz")
     elif in_file is not None and given is not None and abs(given / in_file - 1) > 0.01:
@@ -258,20 +247,20 @@ def _check_gravity_offset(responses: Sequence[Signal], report: ImportReport) -> 
         offset = abs(float(np.median(signal.values))) if signal.values.size else 0.0
         if signal.unit.lower() == "g" and abs(offset - STANDARD_GRAVITY) < 0.5:
             reason = f"called g, rests at {offset:.2f}, which is gravity in m/s^2"
-            report.faults.append(f"unit of {signal.name} in doubt ({reason})")
+            report.add_fault(f"unit of {signal.name} in doubt ({reason})")
 
 
-def apply_full_scale(signals: Sequence[Signal], description: Description, report: ImportReport) -> list[Signal]:
+def apply_full_scale(signals: Sequence[Signal], report: ImportReport) -> list[Signal]:
     """Convert values that are shares of a full scale to their unit."""
-    shares = [signal for signal in signals if signal.per_full_scale]
-    if not shares:
-        if description.full_scale:
-            report.reject("full_scale", None, "its values are no shares of a full scale; leave it out")
-        return list(signals)
-    if len(description.full_scale) != len(shares):
+    shares, full_scale = [signal for signal in signals if signal.per_full_scale], report.description.full_scale
+    if full_scale and not shares:
+        report.reject("full_scale", None, "its values are no shares of a full scale; leave it out")
+    elif len(full_scale) != len(shares):
         fact = f"the full scale of its {len(shares)} channels, in their order and units"
         report.add_missing(fact, "full_scale", " 500,50")
+    elif shares:
+        report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in full_scale), "option")
+    if not shares or len(full_scale) != len(shares):
         return list(signals)
-    report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in description.full_scale), "option")
-    scale = dict(zip((id(signal) for signal in shares), description.full_scale, strict=True))
+    scale = dict(zip(map(id, shares), full_scale, strict=True))
     return [replace(signal, values=signal.values * scale.get(id(signal), 1.0)) for signal in signals]

@@ -3,7 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from acquisition.frf import FrfQuantity
 
@@ -17,36 +17,34 @@ STANDARD_GRAVITY = 9.80665
 POUND_FORCE = 4.4482216152605
 """Pound-force (N per lbf)."""
 
+MOTION_QUANTITIES = ("displacement", "velocity", "acceleration")
+"""Quantities of a response."""
 VOLTAGE_UNITS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
 """Volts per unit of a voltage in lower case; no part of other units."""
 
-QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
-    (0, 1, 0): "time",
-    (0, -1, 0): "frequency",
-    (0, 0, 1): "force",
-    (1, 0, 0): "displacement",
-    (1, -1, 0): "velocity",
-    (1, -2, 0): "acceleration",
-    (1, 0, -1): "receptance",
-    (1, -1, -1): "mobility",
-    (1, -2, -1): "accelerance",
-}
+_LENGTH, _VELOCITY, _ACCELERATION, _DIMENSIONLESS = (1, 0, 0), (1, -1, 0), (1, -2, 0), (0, 0, 0)
+_TIME, _FREQUENCY, _FORCE = (0, 1, 0), (0, -1, 0), (0, 0, 1)
+_FRF_DIMENSIONS = (1, 0, -1), (1, -1, -1), (1, -2, -1)
+_DIMENSIONS = (_TIME, _FREQUENCY, _FORCE, _LENGTH, _VELOCITY, _ACCELERATION, *_FRF_DIMENSIONS)
+QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = dict(
+    zip(_DIMENSIONS, get_args(MeasuredQuantity)[:-1], strict=True)
+)
 """Quantity by the exponents of length, time and force."""
-_LENGTH, _TIME, _FORCE, _DIMENSIONLESS = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
 _UNIT_GROUPS: tuple[tuple[Dimension, dict[str, float]], ...] = (
     (_LENGTH, {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9}),
     (_LENGTH, {"in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "ft": 0.3048}),
     (_TIME, {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}),
-    ((0, -1, 0), {"Hz": 1.0, "kHz": 1e3, "rpm": 1 / 60, "cpm": 1 / 60}),
+    (_FREQUENCY, {"Hz": 1.0, "kHz": 1e3, "rpm": 1 / 60, "cpm": 1 / 60}),
     (_DIMENSIONLESS, {"rad": 1 / (2 * math.pi)}),
     (_FORCE, {"N": 1.0, "newton": 1.0, "newtons": 1.0, "daN": 10.0, "kN": 1e3, "mN": 1e-3}),
     (_FORCE, {"lbf": POUND_FORCE, "lb": POUND_FORCE, "kgf": STANDARD_GRAVITY}),
     ((-1, 2, 1), {"kg": 1.0}),
-    ((1, -2, 0), {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
+    (_ACCELERATION, {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
 )
 _UNITS_BY_NAME = {name: (factor, group) for group, units in _UNIT_GROUPS for name, factor in units.items()}
-_UNITS_BY_LOWER_NAME = {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}
-"""Units in lower case. Mega and milli differ only in case: MN is unknown, and mN is known only as written."""
+_UNITS = _UNITS_BY_NAME | {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}
+"""Units as written and in lower case. Mega and milli differ only in case: MN is unknown, mN is known only as written.
+"""
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
 _TURNS_PER_MINUTE = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
 """Turns per minute as they are written; minutes are no unit otherwise ("x_min" is a minimum)."""
@@ -70,14 +68,8 @@ def parse_unit(text: str) -> Unit | None:
 
     Hz, rad/s and rpm are frequencies, in Hz; g is standard gravity.
     """
-    plain = (
-        re.sub(r"_?\bper\b_?|_per_", "/", text.strip())
-        .replace("⁻", "-")
-        .translate(_ASCII_EQUIVALENTS)
-        .replace("-^", "^-")
-        .replace("**", "^")
-    )
-    plain = _METERS_PER_SECOND.sub(r"m/s^\1", plain)
+    plain = re.sub(r"_?\bper\b_?|_per_", "/", text.strip()).replace("⁻", "-").translate(_ASCII_EQUIVALENTS)
+    plain = _METERS_PER_SECOND.sub(r"m/s^\1", plain.replace("-^", "^-").replace("**", "^"))
     plain = "rpm" if _TURNS_PER_MINUTE.fullmatch(plain) else plain
     try:
         tokens = _tokenize(plain)
@@ -121,14 +113,15 @@ def _parse_product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float,
 
 def _parse_factor(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
     name, power, number, sign, _ = tokens.pop()
+    unit = _UNITS.get(name) or _UNITS.get(name.lower())
     if number:
         return float(number), _DIMENSIONLESS
     if sign == "(":
         (value, dimension), power = _parse_product(tokens), tokens.pop()[4]
-    elif name in _UNITS_BY_NAME or name.lower() in _UNITS_BY_LOWER_NAME:
-        value, dimension = _UNITS_BY_NAME.get(name) or _UNITS_BY_LOWER_NAME[name.lower()]
-    else:
+    elif unit is None:
         raise ValueError(name or sign)
+    else:
+        value, dimension = unit
     exponent = int(power or 1)
     if abs(exponent) > 9:
         raise ValueError(power)

@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.arrays import Floats
 from acquisition.files.contents.column_headings import infer_role, split_heading
-from acquisition.files.contents.contents import Contents, Role, Signal, list_array_signals
+from acquisition.files.contents.contents import Contents, Signal, list_array_signals
 
 _WINDOW_NAME = re.compile(r"(response_?)?window(_?type)?", re.IGNORECASE)
 _WINDOW_LOUD_SHARE = 0.02
@@ -36,7 +35,7 @@ def find_window(variables: Mapping[str, Any]) -> str:
 
 def _infer_window(before: Any, behind: Any) -> str:
     """Infer the window between two signals (n, 2) of time and value; empty where they are equal, or none."""
-    if not all(isinstance(pairs, np.ndarray) and pairs.ndim == 2 and pairs.shape[1] == 2 for pairs in (before, behind)):
+    if not _is_pairs(before) or not _is_pairs(behind):
         return ""
     if before.shape != behind.shape or not np.any(before[:, 1]) or np.array_equal(before[:, 1], behind[:, 1]):
         return ""
@@ -45,11 +44,7 @@ def _infer_window(before: Any, behind: Any) -> str:
     ratio = windowed[loud] / raw[loud]
     if ratio.size < 3 or np.any(ratio <= 0):
         return "of unknown form"
-    return _fit_exponential(time[loud], np.log(ratio))
-
-
-def _fit_exponential(time: Floats, level: Floats) -> str:
-    """Fit an exponential to the logarithm of a window."""
+    time, level = time[loud], np.log(ratio)
     slope, start = np.polyfit(time, level, 1)
     if np.std(level - slope * time - start) > _WINDOW_FIT_TOLERANCE or slope > 0:
         return "of unknown form"
@@ -115,14 +110,11 @@ def _read_lobewatch(v: Mapping[str, Any]) -> Contents | None:
         signals = [Signal("frequency", v["frequency"], "frequency", "Hz"), Signal("frf", v["frf"], "frf", v["unit"])]
         signals += [Signal("coherence", v["coherence"], "coherence")] if "coherence" in v else []
         return replace(labelled, signals=tuple(signals), averages=int(v["averages"]))
-    rate = float(v["sample_rate"])
-    hits = np.atleast_2d(v["force"]), np.atleast_2d(v["acceleration"])
-    signals = []
-    for record, (force, acceleration) in enumerate(zip(*hits, strict=True)):
-        signals += [
-            Signal("force", force, "force", "N", rate=rate, record=record),
-            Signal("acceleration", acceleration, "response", "m/s^2", rate=rate, record=record),
-        ]
+    rate, signals = float(v["sample_rate"]), list[Signal]()
+    hits = zip(np.atleast_2d(v["force"]), np.atleast_2d(v["acceleration"]), strict=True)
+    for record, (force, acceleration) in enumerate(hits):
+        signals.append(Signal("force", force, "force", "N", rate=rate, record=record))
+        signals.append(Signal("acceleration", acceleration, "response", "m/s^2", rate=rate, record=record))
     return replace(labelled, signals=tuple(signals))
 
 
@@ -135,9 +127,9 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
     units, names = _list_texts(v.get("Unit")), _list_texts(v.get("ChanName"))
     frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
     hit = [(name, match[1]) for name in v if (match := re.fullmatch(r"X(\d+)", name)) and _is_pairs(v[name])]
-    over_time = list(_make_signal_calc_hit(v, hit, units, is_only_hit=not frfs))
+    over_time = list(_make_signal_calc_hit(v, hit, units))
     if not frfs:
-        return Contents(tuple(over_time)) if len(hit) > 1 else None
+        return Contents((over_time[0], *over_time[1::2])) if len(hit) > 1 else None
     signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
     for name, channel in frfs:
         label = f"{name} {_get_channel_text(names, channel)}".strip()
@@ -148,22 +140,18 @@ def _read_signal_calc(v: Mapping[str, Any]) -> Contents | None:
             signals.append(Signal(f"C1_{channel}", np.real(coherence[:, 1]), "coherence"))
     processing = " ".join(_list_texts(v.get("DP_Info")))
     averages = re.search(r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", processing, re.IGNORECASE)
-    return Contents((*signals, *over_time), averages=int(averages[1]) if averages else None)
+    signals += [replace(signal, role="", record=1) for signal in over_time]
+    return Contents(tuple(signals), averages=int(averages[1]) if averages else None)
 
 
 def _make_signal_calc_hit(
-    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, is_only_hit: bool
+    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str]
 ) -> Iterator[Signal]:
-    """Yield time and channels of a hit, with roles only where the file has no FRF."""
-    for number, (name, channel) in enumerate(hit):
-        role: Role = "force" if channel == "1" else "response"
-        record = 0 if is_only_hit else 1
-        if number == 0 or not is_only_hit:
-            time = np.real(v[name][:, 0])
-            yield Signal(f"{name}:1", time, "time" if is_only_hit else "", "s", record=record, is_before_window=True)
-        values = np.real(v[name][:, 1])
-        unit = _get_channel_text(units, channel)
-        yield Signal(f"{name}:2", values, role if is_only_hit else "", unit, record=record, is_before_window=True)
+    """Yield time and values of each channel of a hit."""
+    for name, channel in hit:
+        time, values, unit = np.real(v[name][:, 0]), np.real(v[name][:, 1]), _get_channel_text(units, channel)
+        yield Signal(f"{name}:1", time, "time", "s", is_before_window=True)
+        yield Signal(f"{name}:2", values, "force" if channel == "1" else "response", unit, is_before_window=True)
 
 
 def _is_pairs(value: Any) -> bool:
@@ -214,10 +202,9 @@ def _read_logger(v: Mapping[str, Any]) -> Contents | None:
     if "yspec" in v and "npts" in v and np.iscomplexobj(v["yspec"]):
         columns = np.atleast_2d(v["yspec"].T)
         signals = [Signal("frequency", np.arange(columns.shape[1]) * rate / float(v["npts"]), "frequency", "Hz")]
-        with_coherence = bool(v.get("tfun", 0)) and len(columns) == 2
-        signals.append(Signal("yspec:1", columns[0], "frf"))
-        roles = [("coherence", columns[1].real)] if with_coherence else [("frf", column) for column in columns[1:]]
-        signals += [Signal(f"yspec:{i}", column, role) for i, (role, column) in enumerate(roles, 2)]  # type: ignore[arg-type]
+        signals += [Signal(f"yspec:{i}", column, "frf") for i, column in enumerate(columns, 1)]
+        if v.get("tfun", 0) and len(columns) == 2:
+            signals[2] = replace(signals[2], values=columns[1].real, role="coherence")
         return Contents(tuple(signals))
     columns = np.atleast_2d(v["indata"].T)
     return Contents(tuple(Signal(f"indata:{i}", column, rate=rate) for i, column in enumerate(columns, 1)))
@@ -260,7 +247,8 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
     role.
     """
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
-    rate = next((float(v[name]) for name in v if _RATE_NAME.fullmatch(name) and _is_number(v[name])), None)
+    rates = (v[name] for name in v if _RATE_NAME.fullmatch(name) and isinstance(v[name], (int, float, np.number)))
+    rate = next((float(value) for value in rates if value > 0), None)
     axis = next((name for name in arrays if _TIME_NAME.fullmatch(name) and _has_equal_length(name, arrays)), None)
     if rate is None and axis is None:
         return None
@@ -280,10 +268,6 @@ def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
     """Return whether it is a vector as long as others: an axis, though its values may be none."""
     axis = arrays[name]
     return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.number)) and bool(value > 0)
 
 
 def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:

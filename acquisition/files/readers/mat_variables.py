@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from acquisition.errors import DataError
-from acquisition.files.hdf5_file import HDF5_SIGNATURE, MAX_UNPACKED_RATIO, MIN_UNPACKED_LIMIT, check_unpacked_size
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_ratio, check_unpacked_size, get_unpacked_limit
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 
 READ_CPU_TIME, READ_CPU_TIME_PER_BYTE = 2.0, 0.2e-6
@@ -71,31 +71,28 @@ def _compute_cpu_limit(size: int) -> float:
 
 
 def _limit_for_size(size: int) -> None:
-    limit_resources(_compute_cpu_limit(size), READ_MEMORY_FACTOR * max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * size))
+    limit_resources(_compute_cpu_limit(size), READ_MEMORY_FACTOR * get_unpacked_limit(size))
 
 
 def _read_v5(path: Path) -> dict[str, Any]:
     """Read the variables of v4 and v5 by name."""
     import scipy.io  # it takes a while, and HDF5 does not need it
 
-    size = path.stat().st_size
-    _limit_for_size(size)
+    _limit_for_size(path.stat().st_size)
     try:
         unpacked = sum(16 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(path))
     except TypeError:  # scipy names no shape of MATLAB's own objects (a table, a system), and passes over them
         unpacked = 0
-    if unpacked > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * size):
-        raise DataError(f"{path}: {size / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
+    check_unpacked_ratio(unpacked, path)
     variables = scipy.io.loadmat(path, simplify_cells=True)
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
 def _read_v73(path: Path) -> dict[str, Any]:
     """Read the variables of v7.3 by name: arrays transposed, complex numbers as pairs, text as 16-bit codes."""
-    size = path.stat().st_size
-    _limit_for_size(size)
+    _limit_for_size(path.stat().st_size)
     with h5py.File(path, "r") as file:
-        check_unpacked_size(file, size, path)
+        check_unpacked_size(file, path.stat().st_size, path)
         return {name: _convert_node(node) for name, node in file.items() if name != "#refs#"}
 
 

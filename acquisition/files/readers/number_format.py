@@ -17,7 +17,10 @@ from acquisition.arrays import Floats
 
 SignUse = Literal["decimal", "thousands", "doubtful"]
 """Use of a sign in a number."""
-
+NumberFormat = Mapping[str, SignUse]
+"""Use of a comma and of a point in the numbers of a column."""
+PLAIN_NUMBER_FORMAT: NumberFormat = {",": "decimal", ".": "decimal"}
+"""Format with a decimal point or comma and nothing between thousands."""
 _OTHER_SIGN = {",": ".", ".": ","}
 _BLANK_CHARACTERS = " \u00a0\u2009\u202f'\u2019"
 """Blanks between thousands, some of them non-breaking or thin, and apostrophes."""
@@ -38,34 +41,16 @@ _MISSING_VALUE = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QN
 """Missing value as spreadsheets and older C libraries write it."""
 
 
-@dataclass(frozen=True)
-class NumberFormat:
-    """Number format of a column."""
-
-    comma: SignUse = "decimal"
-    """Use of a comma."""
-    point: SignUse = "decimal"
-    """Use of a point."""
-
-    @property
-    def non_decimal_signs(self) -> str:
-        """Signs that are no decimal sign, or perhaps none."""
-        return "".join(sign for sign, use in ((",", self.comma), (".", self.point)) if use != "decimal")
-
-    def parse(self, word: str) -> complex:
-        """Parse a word, real where possible; raise ValueError with the end of a sentence where it is no number."""
-        plain = re.sub(f"[{_BLANK_CHARACTERS}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
-        for sign, use in ((",", self.comma), (".", self.point)):
-            if use != "decimal" and sign in plain:
-                plain = _remove_thousands(plain, sign, use)
-        try:
-            return _parse_number(plain.replace(",", "."))
-        except ValueError:
-            raise ValueError("which is no number") from None
-
-
-PLAIN_NUMBER_FORMAT = NumberFormat()
-"""Format with a decimal point or comma and nothing between thousands."""
+def _parse_word(word: str, numerals: NumberFormat) -> complex:
+    """Parse a word, real where possible; raise ValueError with the end of a sentence where it is no number."""
+    plain = re.sub(f"[{_BLANK_CHARACTERS}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
+    for sign, use in numerals.items():
+        if use != "decimal" and sign in plain:
+            plain = _remove_thousands(plain, sign, use)
+    try:
+        return _parse_number(plain.replace(",", "."))
+    except ValueError:
+        raise ValueError("which is no number") from None
 
 
 def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
@@ -84,7 +69,8 @@ def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
     comma, point = _agree_on_use(commas), _agree_on_use(points)
     if point == "doubtful" and not {"decimal", "doubtful"} & {*commas}:
         point = "decimal"
-    return list(map(NumberFormat, _resolve_uses(commas, comma), _resolve_uses(points, point)))
+    uses = zip(_resolve_uses(commas, comma), _resolve_uses(points, point), strict=True)
+    return [{",": of_comma, ".": of_point} for of_comma, of_point in uses]
 
 
 def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
@@ -115,7 +101,7 @@ def _classify_sign(sign: str, word: str) -> SignUse | None:
 def is_number(word: str) -> bool:
     """Return whether a word is a number in any format."""
     try:
-        PLAIN_NUMBER_FORMAT.parse(word)
+        _parse_word(word, PLAIN_NUMBER_FORMAT)
     except ValueError:
         return any(_classify_sign(sign, word) for sign in _OTHER_SIGN)
     return True
@@ -146,8 +132,9 @@ def parse_columns(columns: Sequence[Sequence[str]], lines: Sequence[int], decima
 
     decimal_sign: a comma or a point where it is known; the other one separates thousands then.
     """
-    by_sign = {",": NumberFormat("decimal", "thousands"), ".": NumberFormat("thousands", "decimal")}
-    written = [by_sign[decimal_sign]] * len(columns) if decimal_sign in by_sign else _infer_formats(columns)
+    written = _infer_formats(columns)
+    if decimal_sign in _OTHER_SIGN:
+        written = [{decimal_sign: "decimal", _OTHER_SIGN[decimal_sign]: "thousands"}] * len(columns)
     return [_parse_column(cells, lines, numerals) for cells, numerals in zip(columns, written, strict=True)]
 
 
@@ -161,7 +148,7 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
     values, flaws = list[complex](), dict[int, str]()
     for i, (cell, line) in enumerate(zip(cells[:n], lines, strict=False)):
         try:
-            values.append(numerals.parse(cell))
+            values.append(_parse_word(cell, numerals))
             fault = "which is no number" if math.isnan(values[-1].real) else ""
         except ValueError as error:
             values.append(math.nan)
@@ -174,7 +161,7 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
 def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> Floats | None:
     """Parse cells at once; None where a number is complex or missing, or has thousands."""
     text = "\n".join(cells)
-    if any(sign in text for sign in numerals.non_decimal_signs):
+    if any(use != "decimal" and sign in text for sign, use in numerals.items()):
         return None
     try:
         values = np.array([*map(float, text.replace(",", ".").split("\n") if "," in text else cells)])

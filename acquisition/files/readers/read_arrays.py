@@ -14,7 +14,7 @@ import numpy as np
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import infer_role
 from acquisition.files.contents.contents import Contents, Format, Signal, list_array_signals, list_distinct_names
-from acquisition.files.hdf5_file import HDF5_SIGNATURE, MAX_UNPACKED_RATIO, MIN_UNPACKED_LIMIT
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_ratio
 from acquisition.files.readers.mat_layouts import find_window, recognize_layout
 from acquisition.files.readers.mat_variables import MAT_V73_SIGNATURE, read_mat_variables
 
@@ -26,21 +26,16 @@ _MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
 def read_mat(path: Path) -> Contents:
     """Read the arrays of a MATLAB file; raise DataError where it is damaged or unpacks out of proportion."""
     variables = read_mat_variables(path)
-    contents = recognize_layout(variables)
-    if contents is not None:
-        return contents
-    return Contents(tuple(list_array_signals(variables)), window=find_window(variables))
+    return recognize_layout(variables) or Contents(tuple(list_array_signals(variables)), window=find_window(variables))
 
 
 def _is_mat(head: bytes, _path: Path) -> bool:
-    return head.startswith((_MAT_V5_SIGNATURE, MAT_V73_SIGNATURE)) or _is_mat_v4(head)
-
-
-def _is_mat_v4(head: bytes) -> bool:
-    """Return whether a file begins with the header of a matrix, in either byte order, and its name.
+    """Return whether a file begins with a signature, or with the header of a matrix in either byte order and its name.
 
     Source: MAT-File Format (The MathWorks), level 4: type, rows, columns, whether complex, length of the name.
     """
+    if head.startswith((_MAT_V5_SIGNATURE, MAT_V73_SIGNATURE)):
+        return True
     for order, least in (("<", 0), (">", 1000)):
         kind, rows, columns, is_complex, length = struct.unpack_from(f"{order}5i", head.ljust(20))
         sizes = rows >= 0 and columns >= 0 and is_complex in (0, 1)
@@ -67,7 +62,8 @@ def read_numpy(path: Path) -> Contents:
 
 def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     if zipfile.is_zipfile(file):
-        _check_zip_size(file, path)
+        with zipfile.ZipFile(file) as archive:
+            check_unpacked_ratio(sum(member.file_size for member in archive.infolist()), path)
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
@@ -75,14 +71,6 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
         return _make_array_contents({"array": loaded} if fields is None else {name: loaded[name] for name in fields})
     with loaded:
         return _make_array_contents({name: loaded[name][()] for name in loaded.files})
-
-
-def _check_zip_size(file: BinaryIO, path: Path) -> None:
-    packed = path.stat().st_size
-    with zipfile.ZipFile(file) as archive:
-        unpacked = sum(member.file_size for member in archive.infolist())
-    if unpacked > max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed):
-        raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
 
 
 def read_hdf5(path: Path) -> Contents:
@@ -100,10 +88,6 @@ def _is_numpy(head: bytes, path: Path) -> bool:
 
 def _is_hdf5(head: bytes, _path: Path) -> bool:
     return head.startswith(HDF5_SIGNATURE)
-
-
-NUMPY_FORMAT = Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy)
-FOREIGN_HDF5_FORMAT = Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5)
 
 
 _SEP005_KEYS = ("data", "name", "unit_str")
@@ -134,9 +118,9 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
             time = None if rate is not None else np.asarray(channel["time"], dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise DataError(f"{where}: {error}") from error
-        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         if rate is not None and not rate > 0:
             raise DataError(f"{where}: fs={rate} Hz is not > 0")
+        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}
@@ -156,4 +140,8 @@ def _is_sep005(head: bytes, _path: Path) -> bool:
     return head.lstrip().startswith(b"[") and b"{" in head[:200] and b'"' in head[:200]
 
 
-SEP005_FORMAT = Format("sep005", "SDyPy SEP005 time series", (".json",), _is_sep005, read_sep005)
+ARRAY_FORMATS = (
+    Format("sep005", "SDyPy SEP005 time series", (".json",), _is_sep005, read_sep005),
+    Format("numpy", "NumPy file", (".npy", ".npz"), _is_numpy, read_numpy),
+    Format("hdf5", "HDF5 file of another program", (".hdf5", ".h5", ".hdf"), _is_hdf5, read_hdf5),
+)

@@ -16,7 +16,7 @@ import numpy as np
 
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import infer_role, split_heading
-from acquisition.files.contents.contents import Contents, Format, Signal, list_distinct_names
+from acquisition.files.contents.contents import Contents, Format, Signal, list_distinct_names, parse_local_time
 from acquisition.files.readers.number_format import parse_columns
 from acquisition.files.readers.text_file import decode_text, read_text
 
@@ -86,17 +86,11 @@ def _get_word(words: Sequence[str], i: int) -> str:
 def _parse_lvm_date(head: Mapping[str, str]) -> datetime | None:
     """Return date and time of the header in the local time zone; None where they cannot be read."""
     clock = head.get("Time", "").replace(",", ".").partition(".")[0]
-    try:
-        return datetime.strptime(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S").astimezone()
-    except ValueError:
-        return None
+    return parse_local_time(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S")
 
 
 def _is_lvm(head: bytes, _path: Path) -> bool:
     return decode_text(head).startswith(LVM_MAGIC)
-
-
-LVM_FORMAT = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm)
 
 
 def read_tdms(path: Path) -> Contents:
@@ -137,4 +131,7 @@ def _get_tdms_start(channel: Any) -> datetime | None:
     return datetime.fromtimestamp(float(seconds), UTC)
 
 
-TDMS_FORMAT = Format("tdms", "TDMS file", (".tdms",), lambda head, _path: head.startswith(b"TDSm"), read_tdms)
+LABVIEW_FORMATS = (
+    Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm),
+    Format("tdms", "TDMS file", (".tdms",), lambda head, _path: head.startswith(b"TDSm"), read_tdms),
+)

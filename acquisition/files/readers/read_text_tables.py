@@ -20,20 +20,9 @@ import numpy as np
 
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import infer_decibel_unit, infer_role, is_decibel
-from acquisition.files.contents.contents import Contents, Format, Role, Signal
+from acquisition.files.contents.contents import Contents, Format, Role, Signal, parse_local_time
+from acquisition.files.readers import table_layout as layout
 from acquisition.files.readers.number_format import Column, is_number
-from acquisition.files.readers.table_layout import (
-    Heading,
-    RowLayout,
-    begins_with_number,
-    detect_row_layout,
-    detect_separator,
-    find_heading_above,
-    find_heading_behind,
-    is_unit_line,
-    normalize_complex,
-    read_columns,
-)
 from acquisition.files.readers.text_file import NumberedLines, decode_text, is_text, number_lines, read_text
 
 _DIGIT = re.compile(r"\d|nan|inf", re.IGNORECASE)
@@ -56,7 +45,7 @@ def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
     signals, notes = list[Signal](), list[str]()
     for record, table in enumerate(_split_tables(path, lines)):
         rows, form, heading = _find_rows(path, table, comments)
-        columns = read_columns(rows, form, str(path), decimal_sign)
+        columns = layout.read_columns(rows, form, str(path), decimal_sign)
         signals += _name_columns(columns, heading, record)
         extras = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
         notes += [f"beside its columns stands {word!r} in the last row" for word in extras]
@@ -71,23 +60,23 @@ def _split_tables(path: Path, lines: NumberedLines) -> Iterator[NumberedLines]:
     first = _find_first_row(path, lines)
     above = {line for line in texts[:first] if _LEADING_WORD.match(line)}
     again = [i for i in range(first, len(texts)) if texts[i] in above]
-    begins = dict.fromkeys(next(j for j in range(i, 0, -1) if begins_with_number(texts[j - 1])) for i in again)
+    begins = dict.fromkeys(next(j for j in range(i, 0, -1) if layout.begins_with_number(texts[j - 1])) for i in again)
     return map(lines.__getitem__, map(slice, [0, *begins], [*begins, len(texts)]))
 
 
 def _remove_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
     """Return the lines up to the last that may be a row, and the words behind it."""
-    form = detect_separator(lines.texts[-1:] or [""])
+    form = layout.detect_separator(lines.texts[-1:] or [""])
     last = next((i for i in range(len(lines.texts), 0, -1) if _may_be_row(lines.texts[i - 1], form)), 0)
     return (lines[:last], lines.texts[last:]) if last else (lines, [])
 
 
-def _may_be_row(line: str, form: RowLayout) -> bool:
+def _may_be_row(line: str, form: layout.RowLayout) -> bool:
     """Return whether a line has a digit, and more than one number where it begins with a word."""
     return bool(_DIGIT.search(line)) and (not _LEADING_WORD.match(line) or sum(map(is_number, form.split(line))) > 1)
 
 
-def _name_columns(columns: Sequence[Column], heading: Heading, record: int) -> list[Signal]:
+def _name_columns(columns: Sequence[Column], heading: layout.Heading, record: int) -> list[Signal]:
     """Return the columns with their names, units and roles; heading: empty without one."""
     n_rows = max((column.values.size for column in columns), default=0)
     named = zip(heading or [("", "")] * len(columns), columns, strict=True)
@@ -107,26 +96,29 @@ def _make_column_signal(name: str, unit: str, column: Column) -> Signal:
     return Signal(name, values, "" if role == "frf" else role, unit, flaws=flaws)
 
 
-def _find_rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowLayout, Heading]:
+def _find_rows(
+    path: Path, lines: NumberedLines, comments: Sequence[str]
+) -> tuple[NumberedLines, layout.RowLayout, layout.Heading]:
     """Return the rows, their layout, and the heading above them, behind the first or among comments."""
     first = _find_first_row(path, lines)
     begin = max(first - 1, 0)  # of the row that may have the heading behind it
-    plain = NumberedLines([*map(normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
-    form = detect_row_layout(plain.texts[first - begin :])
+    plain = NumberedLines([*map(layout.normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
+    form = layout.detect_row_layout(plain.texts[first - begin :])
     if not form.columns:
         cure = "pass over what stands above them with Description.skip"
         raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
     width = len(form.split(plain.texts[first - begin :][:2][-1]))
-    if not _begins_in_column(plain.texts[first - begin], form) and is_unit_line(lines.texts[:first], form, width):
+    above = lines.texts[:first]
+    if layout.is_unit_line(above, form, width) and not _begins_in_column(plain.texts[first - begin], form):
         first += 1  # it holds ranges
     for at in (first, begin):
-        if heading := find_heading_behind(plain.texts[at - begin], form):
+        if heading := layout.find_heading_behind(plain.texts[at - begin], form):
             return plain[at - begin :], form, heading
     _reject_broken_row(path, lines[:first], form, width)
-    return plain[first - begin :], form, find_heading_above([*comments, *lines.texts[:first]], form, width)
+    return plain[first - begin :], form, layout.find_heading_above([*comments, *lines.texts[:first]], form, width)
 
 
-def _begins_in_column(line: str, form: RowLayout) -> bool:
+def _begins_in_column(line: str, form: layout.RowLayout) -> bool:
     """Return whether the first of the columns holds a number in this line."""
     words = form.split(line)
     return form.columns[0] < len(words) and is_number(words[form.columns[0]])
@@ -134,22 +126,22 @@ def _begins_in_column(line: str, form: RowLayout) -> bool:
 
 def _find_first_row(path: Path, lines: NumberedLines) -> int:
     texts = lines.texts
-    begins = [begins_with_number(line) for line in texts[:MIN_TABLE_ROWS]]
+    begins = [layout.begins_with_number(line) for line in texts[:MIN_TABLE_ROWS]]
     for i in range(len(texts)):
         if all(begins[i : i + MIN_TABLE_ROWS]) and len(texts) > 1:
             return i
-        begins += [begins_with_number(line) for line in texts[i + MIN_TABLE_ROWS : i + MIN_TABLE_ROWS + 1]]
+        begins += [layout.begins_with_number(line) for line in texts[i + MIN_TABLE_ROWS : i + MIN_TABLE_ROWS + 1]]
     if len(texts) < 2:
         raise DataError(f"{path}: {len(texts)} lines; a heading and rows of numbers are needed")
     raise DataError(f"{path}: line {lines.numbers[1]}: {texts[1].strip()[:60]!r} is no row of numbers")
 
 
-def _reject_broken_row(path: Path, above: NumberedLines, form: RowLayout, width: int) -> None:
+def _reject_broken_row(path: Path, above: NumberedLines, form: layout.RowLayout, width: int) -> None:
     """Raise DataError where the last line above the rows may be one of them; below a line of units it holds ranges."""
-    words = form.split(normalize_complex(above.texts[-1])) if above.texts else []
+    words = form.split(layout.normalize_complex(above.texts[-1])) if above.texts else []
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
-    if may_be_row and not is_unit_line(above.texts[-2:-1], form, width):
+    if may_be_row and not layout.is_unit_line(above.texts[-2:-1], form, width):
         cure = f"mend it, or pass over what stands above the rows with Description.skip {above.numbers[-1]}"
         place = f"{path}: line {above.numbers[-1]}"
         raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")
@@ -182,12 +174,6 @@ def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[
     return Contents(signals, n_averages, created, direction, tool, window=keys.get("window", ""))
 
 
-_TABLE_EXTENSIONS = (".csv", ".txt", ".frf", ".dat", ".asc")
-TEXT_TABLE_FORMAT = Format(
-    "table", "text table", _TABLE_EXTENSIONS, lambda head, _path: is_text(head), read_table, read_from=read_table
-)
-
-
 PULSE_MAGIC = "Header Size:"
 _PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), ("M", "%m"), ("dd", "%d"), ("d", "%d"))
 
@@ -196,15 +182,16 @@ def read_pulse(path: Path) -> Contents:
     """Read the function of every block; raise DataError where it is cut short or its header states too little."""
     lines, _ = number_lines(read_text(path), 0)
     blocks = _find_pulse_blocks(lines)
-    header = _parse_pulse_header(lines.texts[: blocks[0][0]]) if blocks else {}
+    pairs = (line.partition(":") for line in (lines.texts[: blocks[0][0]] if blocks else []))
+    header = {key.strip().lower(): value.strip() for key, _, value in pairs if value.strip()}
     try:
         is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
-        form, sign = RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
+        form, sign = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
     except (KeyError, ValueError) as error:
         raise DataError(f"{path}: its header lacks {error}, or no row follows it; export it anew") from error
     signals = list[Signal]()
     for record, (first, after) in enumerate(blocks):
-        columns = read_columns(lines[first:after], form, str(path), sign)
+        columns = layout.read_columns(lines[first:after], form, str(path), sign)
         n_there = min(column.values.size for column in columns)
         if n_there != n:
             place = f"{path}: line {lines.numbers[after - 1]}"
@@ -226,12 +213,6 @@ def _find_pulse_blocks(lines: NumberedLines) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _parse_pulse_header(lines: Sequence[str]) -> dict[str, str]:
-    """Return the values by their keys in lower case."""
-    parts = (line.partition(":") for line in lines)
-    return {key.strip().lower(): value.strip() for key, _, value in parts if value.strip()}
-
-
 def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
     function = header.get("function", "").lower()
     if "response" in function:
@@ -245,14 +226,20 @@ def _parse_pulse_date(header: Mapping[str, str]) -> datetime | None:
     for part, directive in _PULSE_DATE_PARTS:
         pattern = re.sub(rf"(?<![%\w]){part}(?!\w)", directive, pattern)
     clock = ":".join(header.get("time", "").split(":")[:3])
-    try:
-        return datetime.strptime(f"{header.get('date', '')} {clock}", f"{pattern} %H:%M:%S").astimezone()
-    except ValueError:
-        return None
+    return parse_local_time(f"{header.get('date', '')} {clock}", f"{pattern} %H:%M:%S")
 
 
 def _is_pulse(head: bytes, _path: Path) -> bool:
     return decode_text(head).startswith(PULSE_MAGIC)
 
 
-PULSE_FORMAT = Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse)
+def _is_table(head: bytes, _path: Path) -> bool:
+    return is_text(head)
+
+
+_TABLE_EXTENSIONS = (".csv", ".txt", ".frf", ".dat", ".asc")
+TEXT_FORMATS = (
+    Format("pulse", "B&K PULSE text", (".txt",), _is_pulse, read_pulse),
+    Format("table", "text table", _TABLE_EXTENSIONS, _is_table, read_table, read_from=read_table),
+)
+"""Formats of text; the table is last because it takes any text."""

@@ -6,14 +6,177 @@ Cincinnati, SDRL).
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
+from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Format, Role, Signal
+from acquisition.files.contents.contents import Contents, Format, Role, Signal, parse_local_time
 from acquisition.files.readers.text_file import decode_utf8_or_latin1
-from acquisition.files.readers.uff_dataset_58 import UffFunction, read_function
+
+_NUMBERS_PER_VALUE = {2: 1, 4: 1, 5: 2, 6: 2}
+"""Number of numbers per value by the type of the ordinate data: real and complex, single and double."""
+_NUMBER_TOKEN = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[EeDd][+-]?\d+)?|[+-]?nan|[+-]?inf", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class UffAxis:
+    """Abscissa, ordinate or its denominator."""
+
+    type: int
+    """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
+    unit: str
+    """Unit; empty where unknown."""
+
+
+@dataclass(frozen=True, eq=False)
+class UffFunction:
+    """Data set 58."""
+
+    lines: tuple[str, ...]
+    """Five lines of identification."""
+    type: int
+    """Code of the function: 1 over time, 4 FRF, 6 coherence."""
+    name: str
+    """Name for people: the measured points."""
+    response_direction: int
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where unknown."""
+    reference_direction: int
+    """Direction of the hammer in the same code."""
+    place: tuple[object, ...]
+    """Nodes and directions, equal for an FRF and its coherence."""
+    abscissa: Floats
+    """Abscissa in its unit, shape (n,)."""
+    step: float
+    """Step of an even abscissa; 0 where it is uneven."""
+    values: Floats | Complexes
+    """Values of the function in their unit, shape (n,)."""
+    abscissa_axis: UffAxis
+    """Quantity and unit of the abscissa."""
+    ordinate: UffAxis
+    """Quantity and unit of the values."""
+    denominator: UffAxis
+    """Quantity and unit that the values were divided by."""
+
+    @property
+    def keys(self) -> dict[str, str]:
+        """Entries `key=value` in the lines of identification, as lobewatch writes them."""
+        return {key: value for line in self.lines for key, value in re.findall(r"(\w+)=([^;]*)(?:;|$)", line)}
+
+    @property
+    def averages(self) -> int | None:
+        """Number of averaged hits; None where unknown."""
+        text = " ".join(self.lines)
+        number = self.keys.get("averages", "") or "".join(re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", text)[:1])
+        return int(number) if number.strip().isdigit() else None
+
+    @property
+    def window(self) -> str:
+        """Window over the response; empty where unknown."""
+        match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
+        return match[1].strip() if match else ""
+
+
+def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, int]:
+    """Read the data set whose first line begins here, and return where its values end; place: for errors."""
+    ends = [begin]
+    for _ in range(12):
+        end = content.find(b"\n", ends[-1])
+        if end < 0:
+            raise DataError(f"{place}: {len(ends) - 1} of 12 header lines are there; it is cut short")
+        ends.append(end + 1)
+    lines = [decode_utf8_or_latin1(content[a:b]).rstrip("\r\n") for a, b in pairwise(ends)]
+    try:
+        kind, n, spacing = map(int, lines[7].split()[:3])
+        start, step = map(float, lines[7].split()[3:5])
+        per_value = _NUMBERS_PER_VALUE[kind]
+        if n < 1:
+            raise ValueError(n)
+    except (ValueError, KeyError) as error:
+        raise DataError(f"{place}: line 7 of its header cannot be read ({lines[7].strip()!r})") from error
+    even, width = bool(spacing), per_value + (0 if spacing else 1)
+    if lines[0].split()[0] == "58":
+        numbers, after = _read_text_values(place, content, ends[-1], n * width)
+    else:
+        numbers, after = _read_binary_values(place, lines[0], content, ends[-1], n, (kind, even))
+    table = numbers.reshape(n, width)
+    abscissa = start + step * np.arange(n, dtype=np.float64) if even else table[:, 0]
+    values = table[:, -1] if per_value == 1 else table[:, -2] + 1j * table[:, -1]
+    return _make_function(lines, abscissa, step if even else 0.0, values), after
+
+
+def _make_function(lines: list[str], abscissa: Floats, step: float, values: Floats | Complexes) -> UffFunction:
+    six = lines[6].ljust(80)
+    response, reference = (_parse_point(six[31:55]), _parse_point(six[56:80]))
+    below = _format_point(reference)
+    where = " ".join(filter(None, [_format_point(response), "over" if below else "", below]))
+    name = where or lines[9].ljust(80)[26:46].strip() or "function"
+    points = response[2], reference[2], (*response, *reference)
+    axes = map(_parse_axis, lines[8:11])
+    function = UffFunction(tuple(lines[1:6]), int(six[:5]), name, *points, abscissa, step, values, *axes)
+    exact = function.keys.get("step")
+    if exact and step and abs(float(exact) / step - 1) < 1e-4:
+        even = float(exact) * np.arange(values.size, dtype=np.float64)
+        return replace(function, abscissa=float(function.keys.get("start", abscissa[0])) + even, step=float(exact))
+    return function
+
+
+def _parse_point(text: str) -> tuple[str, int, int]:
+    """Return name, node and direction."""
+    name = text[:10].strip()
+    node, direction = (re.sub(r"[^\d-]", "", part) for part in (text[10:20], text[20:24]))
+    return ("" if name == "NONE" else name), int(node or 0), int(direction or 0)
+
+
+def _format_point(point: tuple[str, int, int]) -> str:
+    name, node, direction = point
+    axis = "xyz"[abs(direction) - 1] if 0 < abs(direction) < 4 else ""
+    sign = f"-{axis}" if direction < 0 else axis
+    return " ".join(filter(None, [name, str(node) if node or sign else "", sign]))
+
+
+def _parse_axis(line: str) -> UffAxis:
+    line = line.ljust(80)
+    unit = line[47:67].strip()
+    return UffAxis(int(line[:10].split()[0] if line[:10].split() else 0), "" if unit.upper() == "NONE" else unit)
+
+
+def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[Floats, int]:
+    """Read n numbers in columns that may touch each other."""
+    end = content.find(b"\n    -1", begin - 1)
+    body = content[begin : end if end >= 0 else len(content)]
+    numbers = _NUMBER_TOKEN.findall(body)
+    strays = _NUMBER_TOKEN.sub(b"", body).split()
+    if strays:
+        raise DataError(f"{place}: {strays[0][:20]!r} stands among its values")
+    if len(numbers) != n or end < 0:
+        raise DataError(f"{place}: {len(numbers)} of {n} numbers are there; it is cut short or damaged")
+    return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in numbers]), begin + len(body)
+
+
+def _read_binary_values(
+    place: str, head: str, content: bytes, begin: int, n: int, layout: tuple[int, bool]
+) -> tuple[Floats, int]:
+    """Read n values; an uneven abscissa is single precision next to single values, else double."""
+    kind, even = layout
+    words = head.split()
+    order, form = int(words[1]), int(words[2])
+    if form != 2 or order not in (1, 2):
+        raise DataError(f"{place}: binary form {order} {form}; IEEE numbers (1 2 or 2 2) are read")
+    sign, size = "<>"[order - 1], 4 if kind in (2, 5) else 8
+    value = [("value", f"{sign}f{size}", (_NUMBERS_PER_VALUE[kind],))]
+    row = np.dtype(value if even else [("abscissa", f"{sign}f{size}"), *value])
+    body = content[begin : begin + n * row.itemsize]
+    if len(body) < n * row.itemsize:
+        raise DataError(f"{place}: {len(body)} of {n * row.itemsize} bytes of values are there; it is cut short")
+    table = np.frombuffer(body, row)
+    parts = [table["value"]] if even else [table["abscissa"][:, None], table["value"]]
+    return np.hstack(parts).astype(np.float64).ravel(), begin + len(body)
+
 
 _DATA_SET_MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
 _UNIT_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN"), 7: ("in", "lbf"), 9: ("mm", "N")}
@@ -142,13 +305,7 @@ def _list_notes(frfs: Sequence[UffFunction]) -> Iterator[str]:
 
 def _parse_date(function: UffFunction) -> datetime | None:
     """Return the date of the third line, or that of lobewatch's own files; local time where it has no zone."""
-    text = function.keys.get("recorded") or function.lines[2].strip()
-    for form in _DATE_FORMATS:
-        try:
-            return datetime.strptime(text, form).astimezone()
-        except (ValueError, OverflowError, OSError):
-            continue
-    return None
+    return parse_local_time(function.keys.get("recorded") or function.lines[2].strip(), *_DATE_FORMATS)
 
 
 def _is_uff(head: bytes, _path: Path) -> bool:

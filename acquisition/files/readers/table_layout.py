@@ -72,13 +72,8 @@ def detect_separator(rows: Sequence[str]) -> RowLayout:
             return RowLayout(separator)
     with_comma = next((row for row in rows if "," in row), "")
     words = re.split(BLANK_SEPARATOR, with_comma.strip())
-    may_be_blanks = not with_comma or (len(words) > 1 and all(map(_is_single_number, words)))
-    return RowLayout(BLANK_SEPARATOR if may_be_blanks else ",")
-
-
-def _is_single_number(word: str) -> bool:
-    """Return whether a word is one number instead of a part of a row between commas."""
-    return is_number(word) and not word.endswith(",")
+    are_numbers = len(words) > 1 and all(is_number(word) and not word.endswith(",") for word in words)
+    return RowLayout(BLANK_SEPARATOR if are_numbers or not with_comma else ",")
 
 
 def detect_row_layout(rows: Sequence[str]) -> RowLayout:
@@ -87,7 +82,8 @@ def detect_row_layout(rows: Sequence[str]) -> RowLayout:
     begin, below = rows[:MIN_SHORT_COLUMN_ROWS], rows[MIN_SHORT_COLUMN_ROWS:]
     sample = [form.split(row) for row in (*begin, *below[:: max(len(below) // LAYOUT_SAMPLE_ROWS, 1)])]
     if len(rows) < MIN_ROWS_FOR_TEXT_COLUMN:
-        return replace(form, columns=tuple(range(len(_trim_empty_end(sample[0])))))
+        words = sample[0]
+        return replace(form, columns=tuple(range(len(words) - (len(words) > 1 and not words[-1]))))
     in_columns = itertools.zip_longest(*sample, fillvalue="")
     return replace(form, columns=tuple(i for i, words in enumerate(in_columns) if _is_number_column(words)))
 
@@ -96,11 +92,6 @@ def _is_number_column(words: Sequence[str]) -> bool:
     """Return whether most words are numbers, or most of those above the last number where these are no notes."""
     filled = [i for i, word in enumerate(words, 1) if is_number(word)]
     return 2 * len(filled) > len(words) or (len(filled) >= MIN_SHORT_COLUMN_ROWS and 2 * len(filled) > filled[-1])
-
-
-def _trim_empty_end(words: Sequence[str]) -> Sequence[str]:
-    """Remove an empty word behind the last separator."""
-    return words[:-1] if len(words) > 1 and not words[-1] else words
 
 
 def read_columns(rows: NumberedLines, form: RowLayout, place: str, decimal_sign: str = "") -> list[Column]:

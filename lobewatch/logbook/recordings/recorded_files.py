@@ -22,8 +22,7 @@ from acquisition import (
     new_tap_id,
     parse_direction,
 )
-from acquisition.files.contents.contents import format_window
-from acquisition.files.contents.description import Origin
+from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
 from lobewatch.machine import Machine, MachineFolder

@@ -25,8 +25,7 @@ from acquisition import (
     read_hits,
     write_tap,
 )
-from acquisition.files.convert import EXPORT_FORMATS
-from acquisition.files.writers import ExportLabels
+from acquisition.files.convert import EXPORT_FORMATS, ExportLabels
 from acquisition.frf import FrfQuantity
 from acquisition.tap_test import Circumstances, new_tap_id
 

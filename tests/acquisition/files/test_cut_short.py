@@ -14,8 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition import Circumstances, DataError, Description, Frf, Hit, TapTest, inspect_file, new_tap_id, write_tap
-from acquisition.files.convert import EXPORT_FORMATS
-from acquisition.files.writers import ExportLabels
+from acquisition.files.convert import EXPORT_FORMATS, ExportLabels
 
 RANDOM = np.random.default_rng(1)
 HIT = Hit(RANDOM.normal(size=40), RANDOM.normal(size=40), 1000.0)

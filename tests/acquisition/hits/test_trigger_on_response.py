@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, SimulatedSource, Trigger, capture_hits
-from acquisition.hit import select_input_channels
+from acquisition.hit import TapInputs
 
 RATE = 12800.0
 SENSOR = Channel("acceleration", 1e-2, 5.0)
@@ -49,18 +49,18 @@ def test_a_level_that_gravity_alone_reaches_counts_from_rest() -> None:
 def test_of_several_accelerations_that_of_the_direction_is_taken() -> None:
     x, y = (Channel("acceleration", 1e-2, 5.0, direction=name) for name in ("x", "y"))
     axes = (x, y, SENSOR)
-    assert select_input_channels(axes, "acceleration", "x") == (0,)
-    assert select_input_channels((HAMMER, *axes), "force", "y") == (0, 2)
-    assert select_input_channels((HAMMER, *axes), "force", "xy") == (0, 2)  # hit in x, seen in y
+    assert TapInputs.select(axes, "acceleration", "x").rows == (0,)
+    assert TapInputs.select((HAMMER, *axes), "force", "y").rows == (0, 2)
+    assert TapInputs.select((HAMMER, *axes), "force", "xy").rows == (0, 2)  # hit in x, seen in y
     with pytest.raises(DataError, match=r'acceleration x, acceleration y, acceleration; .* direction = "x"$'):
-        select_input_channels(axes, "acceleration")
+        TapInputs.select(axes, "acceleration")
     with pytest.raises(DataError, match=r'direction = "y"$'):
-        select_input_channels((x, SENSOR), "acceleration", "y")
+        TapInputs.select((x, SENSOR), "acceleration", "y")
 
 
 def test_the_force_is_left_out_where_the_response_triggers() -> None:
-    assert select_input_channels((HAMMER, SENSOR), "acceleration") == (1,)
+    assert TapInputs.select((HAMMER, SENSOR), "acceleration").rows == (1,)
     with pytest.raises(DataError, match="channels for force; one acceleration channel is needed"):
-        select_input_channels((HAMMER,), "acceleration")
+        TapInputs.select((HAMMER,), "acceleration")
     with pytest.raises(DataError, match="one force and one acceleration"):
-        select_input_channels((SENSOR,))
+        TapInputs.select((SENSOR,))

@@ -27,7 +27,7 @@ def record(channels: Pair, force: Signal = 0.0, response: Signal = 0.0, lost: in
     random = np.random.default_rng(1)
     noise = random.normal(scale=0.2, size=TIME.size), random.normal(scale=2.0, size=TIME.size)
     codes = [channel.encode(n + extra) for channel, n, extra in zip(channels, noise, (force, response), strict=True)]
-    return Hit.from_codes(codes, channels, RATE, 0, lost)
+    return Hit.from_codes(codes, channels, RATE, lost_scans=lost)
 
 
 def failed(hit: Hit, level: float | None = 20.0, free: int = 10**10) -> dict[str, str]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.files.contents.spindle_speed import compute_speed_from_pulses
+from acquisition.files.read_cut import compute_speed_from_pulses
 
 RATE = 10e3
 

@@ -20,9 +20,8 @@ import pytest
 import scipy.io
 
 from acquisition import DataError, Description, Frf, Hit, inspect_file, read_frf
-from acquisition.files.convert import EXPORT_FORMATS
+from acquisition.files.convert import EXPORT_FORMATS, ExportLabels
 from acquisition.files.readers import mat_variables
-from acquisition.files.writers import ExportLabels
 
 DATA = Path(__file__).parents[3] / "data"
 F = np.arange(2.0, 100.0, 2.0)

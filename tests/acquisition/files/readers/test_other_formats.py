@@ -15,8 +15,7 @@ import scipy.io
 import scipy.io.wavfile
 
 from acquisition import DataError, Description, Hit, inspect_file, read_frf, read_hits
-from acquisition.files.convert import EXPORT_FORMATS
-from acquisition.files.writers import ExportLabels
+from acquisition.files.convert import EXPORT_FORMATS, ExportLabels
 
 F = np.arange(0.0, 100.0, 2.0)
 H = 1e-6 / (1 + 0.2j * F)

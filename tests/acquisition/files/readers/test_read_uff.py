@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf, from_accelerance, inspect_file
-from acquisition.files.writers import ExportLabels, encode_uff_frf
+from acquisition.files.convert import ExportLabels, encode_uff_frf
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -21,7 +21,7 @@ from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.monitoring.change_detection import SeriesChange, find_newest_change
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, SeriesScatterPrior
-from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_percents
+from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +104,9 @@ class ValueHistory:
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
         """Find the change that the newest points are sure of, and its time, or None."""
-        rows, numbers = self.trend_values
-        reclamped = [row.conditions.reclamped for row in rows]
-        times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
-        change = find_newest_change(np.array(percents))
-        return None if change is None else (times[change.point], change)
+        points = list_newest_points(self.tap_values)
+        change = find_newest_change(np.array([point.percent for point in points]))
+        return None if change is None else (points[change.point].time, change)
 
     @property
     def trend_values(self) -> tuple[tuple[HistoryRow, ...], Floats]:

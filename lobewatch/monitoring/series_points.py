@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
 from math import copysign, sqrt
 from statistics import median
 from typing import NamedTuple, Self
@@ -77,47 +76,6 @@ class Readings:
         operators = tuple(self.operators[i] for i in at) if self.operators else ()
         mean = (self.y[at] + other[at]) / 2
         return Readings(mean, temperature, operators, scatter_prior=SeriesScatterPrior(self.scatter_prior.common))
-
-
-SAME_CLAMPING_TIME = timedelta(hours=24)
-"""Time within which tap tests share a clamping unless recorded otherwise; chosen."""
-TapRange = tuple[int, int]
-"""Indices of the first tap test of a point, and after its last."""
-
-
-class PercentSeries(NamedTuple):
-    """One value of the tap tests of a series, oldest first."""
-
-    times: tuple[datetime, ...]
-    """Times of the tests."""
-    percents: tuple[float, ...]
-    """Changes of the value since the first test (%)."""
-    temperatures: tuple[float, ...]
-    """Temperatures of the spindle (degC); NaN if not recorded."""
-    reclamped: tuple[bool, ...]
-    """True for each test whose tool was reclamped."""
-
-    def percent(self, span: TapRange) -> float:
-        """Return the change of a point (%): mean of two, median from three on."""
-        first, end = span
-        if end - first > 2:
-            return median(self.percents[first:end])
-        return (self.percents[first] + self.percents[end - 1]) / 2
-
-    def temperature(self, span: TapRange) -> float:
-        """Return the mean of the temperatures recorded for a point, or NaN."""
-        recorded = [temperature for temperature in self.temperatures[slice(*span)] if temperature == temperature]
-        return sum(recorded) / len(recorded) if recorded else np.nan
-
-
-def divide_into_points(series: PercentSeries) -> Iterator[TapRange]:
-    """Divide the tap tests of a series, at least one, into points."""
-    first = 0
-    for tap in range(1, len(series.times)):
-        if series.reclamped[tap] or series.times[tap] - series.times[first] >= SAME_CLAMPING_TIME:
-            yield first, tap
-            first = tap
-    yield first, len(series.times)
 
 
 RECENT_USE_DAYS = 180.0

@@ -13,6 +13,7 @@ from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.arrays import Floats
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_samples import ProgramSamples
+from lobewatch.verdicts.uncertainty import Factors
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
 
 CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
@@ -59,9 +60,9 @@ def _stiffness_ratios(calibration: Calibration) -> Floats:
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
 
 
-def apply_drops(samples: ProgramSamples, drops: Floats, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Apply each of some frequency drops (k,) to all samples, one after the other."""
-    return samples.sweep(np.ones(drops.size), 1 - drops, np.array([stiffness_at(drop) for drop in drops.tolist()]))
+def apply_drops(samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0) -> ProgramSamples:
+    """Apply each of some frequency drops (k,) to all samples, one after the other; speed: relative, one or (k,)."""
+    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]))
 
 
 def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:

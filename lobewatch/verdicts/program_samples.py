@@ -15,7 +15,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engage
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.uncertainty import Uncertainty
+from lobewatch.verdicts.uncertainty import Factors, Uncertainty, scale_fields
 
 N_PROGRAM_SAMPLES = 300
 """Number of samples: if all are stable, at most 1 % of the uncertainty chatters at 95 % confidence."""
@@ -123,18 +123,12 @@ class ProgramSamples:
         grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
         return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
 
-    def scale(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramSamples:
-        """Scale speed, frequencies and stiffnesses of all samples."""
-        return self.sweep(np.array([speed]), np.array([frequency]), np.array([stiffness]))
-
-    def sweep(self, speed: Floats, frequency: Floats | float = 1.0, stiffness: Floats | float = 1.0) -> ProgramSamples:
+    def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> ProgramSamples:
         """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
         n, f, k = (np.repeat(factor, len(self.rows))[:, np.newaxis] for factor in factors)
-        speed_rpm = rows.speed_rpm * n[:, 0]
-        rows = replace(rows, speed_rpm=speed_rpm, frequency=rows.frequency * f, stiffness=rows.stiffness * k)
-        return replace(self, rows=rows)
+        return replace(self, rows=scale_fields(rows, speed_rpm=n[:, 0], frequency=f, stiffness=k))
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
@@ -206,12 +200,7 @@ def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) ->
         return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
     push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
-    changed = replace(
-        rows,
-        frequency=rows.frequency * factor(*ROTATING_FREQUENCY_FACTOR, frequency),
-        damping_ratio=rows.damping_ratio * factor(*ROTATING_DAMPING_FACTOR, damping),
-        stiffness=rows.stiffness * factor(*ROTATING_STIFFNESS_FACTOR, stiffness),
-        tangential=rows.tangential * push,
-        radial=rows.radial * push,
-    )
+    f, zeta = factor(*ROTATING_FREQUENCY_FACTOR, frequency), factor(*ROTATING_DAMPING_FACTOR, damping)
+    k = factor(*ROTATING_STIFFNESS_FACTOR, stiffness)
+    changed = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=push, radial=push)
     return replace(samples, rows=changed)

@@ -125,16 +125,6 @@ REQUESTED_KEYS = ("speed_rpm", "depth_mm")
 """Keys of a program that are ignored if a setting is requested."""
 
 
-@dataclass(frozen=True)
-class Alternative:
-    """Alternative to the recommended setting."""
-
-    label: str
-    """Label of its advantage."""
-    setting: Setting
-    """Speed and depth."""
-
-
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """Answer to a request for speed and depth."""
@@ -151,8 +141,8 @@ class Recommendation:
     """Reason why there is no setting."""
     remedies: tuple[str, ...] = ()
     """Measures that would allow one."""
-    alternatives: tuple[Alternative, ...] = ()
-    """Alternative settings, at most two."""
+    alternatives: tuple[tuple[str, Setting], ...] = ()
+    """Alternative settings with the label of their advantage, at most two."""
     feed_mm: tuple[float, float] | None = None
     """Smallest and largest feed per tooth (mm): that of the program, else the tool limits; None if unknown."""
     remarks: tuple[Remark, ...] = ()
@@ -177,15 +167,13 @@ def recommend(
     if isinstance(tool, DataError):
         tap = f"tap it: TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
-    if gap := _find_gap(table, tool, machine):
+    if gap := _find_gap(table, tool, machine) or _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
-    if too_fast := _find_speed_conflict(CutRange.of(machine, table)):
-        return Recommendation(table, either, reason=too_fast[0], remedies=too_fast[1:])
     search = SettingSearch(ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed, either))
     if is_set and present_rpm is not None:
         setting = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     else:
-        setting = search.best if depth_mm is None else search.fastest_window(depth_mm)
+        setting = search.best if depth_mm is None else search.nearest_window(depth_mm, search.cut_range.high_rpm)
     others = tuple(_list_alternatives(search, setting, present_rpm))
     if setting is None:
         reason, cures = _explain_gap(search, depth_mm, present_rpm if is_set else None)
@@ -236,15 +224,15 @@ def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, floa
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
-def _list_alternatives(search: SettingSearch, setting: Setting | None, own_rpm: float | None) -> Iterator[Alternative]:
-    places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
+def _list_alternatives(search: SettingSearch, best: Setting | None, rpm: float | None) -> Iterator[tuple[str, Setting]]:
+    places = {(best.speed_rpm, best.depth_mm)} if best else set[tuple[float, float]]()
     wanted = {MAX_REMOVAL_LABEL: search.best}
-    if own_rpm is not None:
-        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(own_rpm, search.cut_range.deepest_mm)
+    if rpm is not None:
+        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(rpm, search.cut_range.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
-            yield Alternative(what, other)
+            yield what, other
 
 
 def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:

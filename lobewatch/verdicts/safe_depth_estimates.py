@@ -6,7 +6,6 @@ that what it does not see (low immersion, flip) counts. Nothing is evaluated yet
 
 import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -153,7 +152,9 @@ class LikelyDepths:
 
     def window_centers(self, depth_mm: float) -> list[float]:
         """Return the center (rpm) of each speed window in which a depth (mm) is likely safe."""
-        return [float(self.speeds[run[run.size // 2]]) for run in _split_runs(self.depths >= depth_mm)]
+        places = np.flatnonzero(self.depths >= depth_mm)
+        runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+        return [float(self.speeds[run[run.size // 2]]) for run in runs if run.size]
 
     def removal_peaks(self, count: int) -> list[tuple[float, float]]:
         """Return speeds (rpm) and depths (mm) of local maxima of the removal rate, then of others apart."""
@@ -245,10 +246,3 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
     share = np.where(first > 0, -low / np.where(high == low, 1.0, high - low), 0.5)
     begin = np.where(first > 0, depths[row, before], 0.0)
     return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
-
-
-def _split_runs(wanted: Flags) -> list[Indices]:
-    """Split into runs of consecutive places."""
-    places: Indices = np.flatnonzero(wanted)
-    runs: Sequence[Indices] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    return [run for run in runs if run.size]

@@ -14,7 +14,7 @@ from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import expected_frequency_drop
-from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.frequency_drop import StiffnessAt, apply_drops
 from lobewatch.verdicts.program_samples import ProgramSamples
 
 
@@ -50,16 +50,13 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
-    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
+    return apply_drops(samples, np.array([0, drop]), stiffness_at, np.array([1 / ROBUST_SPEED_FACTOR, 1]))
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over both speeds, the frequency drop and half of it."""
-    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at)
-
-
-def _sweep(samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness: StiffnessAt) -> ProgramSamples:
-    return samples.sweep(np.array(speeds), 1 - np.array(drops), np.array([stiffness(drop) for drop in drops]))
+    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR])
+    return apply_drops(samples, np.array([0, drop, drop / 2, 0]), stiffness_at, speeds)
 
 
 def find_speed_window(
@@ -75,7 +72,7 @@ def find_speed_window(
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
     """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
-    grown = _sweep(hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at).critical_growth(depth)
+    grown = apply_drops(hardest, CHECKED_DROPS, stiffness_at).critical_growth(depth)
     return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
 
 
@@ -87,7 +84,7 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
         last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
         if last < steps[-1]:
             break
-    while last > 0 and np.any(near.scale(speed=float(ratio[last])).critical_growth(depth) >= 0):
+    while last > 0 and np.any(near.sweep(ratio[last : last + 1]).critical_growth(depth) >= 0):
         last //= 2
     return float(ratio[last])
 

@@ -7,7 +7,7 @@ Where no speed of the grid has such a depth, nothing is recommended.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -19,9 +19,9 @@ from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, 
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
-from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
+from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_samples, find_worst_limit
 from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths, find_deepest_stable
 from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, Setting
 
@@ -105,11 +105,12 @@ class SettingSearch:
 
     def nearest_window(self, depth_mm: float, speed_rpm: float) -> Setting | None:
         """Find a depth (mm) in the speed window nearest to a speed (rpm)."""
-        return self._first_safe(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
-
-    def fastest_window(self, depth_mm: float) -> Setting | None:
-        """Find a depth (mm) in the fastest speed window."""
-        return self._first_safe(depth_mm, lambda speed: -speed)
+        for speed in self._candidate_speeds(depth_mm, speed_rpm):
+            if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
+                setting = self.verify(speed, depth_mm)
+                if isinstance(setting, Setting):
+                    return setting
+        return None
 
     def deepest_at(self, speed_rpm: float, most_mm: float) -> Setting | None:
         """Find the deepest setting at a speed (rpm), up to a depth (mm)."""
@@ -117,22 +118,14 @@ class SettingSearch:
             return None
         return self._deepest_setting(speed_rpm, min(most_mm, self._deepest_stable(speed_rpm)))
 
-    def _first_safe(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
-        """Find a depth (mm) in the first safe speed window, the lowest rank first."""
-        for speed in self._candidate_speeds(depth_mm, rank):
-            if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
-                setting = self.verify(speed, depth_mm)
-                if isinstance(setting, Setting):
-                    return setting
-        return None
-
-    def _candidate_speeds(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
-        """Yield speeds (rpm) at which a depth (mm) is likely safe; the speed of the best setting last."""
+    def _candidate_speeds(self, depth_mm: float, near_rpm: float) -> Iterator[float]:
+        """Yield speeds (rpm) at which a depth (mm) is likely safe, the nearest first; that of the best setting last."""
         if self.cut_range.is_empty:
             return
         depths = depth_mm, NEARLY_SAFE_SHARE * depth_mm
         middles = {center for depth in depths for center in self.likely_depths.window_centers(depth)}
-        yield from map(_round_speed, sorted(middles, key=rank)[:MAX_SEARCHED_SPEEDS])
+        nearest = sorted(middles, key=lambda speed: abs(math.log(speed / near_rpm)))
+        yield from map(_round_speed, nearest[:MAX_SEARCHED_SPEEDS])
         if self.best is not None:
             yield self.best.speed_rpm
 
@@ -240,21 +233,22 @@ class SettingSearch:
         """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
         depth = depth_mm / 1e3
         deep = ROBUST_DEPTH_FACTOR * depth
-        program = sample_program(self.case.at(speed, depth_mm))
-        limit = program.worst.limit.limit
+        case = self.case.at(speed, depth_mm)
+        worst = find_worst_limit(case)
+        limit, samples = worst.limit.limit, draw_samples(case, worst)
         if limit < depth * (1 + MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
-        grown = program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)
-        near = program.samples.with_cuts(grown >= 0)
+        grown = samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)
+        near = samples.with_cuts(grown >= 0)
         around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(deep)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        result = evaluate_samples(program)
+        result = evaluate_samples(depth, worst, samples)
         if not result.is_stable_throughout:
             places = 1 + np.flatnonzero(result.chatters)
             self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
+            calm = min(find_deepest_stable(samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
             return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)

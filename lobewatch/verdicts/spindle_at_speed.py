@@ -13,7 +13,7 @@ from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
-from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields
 
 AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
 
@@ -82,15 +82,6 @@ NO_TEST_CUTS = SpindleAtSpeed()
 
 def _scale_modes(modes: TipModes, factors: Floats) -> TipModes:
     """Scale frequency, damping ratio and stiffness of modes by factors (n, 3)."""
-    return modes and [
-        replace(
-            mode,
-            frequency=mode.frequency * f,
-            damping_ratio=mode.damping_ratio * zeta,
-            stiffness=mode.stiffness * k,
-            covariance=None,
-            jackknife=None,
-            n_hits=0,
-        )
-        for mode, (f, zeta, k) in zip(modes, factors.tolist(), strict=True)
-    ]
+    unfitted = [replace(mode, covariance=None, jackknife=None, n_hits=0) for mode in modes or ()]
+    pairs = zip(unfitted, factors.tolist(), strict=True)
+    return modes and [scale_fields(mode, frequency=f, damping_ratio=zeta, stiffness=k) for mode, (f, zeta, k) in pairs]

@@ -19,7 +19,6 @@ from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty_causes import QUESTION, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -183,7 +182,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
     if stability is Stability.DOUBTFUL:
-        cause = _find_decisive_cause(case, result)
+        cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
     return Verdict(
@@ -240,15 +239,6 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
         return f"it rests on a tap test in question ({', '.join(codes)})", cure
     return None
-
-
-def _find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
-    """Return the name of the cause of uncertainty that decides a doubtful verdict."""
-    if case.assembly.questions:
-        return QUESTION.name
-    if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
-        return WORKPIECE.name
-    return program_remarks.find_decisive_cause(result, case.depth)
 
 
 def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:

@@ -17,7 +17,7 @@ import scipy
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts import program_samples
-from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields
 
 ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 """Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
@@ -94,15 +94,11 @@ class SpindleSamples:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._side_factors()[:, self.at_rest.axes[self.at_rest.direction]]
         push, ratio = self._coefficient_factors(material, tangential, radial)
-        return replace(
-            self.at_rest,
-            frequency=self.at_rest.frequency * self._frequency_factors(),
-            damping_ratio=np.minimum(self.at_rest.damping_ratio * at_side[..., 0], MAX_SAMPLED_DAMPING),
-            stiffness=self.at_rest.stiffness * at_side[..., 1],
-            speed_rpm=np.full(len(self), speed_rpm),
-            tangential=tangential * push,
-            radial=radial * push * ratio,
-        )
+        f, zeta, k = self._frequency_factors(), at_side[..., 0], at_side[..., 1]
+        rows = scale_fields(self.at_rest, frequency=f, damping_ratio=zeta, stiffness=k)
+        rows = replace(rows, damping_ratio=np.minimum(rows.damping_ratio, MAX_SAMPLED_DAMPING))
+        speeds, force = np.full(len(self), speed_rpm), tangential * push
+        return replace(rows, speed_rpm=speeds, tangential=force, radial=radial * push * ratio)
 
     def _material_index(self, material: int) -> int:
         """Place of the first number of a material."""

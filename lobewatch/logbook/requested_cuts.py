@@ -20,8 +20,8 @@ from lobewatch.machine.settings.requested_cut import (
     find_common_speed,
 )
 from lobewatch.verdicts.pitch_proposal import PitchProposal, propose_pitch
+from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import Recommendation, recommend
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict
 
 

@@ -14,9 +14,15 @@ import scipy
 
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.level_model import build_level_model
-from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
 from lobewatch.monitoring.series_points import Readings
-from lobewatch.monitoring.trend_shapes import SHAPE_KINDS, ShapeFits, TrendShape, fit_shapes
+from lobewatch.monitoring.trend_shapes import (
+    SHAPE_KINDS,
+    RandomWalkFits,
+    ShapeFits,
+    TrendShape,
+    fit_random_walks,
+    fit_shapes,
+)
 
 MIN_FORECAST_POINTS = 8
 """Smallest number of points for a forecast; chosen."""

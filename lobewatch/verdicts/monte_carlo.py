@@ -12,9 +12,8 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts import program_samples
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import ProgramSamples, WorstLimit, build_median_row
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 

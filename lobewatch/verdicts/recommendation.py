@@ -14,12 +14,10 @@ from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_remarks import missing_tool_remarks
-from lobewatch.verdicts.setting_robustness import Setting
+from lobewatch.verdicts.setting_robustness import Setting, find_tolerable_drop, model_softening
 from lobewatch.verdicts.setting_search import SettingSearch
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, find_open_question, is_compliance_known
 
 

@@ -17,10 +17,9 @@ from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.frequency_drop import StiffnessAt
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR
+from lobewatch.verdicts.setting_robustness import StiffnessAt
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
@@ -60,15 +59,15 @@ class CriticalSamples:
 
     def deepest_stable(self, most: float) -> float:
         """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth margin."""
-        few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
+        few, depth = self.selected, robustness.ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
-        while calm == depth < ROBUST_DEPTH_FACTOR * most:
-            depth = min(DEPTH_GROWTH_FACTOR * depth, ROBUST_DEPTH_FACTOR * most)
+        while calm == depth < robustness.ROBUST_DEPTH_FACTOR * most:
+            depth = min(DEPTH_GROWTH_FACTOR * depth, robustness.ROBUST_DEPTH_FACTOR * most)
             calm = find_deepest_stable(few, depth)
         while calm == 0 and depth > MIN_SEARCHED_DEPTH:
             depth *= DEPTH_SHRINK_FACTOR
             calm = find_deepest_stable(few, depth)
-        return calm / ROBUST_DEPTH_FACTOR
+        return calm / robustness.ROBUST_DEPTH_FACTOR
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
         """Return the largest growth of the selected samples at relative speeds and depths (m) (k,).
@@ -76,7 +75,7 @@ class CriticalSamples:
         In the worst direction of feed: it says where to look, no more.
         """
         few = self.selected.with_lowest_cuts(0.0)
-        wanted = np.repeat(ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
+        wanted = np.repeat(robustness.ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
         return np.asarray(np.max(few.sweep(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
 
 
@@ -88,13 +87,15 @@ def select_critical_samples(
     program: the case at one speed and the depth that is likely safe.
     """
     likely = draw_likely_samples(case, program)
-    order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    order = np.argsort(-likely.median_growth_near(program.depth, drop, robustness.ROBUST_SPEED_FACTOR))[
+        :N_CRITICAL_FEEDS
+    ]
     likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
     aged = robustness.sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
     median = likely.rows[np.zeros(1, dtype=np.intp)]
-    push = (1 + MIN_DEPTH_MARGIN) / ROBUST_DEPTH_FACTOR
+    push = (1 + robustness.MIN_DEPTH_MARGIN) / robustness.ROBUST_DEPTH_FACTOR
     median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     growing, flexible = np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES]
     first = np.unique(np.concatenate((growing, flexible, [grown.size])))
@@ -186,9 +187,9 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
     lobes = [lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross) for cut in cuts]
     by_cut = np.array([each.depth for each in lobes]) * 1e3
-    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
+    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(robustness.ROBUST_SPEED_FACTOR)
     steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:

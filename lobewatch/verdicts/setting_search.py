@@ -18,12 +18,11 @@ from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
 from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_samples, find_worst_limit
 from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths, find_deepest_stable
-from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, Setting
+from lobewatch.verdicts.setting_robustness import Setting, StiffnessAt, model_softening
 
 MAX_DEPTH_MARGIN = 20.0
 """Largest searched depth margin, which also represents no limit."""
@@ -232,13 +231,13 @@ class SettingSearch:
     def verify(self, speed: float, depth_mm: float) -> Setting | float:
         """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
         depth = depth_mm / 1e3
-        deep = ROBUST_DEPTH_FACTOR * depth
+        deep = robustness.ROBUST_DEPTH_FACTOR * depth
         case = self.case.at(speed, depth_mm)
         worst = find_worst_limit(case)
         limit, samples = worst.limit.limit, draw_samples(case, worst)
-        if limit < depth * (1 + MIN_DEPTH_MARGIN):
-            return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
-        grown = samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)
+        if limit < depth * (1 + robustness.MIN_DEPTH_MARGIN):
+            return 1e3 * limit / (1 + robustness.MIN_DEPTH_MARGIN)
+        grown = samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, robustness.ROBUST_SPEED_FACTOR)
         near = samples.with_cuts(grown >= 0)
         around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(deep)
@@ -260,8 +259,8 @@ class SettingSearch:
         """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
-        calm = find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
-        return min(1e3 * calm / ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
+        calm = find_deepest_stable(samples[places], robustness.ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
+        return min(1e3 * calm / robustness.ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
 
 
 def _round_speed(speed: float) -> float:

@@ -15,10 +15,9 @@ from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""

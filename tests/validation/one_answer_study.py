@@ -20,12 +20,11 @@ from lobes import build_milling_system, count_pieces, growth_rate, rows_at_speed
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase
 from lobewatch.verdicts.program_samples import draw_samples, find_worst_limit
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets, recommend
 from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
 from lobewatch.verdicts.setting_search import SettingSearch
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 
 STEP = 0.01

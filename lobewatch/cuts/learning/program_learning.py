@@ -5,12 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lobewatch.cuts.learning import label_check
+from lobewatch.cuts.learning import posterior as posteriors
 from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence, estimate_force_by_power
-from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
-from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
-from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
+from lobewatch.cuts.learning.posterior import Contradiction, InconsistentCut, Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import CutEntry, geometry_key
 from lobewatch.machine.settings.cut_range import CutRange
@@ -73,13 +71,13 @@ def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: C
     posterior, odd_powers = start, []
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
-        if label_check.is_power_inconsistent(evidence):
+        if posteriors.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
             evidence = replace(evidence, cut=replace(cut, power=None))
         posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
     own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    inconsistent = (*label_check.find_inconsistent_cuts(posterior), *odd_powers)
+    inconsistent = (*posteriors.find_inconsistent_cuts(posterior), *odd_powers)
     return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 

@@ -11,16 +11,14 @@ from acquisition import DataError
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.cut_evidence import CutEntries
-from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
-from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.learning.posterior import Posterior, inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, learn_program
 from lobewatch.machine import CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
-from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, SpindleAtSpeed, build_program
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import FactorRange, LearnedSamples, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program

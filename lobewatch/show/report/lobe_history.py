@@ -25,8 +25,8 @@ from lobewatch.show.report.section import NumberTable, tabulate_lobes
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
 from lobewatch.tool.assembly import compute_tip_lobes
 from lobewatch.verdicts import Setting, Verdict
-from lobewatch.verdicts.frequency_drop import model_softening
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
+from lobewatch.verdicts.setting_robustness import model_softening
 from modal import Mode
 
 

@@ -10,10 +10,9 @@ from typing import Any
 from acquisition import Channel
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.monitoring.alarm import Alarm
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
-from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
+from lobewatch.monitoring.status_rules import Alarm, is_early_alarm, sort_by_severity, worst_status
 from lobewatch.show.history import cut_result_text
 from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.report_data import ReportData

@@ -12,8 +12,8 @@ import pytest
 from lobes import Cut, MillingRows, build_milling_system, rows_at_speeds, zero_order_lobes
 from lobes.floquet import count_pieces, largest_multipliers
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.expected_gain import CutGrid, list_speeds
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import CutGrid, list_speeds
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 

@@ -21,9 +21,15 @@ from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, lower_envelope, rows_at_speeds, stability_boundary, zero_order_lobes
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import log_likelihood, predict_cut
-from lobewatch.cuts.learning.expected_gain import CutGrid, compare_zero_order, floor_depth, list_speeds
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.cuts.learning.suggestion import find_best_removal_rate, suggest_cut
+from lobewatch.cuts.learning.suggestion import (
+    CutGrid,
+    compare_zero_order,
+    find_best_removal_rate,
+    floor_depth,
+    list_speeds,
+    suggest_cut,
+)
 from lobewatch.machine.journal.cut_entry import CutVerdict
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.zero_order_batch import is_force_constant

@@ -10,14 +10,14 @@ import pytest
 
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import CutPrediction, log_likelihood
-from lobewatch.cuts.learning.label_check import (
+from lobewatch.cuts.learning.posterior import (
     Contradiction,
     InconsistentCut,
+    NewEvidence,
     find_contradiction,
     find_inconsistent_cuts,
     inconsistent_cut_remarks,
 )
-from lobewatch.cuts.learning.posterior import NewEvidence
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 STABLE = CutEvidence(SLOT, 12000, 3e-3, "stable", id="c7")

@@ -17,8 +17,7 @@ from lobewatch.cuts.learning.cut_likelihood import (
     max_log_likelihood,
     predict_cut,
 )
-from lobewatch.cuts.learning.label_check import Contradiction, find_inconsistent_cuts
-from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.posterior import Contradiction, Posterior, build_prior, find_inconsistent_cuts
 from lobewatch.machine.journal.cut_entry import CutVerdict
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill, doubt

@@ -10,8 +10,7 @@ import pytest
 from lobes import Cut, stability_boundary, zero_order_lobes
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import predict_cut
-from lobewatch.cuts.learning.expected_gain import compare_zero_order, floor_depth, list_speeds
-from lobewatch.cuts.learning.suggestion import suggest_cut
+from lobewatch.cuts.learning.suggestion import compare_zero_order, floor_depth, list_speeds, suggest_cut
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
 

@@ -247,13 +247,14 @@ def detect_changes(readings: Readings) -> Detection:
     begin = judged = 0
     while judged < count:
         down, up = monitor_drops_and_rises(readings.since(begin))
-        end = count if up.first_alarm is None else begin + up.first_alarm + 1
+        risen = up.first_alarm
+        end = count if risen is None else begin + risen + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
         drops += _find_drops(down, begin, judged, end)
         judged = end
-        if up.first_alarm is not None:
-            seen = up.change_at(up.first_alarm)
-            rise, begin = seen._replace(point=begin + seen.point), begin + up.first_alarm
+        if risen is not None:
+            seen = up.change_at(risen)
+            rise, begin = seen._replace(point=begin + seen.point), begin + risen
     return Detection(scores, tuple(drops), rise)
 
 

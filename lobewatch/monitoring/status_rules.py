@@ -221,8 +221,6 @@ STATUS_RULES = (
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
 """Status by remark code, in order of severity."""
-LIMIT_CODES = {rule.code for rule in STATUS_RULES if rule.is_limit}
-"""Codes with which an alarm is not early."""
 UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
 """Next step for a machine that cannot be read."""
 
@@ -250,7 +248,8 @@ def worst_status(ordered: Sequence[Remark]) -> StatusLevel:
 
 def is_early_alarm(ordered: Sequence[Remark]) -> bool:
     """Return whether the only alarm is a detected drop short of every limit and program."""
-    return worst_status(ordered) is ALARM and {remark.code for remark in ordered}.isdisjoint(LIMIT_CODES)
+    codes = {remark.code for remark in ordered}
+    return worst_status(ordered) is ALARM and not any(rule.code in codes for rule in STATUS_RULES if rule.is_limit)
 
 
 def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:

@@ -99,7 +99,9 @@ def propose_pitch(
     limits = _pitch_limits(verdict.samples, case.depth)
     half_wave = half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
     search = PitchSearch(case, verdict.samples, limits)
-    unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
+    patterns = pitch_patterns(table.teeth, half_wave) if np.isfinite(verdict.limit) else ()
+    kinds = itertools.groupby(patterns, key=lambda pattern: pattern.name)
+    unequal = [search.find_best(list(alike)) for _, alike in kinds]
     if present := machine.build_cut(table).pitch:
         unequal.append(search.evaluate(PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is"))[0])
     band = verdict.limit, verdict.limit_low, verdict.limit_high
@@ -118,13 +120,8 @@ class PitchSearch:
     equal_limits: Floats
     """Limits with equal pitch (m), the median first."""
 
-    def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
-        """Find the pattern of each kind with the highest 1 % limit."""
-        kinds = itertools.groupby(pitch_patterns(self.case.table.teeth, half_wave), key=lambda pattern: pattern.name)
-        return [self._find_best(list(patterns)) for _, patterns in kinds]
-
-    def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
-        """Find the best pattern of one kind."""
+    def find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
+        """Find the pattern of one kind with the highest 1 % limit."""
         places = np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist()
         places += range(0, self.equal_limits.size, PITCH_SAMPLE_STEP)
         judged = dict[PitchPattern, PitchEvaluation]()

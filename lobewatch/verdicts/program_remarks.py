@@ -11,7 +11,7 @@ from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
 from lobewatch.verdicts.uncertainty_causes import QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
@@ -111,10 +111,14 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
 
 
 def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
+    """Warn about a corner, by the zero-order limit at its immersion in the worst feed direction."""
     table = case.table
     radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
     inside, radial = table.corner_immersion(radius), table.radial_mm[1]
-    limit = _limit_at_immersion(inside, case, result.samples)
+    cut, median = replace(case.program.cut, immersion=inside), result.samples.rows[np.array([0])]
+    fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
+    speed = np.array([table.speed_rpm])
+    limit = min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
     share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
     corner = f"a corner of {radius:g} mm radius takes as much as {inside * table.tool_diameter_mm:.2g} mm"
     limited = f"the limit is about {1e3 * limit:.2g} mm there{share}"
@@ -122,14 +126,6 @@ def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
     straight = f"[{radial:g}, {radial:g}] where the path is straight"
     cure = f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; {straight}"
     return Remark("one-engagement", table.name, text, cure)
-
-
-def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSamples) -> float:
-    """Return the median limit (m) by the zero-order approximation at another immersion, in the worst feed direction."""
-    cut, median = replace(case.program.cut, immersion=immersion), samples.rows[np.array([0])]
-    fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
-    speed = np.array([case.table.speed_rpm])
-    return min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
 
 
 N_CAUSE_SAMPLES = 60

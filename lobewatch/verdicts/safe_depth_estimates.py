@@ -19,7 +19,7 @@ from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import StiffnessAt
+from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR, StiffnessAt
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
@@ -87,9 +87,7 @@ def select_critical_samples(
     program: the case at one speed and the depth that is likely safe.
     """
     likely = draw_likely_samples(case, program)
-    order = np.argsort(-likely.median_growth_near(program.depth, drop, robustness.ROBUST_SPEED_FACTOR))[
-        :N_CRITICAL_FEEDS
-    ]
+    order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
     likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
     aged = robustness.sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
@@ -189,7 +187,7 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     by_cut = np.array([each.depth for each in lobes]) * 1e3
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(robustness.ROBUST_SPEED_FACTOR)
+    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
     steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:

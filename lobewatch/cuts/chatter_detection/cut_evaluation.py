@@ -129,14 +129,15 @@ def _evaluate_axis(
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
     unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
-    by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
-    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
-    judged = _evaluate_peaks(sound, cut, teeth, immersion)
-    if judged.reason != "unexplained-tone":
-        return judged
-    tones = classification.add_air_tones(quiet, air, by_origin.unexplained.frequency)
-    by_origin = classification.classify_peaks(peaks, spectrum, tones, speed, teeth, unsteady)
-    return _evaluate_peaks(replace(sound, peaks=by_origin), cut, teeth, immersion)
+
+    def evaluate(quiet: Spectrum) -> CutEvaluation:
+        by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
+        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion)
+
+    sound = evaluate(quiet)
+    if sound.reason != "unexplained-tone" or sound.peaks is None:
+        return sound
+    return evaluate(classification.add_air_tones(quiet, air, sound.peaks.unexplained.frequency))
 
 
 def _find_speed(
@@ -180,23 +181,20 @@ def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
 
 def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
     """Rank an axis: chatter first, then by energy."""
-    if sound.peaks is None:
-        return False, 0.0
-    if sound.chatter is not None:
-        return True, sound.chatter.peaks.energy
-    return False, sound.peaks.comb.energy
+    peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
+    return sound.chatter is not None, peaks.energy if peaks else 0.0
 
 
-def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
+def _evaluate_peaks(
+    peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
+) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
-    peaks, speed, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
-    if peaks is None or speed is None or spectrum is None:
-        raise ValueError("a cut whose lines are not known cannot be judged")
+    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return replace(sound, verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
-        return _evaluate_without_chatter(sound, teeth, immersion)
+        return _evaluate_without_chatter(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
     end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
@@ -206,7 +204,7 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = replace(sound, energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
-        return _evaluate_without_chatter(sound, teeth, immersion)
+        return _evaluate_without_chatter(sound, peaks, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
         return replace(sound, verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
@@ -215,11 +213,11 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
     return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
 
 
-def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
+def _evaluate_without_chatter(
+    sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float
+) -> CutEvaluation:
     """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
-    if sound.peaks is None:
-        return sound
-    power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
+    power, order = peaks.comb.amplitude**2, peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))
     is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))

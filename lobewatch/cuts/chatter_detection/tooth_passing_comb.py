@@ -53,7 +53,8 @@ def find_comb(
     """
     peaks = peaks.loudest(MAX_COMB_PEAKS)
     few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
-    folded = _folded_images(peaks, sample_rate)
+    levels = peaks.frequency
+    folded = np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
     for images in (folded[:1], folded) if few else (folded[:1],):
         best = _pick_comb(peaks, images, bin_width, frequency, tolerance)
         if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
@@ -93,12 +94,6 @@ def refine_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> Spi
     """Refine a frequency (Hz) by least squares over its harmonics among peaks; None without any."""
     comb = _fit_comb(frequency, peaks, peaks.frequency[np.newaxis], bin_width)
     return _comb_speed(comb, peaks, bin_width) if np.any(comb.is_member) else None
-
-
-def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
-    """Return the frequencies that may have been folded to each peak (Hz), itself first; shape (images, n)."""
-    levels = peaks.frequency
-    return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
 def _pick_comb(peaks: SpectralPeaks, images: Floats, width: float, frequency: float, tolerance: float) -> Comb | None:

@@ -140,7 +140,5 @@ def is_setting_taken(
 
 def find_cut_to_repeat(cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence]) -> CutEvidence | None:
     """Find the first rejected cut that was made only once, or None."""
-    for cut in cuts:
-        if cut in rejected and sum(cut.is_repeat_of(other) for other in cuts) == 1:
-            return cut
-    return None
+    made_once = (cut for cut in cuts if sum(cut.is_repeat_of(other) for other in cuts) == 1)
+    return next((cut for cut in made_once if cut in rejected), None)

@@ -307,24 +307,18 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     wrong = f"by the other cuts wrong with {100 * contradicting.wrong_probability:.0f} %"
-    text, cure = {
-        Contradiction.FREQUENCY: (
-            f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
-            "tap the workpiece where it is cut",
-        ),
-        Contradiction.CHATTERS: (
-            f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
-            "cut it again, or take it out with folder_updates.exclude_entry; tap again if it stays",
-        ),
-        Contradiction.STABLE: (
-            f"stable {at}, {wrong}: a slip, another depth or speed than told?",
-            "cut it again, or take it out with folder_updates.exclude_entry",
-        ),
-        Contradiction.POWER: (
-            f"its power {at} says another Kt than what was known before: this or an earlier one misread, another feed, "
-            "another depth, worn edges?",
-            "read it again, or take the cut whose power was misread out with folder_updates.exclude_entry; "
-            "its word counts",
-        ),
-    }[contradicting.contradiction]
+    kind, out = contradicting.contradiction, "out with folder_updates.exclude_entry"
+    misread = "this or an earlier one misread, another feed, another depth, worn edges?"
+    text = {
+        Contradiction.FREQUENCY: f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
+        Contradiction.CHATTERS: f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
+        Contradiction.STABLE: f"stable {at}, {wrong}: a slip, another depth or speed than told?",
+        Contradiction.POWER: f"its power {at} says another Kt than what was known before: {misread}",
+    }[kind]
+    cure = {
+        Contradiction.FREQUENCY: "tap the workpiece where it is cut",
+        Contradiction.CHATTERS: f"cut it again, or take it {out}; tap again if it stays",
+        Contradiction.STABLE: f"cut it again, or take it {out}",
+        Contradiction.POWER: f"read it again, or take the cut whose power was misread {out}; its word counts",
+    }[kind]
     return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

@@ -118,19 +118,10 @@ def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, mach
 
 def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
     angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
-    return CutEvidence(
-        cut=cut.cut,
-        speed_rpm=cut.speed_rpm,
-        depth=cut.depth,
-        verdict=cut.word,
-        frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
-        feed_angles=tuple(angles),
-        material=material,
-        speed_found=cut.by != "ear",
-        frequency_ratio=_frequency_ratio(cut, tool),
-        id=cut.id,
-        power=None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter),
-    )
+    frequency = float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz
+    power = None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter)
+    made = cut.cut, cut.speed_rpm, cut.depth, cut.word, frequency, tuple(angles), material
+    return CutEvidence(*made, cut.by != "ear", _frequency_ratio(cut, tool), cut.id, power)
 
 
 def _frequency_ratio(cut: CutEntry, tool: Assembly) -> float:

@@ -218,8 +218,7 @@ class DetectedDrop(NamedTuple):
     """Kind and beginning when it was triggered, and present size."""
 
 
-@dataclass(frozen=True, eq=False)
-class Detection:
+class Detection(NamedTuple):
     """Changes detected in a series."""
 
     scores: Floats

@@ -6,7 +6,6 @@ random numbers.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -70,8 +69,7 @@ class Rate(NamedTuple):
     """97.5 % quantile."""
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(NamedTuple):
     """Mixture of all shapes of a trend."""
 
     shapes: tuple[TrendShape, ...]
@@ -140,8 +138,7 @@ def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Float
     return fit_past(dates, Readings(y, temperature)).forecast(horizon)
 
 
-@dataclass(frozen=True, eq=False)
-class PastFit:
+class PastFit(NamedTuple):
     """Fits of all shapes to a series, the part of a forecast that does not depend on today."""
 
     families: tuple[FitFamily, ...]

@@ -5,7 +5,7 @@ Imported with every look at a plant, so without numpy.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
@@ -114,8 +114,7 @@ class StatusLevel(StrEnum):
 ALARM, UNKNOWN, WARN, GOOD = StatusLevel
 
 
-@dataclass(frozen=True)
-class StatusRule:
+class StatusRule(NamedTuple):
     """A rule of the machine status: what a remark code means, with its texts; words in braces are filled in."""
 
     code: str

@@ -238,8 +238,7 @@ class RandomWalkFits:
         return np.array(means), np.array(errors)
 
 
-@dataclass(frozen=True, eq=False)
-class _RotatedPoints:
+class _RotatedPoints(NamedTuple):
     """Series rotated into the directions in which the random walk is independent."""
 
     kind: ShapeKind

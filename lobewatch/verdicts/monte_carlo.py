@@ -1,7 +1,6 @@
 """Evaluate a program on all Monte Carlo samples: limits, band of limits, samples that chatter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -183,8 +182,7 @@ UNLIMITED_DEPTH = 1e3
 """Depth that represents no limit (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class LimitBand:
+class LimitBand(NamedTuple):
     """Band between the 1 % and 99 % quantiles of the limits, at the speeds of a diagram."""
 
     speed_rpm: Floats

@@ -6,7 +6,8 @@ which of each kind is best; and what is said of that is the evaluation's, sample
 """
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -40,8 +41,7 @@ MIN_PITCH_GAIN = 1.05
 """Smallest gain at the low end of the limit for which unequal pitches are proposed; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class PitchEvaluation:
+class PitchEvaluation(NamedTuple):
     """Cutter pitches with the evaluation of the cut."""
 
     pattern: PitchPattern
@@ -64,8 +64,7 @@ class PitchEvaluation:
     """Share of the samples in which equal pitch has the higher limit."""
 
 
-@dataclass(frozen=True, eq=False)
-class PitchProposal:
+class PitchProposal(NamedTuple):
     """Value of unequal pitches for one cut at one speed."""
 
     verdict: Verdict
@@ -109,8 +108,7 @@ def propose_pitch(
     return PitchProposal(verdict, evaluation, tuple(sorted(unequal, key=lambda judged: -judged.low)), half_wave)
 
 
-@dataclass(frozen=True, eq=False)
-class PitchSearch:
+class PitchSearch(NamedTuple):
     """Search for the pitches of one cut."""
 
     case: ProgramCase

@@ -6,7 +6,8 @@ that what it does not see (low immersion, flip) counts. Nothing is evaluated yet
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -38,8 +39,7 @@ MIN_SEARCHED_DEPTH = 1e-5
 """Smallest searched depth (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class CriticalSamples:
+class CriticalSamples(NamedTuple):
     """Critical samples of a cut at one speed."""
 
     likely_depth: float
@@ -140,8 +140,7 @@ POCKET_VALLEY_SHARE = 0.8
 """Likely depth between two separate pockets, as a share of the shallower pocket, at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class LikelyDepths:
+class LikelyDepths(NamedTuple):
     """Likely safe depths over speed."""
 
     speeds: Floats

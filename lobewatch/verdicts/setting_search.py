@@ -8,7 +8,7 @@ Where no speed of the grid has such a depth, nothing is recommended.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -206,7 +206,7 @@ class SettingSearch:
     def _deepest_stable(self, speed: float) -> float:
         """Return the deepest depth (mm) at a speed (rpm) by the critical samples, now and later."""
         most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
-        hard = self.critical[speed] = replace(self._critical_samples(speed), chattered=frozenset(self.chattered))
+        hard = self.critical[speed] = self._critical_samples(speed)._replace(chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest_stable(most)
 
     def _critical_samples(self, speed: float) -> CriticalSamples:

@@ -5,7 +5,7 @@ A stiffness stretches all limits alike and moves none of them along the speeds, 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,7 @@ SPEEDS_ONLY_CODE = "speeds-alone"
 """Code of the remark on speed pockets."""
 
 
-@dataclass(frozen=True)
-class SpeedPocket:
+class SpeedPocket(NamedTuple):
     """Stable pocket of unknown depth."""
 
     speed_rpm: float

@@ -47,8 +47,7 @@ class FactorRange(NamedTuple):
     """Highest factor."""
 
 
-@dataclass(frozen=True, eq=False)
-class LearnedSamples:
+class LearnedSamples(NamedTuple):
     """Spindles at speed that explain the test cuts, r of equal weight, around their mean; n modes in x, then y."""
 
     frequency: Floats

@@ -1,6 +1,6 @@
 """Fit a grid of spindle harmonics and sidebands to spectral peaks."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ MAX_SPEED_CHANGE = 0.005
 """Relative change of the spindle frequency above which least squares have diverged; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class SidebandFamily:
+class SidebandFamily(NamedTuple):
     """Peaks at sign * r + k f with the spindle frequency f."""
 
     indices: Indices
@@ -31,8 +30,7 @@ class SidebandFamily:
     """Order k of each peak, shape (n,)."""
 
 
-@dataclass(frozen=True)
-class SpindleSpeed:
+class SpindleSpeed(NamedTuple):
     """True spindle speed with its error."""
 
     frequency: float

@@ -1,6 +1,7 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,8 +85,7 @@ MAX_SPEED_ERRORS = 3.0
 """Standard errors of the spindle frequency within which its harmonics are searched; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class PeaksByOrigin:
+class PeaksByOrigin(NamedTuple):
     """All peaks of a cut by origin."""
 
     comb: SpectralPeaks
@@ -198,8 +198,7 @@ MIN_FAMILY_ENERGY = 0.25
 """Smallest energy of the chosen family over that of the largest."""
 
 
-@dataclass(frozen=True, eq=False)
-class ChatterPeaks:
+class ChatterPeaks(NamedTuple):
     """One family of chatter peaks."""
 
     frequency: float

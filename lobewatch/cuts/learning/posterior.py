@@ -125,8 +125,7 @@ class Posterior:
         return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
 
 
-@dataclass(frozen=True, eq=False)
-class NewEvidence:
+class NewEvidence(NamedTuple):
     """New cut before the posterior is updated."""
 
     prior: Posterior
@@ -234,8 +233,7 @@ class Contradiction(StrEnum):
     """Power with another Kt than that of the cuts before it."""
 
 
-@dataclass(frozen=True)
-class InconsistentCut:
+class InconsistentCut(NamedTuple):
     """Cut with a rejected label or power, or with a frequency of no mode."""
 
     cut: CutEvidence

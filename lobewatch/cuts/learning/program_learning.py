@@ -1,7 +1,8 @@
 """Learn from the test cuts of a program, and find its next test cut."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,7 @@ from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import uncertainty_of
 
 
-@dataclass(frozen=True, eq=False)
-class LearningResult:
+class LearningResult(NamedTuple):
     """Result of learning for one program."""
 
     program: ProgramTable
@@ -46,8 +46,7 @@ class LearningResult:
         return tuple(cut for cut in self.posterior.cuts if cut not in self.rejected_cuts)
 
 
-@dataclass(frozen=True, eq=False)
-class NextCut:
+class NextCut(NamedTuple):
     """Next test cut with its basis."""
 
     learning: LearningResult
@@ -73,7 +72,7 @@ def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: C
         evidence = posterior.predict(cut)
         if posteriors.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
-            evidence = replace(evidence, cut=replace(cut, power=None))
+            evidence = evidence._replace(cut=replace(cut, power=None))
         posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
     own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +32,7 @@ ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
 """Smallest and largest credible ratio of true limit to zero-order limit; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class CutGrid:
+class CutGrid(NamedTuple):
     """Grid of possible test cuts."""
 
     cut: Cut
@@ -104,8 +104,7 @@ EQUAL_DEPTH_TOLERANCE = 1e-9
 """Difference of two equal depths (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class LimitCharts:
+class LimitCharts(NamedTuple):
     """Limits of equally weighted samples over the speeds of a grid."""
 
     grid: CutGrid
@@ -227,8 +226,7 @@ MIN_REMOVAL_RATE_SHARE = 1e-3
 """Smallest best removal rate so far, as a share of the largest of the grid."""
 
 
-@dataclass(frozen=True)
-class Suggestion:
+class Suggestion(NamedTuple):
     """Suggested test cut."""
 
     speed_rpm: float
@@ -271,7 +269,7 @@ def suggest_cut(
     few = posterior.resample(N_SUGGESTION_SAMPLES)
     samples, chart = few.samples, LimitCharts.of(few.samples, grid)
     if (again := _find_repeat(few, [cut for cut in cuts if grid.contains(cut.speed_rpm)], left, rejected)) is not None:
-        return replace(_build_suggestion(grid, again.speed_rpm, again.depth, best, samples), repeats=again.id)
+        return _build_suggestion(grid, again.speed_rpm, again.depth, best, samples)._replace(repeats=again.id)
     unlearned = find_best_removal_rate([cut for cut in cuts if cut not in posterior.cuts])
     true = np.maximum(chart.true_best_rates(cuts), unlearned)
     least = MIN_EXPECTED_GAIN * max(best, MIN_REMOVAL_RATE_SHARE * float(np.max(chart.removal_rates)))

@@ -62,7 +62,7 @@ def test_chatter_of_half_a_percent_of_the_weight_by_the_others_is_explained(shar
     prediction = found.prediction._replace(excess=np.array([5.0, 5.0]))
     log_weight = np.log([share, 1 - share]) + log_likelihood(CHATTER, prediction)
     learnt = replace(found.prior, log_weight=log_weight)
-    chatters = replace(found, prior=learnt, prediction=prediction)
+    chatters = found._replace(prior=learnt, prediction=prediction)
     odd = find_contradiction(chatters)
     assert (odd and odd.contradiction) is (Contradiction.FREQUENCY if is_odd else None)
 

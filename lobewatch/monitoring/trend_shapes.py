@@ -302,3 +302,7 @@ def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:
     """Return the covariance of the random walk, its amount being 1, at two sets of shares of the span, shape (n, d)."""
     first = np.minimum(share[:, np.newaxis], ahead)
     return first**3 / 3 + first**2 * np.abs(share[:, np.newaxis] - ahead) / 2 if is_bend else first
+
+
+FitFamily = ShapeFits | RandomWalkFits
+"""Fits of one sort of shapes to a series."""

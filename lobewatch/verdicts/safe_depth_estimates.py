@@ -19,7 +19,7 @@ from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
+from lobewatch.verdicts.program_samples import FREQUENCY_MARGIN, ProgramSamples, draw_likely_samples
 from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR, StiffnessAt
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
@@ -132,8 +132,6 @@ MIN_REMOVAL_SHARE = 0.75
 """Possible removal rate at a speed, as a share of the largest zero-order rate, below which it is not checked."""
 MAX_DEPTH_FACTOR = 1.3
 """Largest distinguished limit over the largest allowed depth including its margin."""
-LIKELY_FREQUENCY_MARGIN = 0.003
-"""Relative frequency margin in addition to speed uncertainty and frequency drop."""
 MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
 """Smallest relative distance of two checked maxima, and of other checked speeds."""
 POCKET_VALLEY_SHARE = 0.8
@@ -186,7 +184,7 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     by_cut = np.array([each.depth for each in lobes]) * 1e3
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    margin = uncertainty.speed + FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
     steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:

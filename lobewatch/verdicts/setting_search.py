@@ -206,16 +206,13 @@ class SettingSearch:
     def _deepest_stable(self, speed: float) -> float:
         """Return the deepest depth (mm) at a speed (rpm) by the critical samples, now and later."""
         most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
-        hard = self.critical[speed] = self._critical_samples(speed)._replace(chattered=frozenset(self.chattered))
+        if speed not in self.critical:
+            likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
+            program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
+            few = estimates.select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
+            self.critical[speed] = few
+        hard = self.critical[speed] = self.critical[speed]._replace(chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest_stable(most)
-
-    def _critical_samples(self, speed: float) -> CriticalSamples:
-        """Return the critical samples at a speed (rpm)."""
-        if speed in self.critical:
-            return self.critical[speed]
-        likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
-        program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
-        return estimates.select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
         """Find the deepest setting up to a depth (mm)."""

@@ -14,9 +14,9 @@ from lobewatch.cuts.chatter_detection import peak_classification as classificati
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 from lobewatch.machine.journal.cut_entry import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -165,7 +165,7 @@ def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> Cut
     if speed is None:
         return _speed_not_found(spectra[0], np.nan)
     peaks = classification.find_cut_peaks(spectra, silence)
-    reach = classification.PEAK_TOLERANCE * spectra[0].bin_width
+    reach = spectral.PEAK_TOLERANCE * spectra[0].bin_width
     others = peaks[spectral.fold_frequency(peaks.frequency, speed.frequency) > reach]
     if len(others):
         distant = 60 * spindle_speed.find_distant_speed(spectra, silence, teeth, commanded, speed, others)

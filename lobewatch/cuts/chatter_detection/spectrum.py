@@ -40,6 +40,16 @@ SKIRT_AMPLITUDE_RATIO = 3.0
 """Amplitude of a peak over that of a fainter one on its skirt, a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
 """Standard error of the frequency of a peak times the root of its signal-to-noise ratio (bins)."""
+MIN_UNSTEADINESS = 1e-4
+"""Relative speed variation of every spindle; chosen."""
+PEAK_TOLERANCE = 1.2
+"""Largest distance of a peak from a frequency that it belongs to (bins)."""
+MAX_AIR_POWER_RATIO = 9.0
+"""Power of a peak over its power in air, up to which it is not caused by the cut."""
+AIR_PEAK_TOLERANCE = 2.0
+"""Distance up to which a peak in air is the same peak (bins of the air spectrum)."""
+MAX_HARMONICS = 16
+"""Number of harmonics below half the sample rate, under which any harmonic limits the folded ones; chosen."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
 """Smallest standard error of the frequency of a peak (bins)."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition import Remark
-from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence
+from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence
 from lobewatch.cuts.learning.program_learning import collect_evidence
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.journal.cut_entry import geometry_key

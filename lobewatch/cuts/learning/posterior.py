@@ -14,8 +14,7 @@ from acquisition import Remark
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning import cut_likelihood
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import CutPrediction, predict_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.uncertainty import Uncertainty
 

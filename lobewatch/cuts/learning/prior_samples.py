@@ -25,8 +25,6 @@ ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 Frequency, damping and stiffness are those of the chatter risk of a verdict (the deviation of f_n absolute)."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
 """Share of frequencies that differ more, and factor on their deviation; chosen, as no measurements exist."""
-MIN_PRIOR_FACTOR = 0.1
-"""Smallest factor over its mean."""
 MAX_SAMPLED_DAMPING = 0.95
 """Largest sampled damping ratio; modes stay underdamped."""
 OPEN_FORCE_RATIO_SHARE = 0.3
@@ -88,7 +86,7 @@ class SpindleSamples:
         at_speed, normal = self.normal[:, first : first + 2].T
         force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
         mean, spread = ROTATING_FORCE_PRIOR
-        return np.asarray(mean * np.maximum(1 + spread * at_speed, MIN_PRIOR_FACTOR) * force)
+        return np.asarray(mean * np.maximum(1 + spread * at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
@@ -116,7 +114,7 @@ class SpindleSamples:
         normal = self.normal[:, first : first + NUMBERS_PER_SPINDLE].reshape(-1, 2, 2)
         priors = program_samples.ROTATING_DAMPING_FACTOR, program_samples.ROTATING_STIFFNESS_FACTOR
         median, spread = np.array(priors).T
-        return np.asarray(median * np.maximum(1 + spread * normal, MIN_PRIOR_FACTOR))
+        return np.asarray(median * np.maximum(1 + spread * normal, program_samples.MIN_ROTATING_FACTOR))
 
     def _coefficient_factors(self, material: int, tangential: float, radial: float) -> tuple[Floats, Floats]:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""

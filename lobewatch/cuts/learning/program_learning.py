@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.cuts.learning import posterior as posteriors
-from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence, estimate_force_by_power
+from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.posterior import Contradiction, InconsistentCut, Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -12,20 +11,17 @@ import numpy as np
 from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
-from lobewatch.cuts.learning.cut_evidence import CutEvidence, find_cut_to_repeat, is_setting_taken
-from lobewatch.cuts.learning.cut_likelihood import CHATTER_FREQUENCY_SPREAD, LIMIT_SPREAD, predict_cut
+from lobewatch.cuts.learning import cut_likelihood
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, find_cut_to_repeat, is_setting_taken, predict_cut
 from lobewatch.cuts.learning.posterior import Posterior, wrong_label_probability
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.machine.journal.cut_entry import CutVerdict
+from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, STEP_ROUNDING, round_down_depth_mm
 from lobewatch.tool.principal_directions import TipModes
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 
 SPEED_GRID_STEP = 0.008
 """Relative step of the checked speeds."""
-TRIED_SPEED_STEP_RPM, TRIED_DEPTH_STEP_MM = 10.0, 0.05
-"""Steps of speed (rpm) and depth (mm) that a machine can set."""
-DEPTH_ROUNDING = 1e-6
-"""Share of a depth step that rounding may lose."""
 N_COMPARED_SPEEDS = 80
 """Number of speeds at which the zero-order approximation is compared with semi-discretization."""
 ZERO_ORDER_TRUST_RANGE = (0.1, 3.0)
@@ -55,16 +51,9 @@ class CutGrid(NamedTuple):
         return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 
 
-def list_speeds(low: float, high: float) -> Floats:
-    """List the speeds that can be set (rpm), in steps of 0.8 % and of 10 rpm."""
-    number = max(int(np.log(high / low) / SPEED_GRID_STEP) + 1, 2)
-    speeds = np.round(np.geomspace(low, high, number) / TRIED_SPEED_STEP_RPM) * TRIED_SPEED_STEP_RPM
-    return np.unique(np.clip(speeds, low, high))
-
-
 def floor_depth(depth: float) -> float:
     """Round a depth (m) down to one that can be set."""
-    return round(math.floor(depth * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING) * TRIED_DEPTH_STEP_MM, 6) / 1e3
+    return round_down_depth_mm(1e3 * depth) / 1e3
 
 
 def compare_zero_order(
@@ -131,8 +120,8 @@ class LimitCharts(NamedTuple):
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True))
         limit = np.minimum(limit * grid.zero_order_trust, grid.max_depths)
         order = np.argsort(-limit, axis=0, kind="stable")
-        steps = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / TRIED_DEPTH_STEP_MM + DEPTH_ROUNDING)
-        depth = steps * TRIED_DEPTH_STEP_MM / 1e3
+        steps = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / DEPTH_STEP_MM + STEP_ROUNDING)
+        depth = steps * DEPTH_STEP_MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
         teeth = grid.cut.repeats_per_turn * grid.speeds / 60
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
@@ -147,7 +136,7 @@ class LimitCharts(NamedTuple):
         """Return whether the verdict of a cut is wrong in each sample, shape (r,)."""
         row = int(np.argmin(np.abs(np.log(self.grid.speeds / cut.speed_rpm))))
         excess = np.log(cut.depth / self.limits[:, row]) * (-1 if cut.has_chatter else 1)
-        return np.asarray(excess > MAX_LABEL_DEVIATION * LIMIT_SPREAD)
+        return np.asarray(excess > MAX_LABEL_DEVIATION * cut_likelihood.LIMIT_SPREAD)
 
     def expected_gains(self, weights: Floats, best: float | Floats) -> Floats:
         """Return the expected gain of removal rate (rpm m) at each speed, shape (s,)."""
@@ -193,7 +182,7 @@ class LimitCharts(NamedTuple):
         if not places.size:
             return 0.0
         expected = self.frequencies[places, row]
-        wide = FREQUENCY_ERROR_FACTOR * CHATTER_FREQUENCY_SPREAD * self.typical_frequency
+        wide = FREQUENCY_ERROR_FACTOR * cut_likelihood.CHATTER_FREQUENCY_SPREAD * self.typical_frequency
         gains = []
         shares = (np.arange(N_EXPECTED_FREQUENCIES) + 0.5) / N_EXPECTED_FREQUENCIES
         for frequency in (expected[int(share * places.size)] for share in shares):

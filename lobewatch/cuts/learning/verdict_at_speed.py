@@ -10,7 +10,7 @@ import numpy as np
 from acquisition import DataError
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.cut_evidence import CutEntries
+from lobewatch.cuts.learning.cut_likelihood import CutEntries
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts
 from lobewatch.cuts.learning.posterior import Posterior, inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, learn_program

@@ -14,20 +14,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from shown_power import FEED, ShownPower
+from speed_grid import list_speeds
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, lower_envelope, rows_at_speeds, stability_boundary, zero_order_lobes
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import log_likelihood, predict_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, log_likelihood, predict_cut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
 from lobewatch.cuts.learning.suggestion import (
     CutGrid,
     compare_zero_order,
     find_best_removal_rate,
     floor_depth,
-    list_speeds,
     suggest_cut,
 )
 from lobewatch.machine.journal.cut_entry import CutVerdict

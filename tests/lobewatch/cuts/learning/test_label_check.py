@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import CutPrediction, log_likelihood
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, log_likelihood
 from lobewatch.cuts.learning.posterior import (
     Contradiction,
     InconsistentCut,

@@ -9,10 +9,10 @@ import pytest
 
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import (
     MISLABELED_SHARE,
     UNPITCHED_MISLABELED_SHARE,
+    CutEvidence,
     log_likelihood,
     max_log_likelihood,
     predict_cut,

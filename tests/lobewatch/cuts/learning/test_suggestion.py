@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from speed_grid import list_speeds
 
 from lobes import Cut, stability_boundary, zero_order_lobes
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import predict_cut
-from lobewatch.cuts.learning.suggestion import compare_zero_order, floor_depth, list_speeds, suggest_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, predict_cut
+from lobewatch.cuts.learning.suggestion import compare_zero_order, floor_depth, suggest_cut
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
 
@@ -80,16 +80,6 @@ def test_zero_order_is_corrected_where_it_is_not_exact(mill: Mill) -> None:
     mean = zero_order_lobes([mill.x], [mill.y], slender, speeds).depth
     assert share == pytest.approx(np.minimum(true, 0.02) / np.minimum(mean, 0.02))
     assert np.max(np.abs(share - 1)) > 0.1
-
-
-def test_speeds_are_steps_of_0_8_percent_that_can_be_set_between_the_ends() -> None:
-    speeds = list_speeds(4005.0, 20000.0)
-    assert (speeds[0], speeds[-1]) == (4005.0, 20000.0)
-    assert np.all(speeds[1:] % 10 == 0)
-    steps = np.diff(np.log(speeds))
-    assert np.mean(steps) == pytest.approx(0.008, rel=0.02)
-    assert np.max(np.abs(steps - 0.008)) < 2 * 5 / 4000
-    assert list_speeds(5000.0, 5010.0).tolist() == [5000.0, 5010.0]
 
 
 def test_zero_order_is_believed_between_a_tenth_and_three_times_the_truth(mill: Mill) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from lobewatch.cuts.learning.verdict_at_speed import evaluate_at_speed
+from lobewatch.cuts.learning.program_learning import evaluate_at_speed
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements

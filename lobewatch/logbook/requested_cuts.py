@@ -8,7 +8,7 @@ import msgspec
 
 from acquisition import DataError
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
-from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
+from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable

@@ -156,15 +156,10 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     """Name the decisive cause of uncertainty, and what would reduce it."""
     table, assembly, record = case.table, case.assembly, UNCERTAINTY_CAUSES[cause]
     missing, missing_remedy = assembly.missing_direction
+    measure = "measure them" if table.material else "measure them, or name the material"
+    asked = ", ".join(dict.fromkeys(question.code for question in assembly.questions))
     tangential = result.median.limit / case.depth * case.program.cut.tangential
-    values = {
-        "kt": f"{tangential / 1e6:.0f}",
-        "tool": repr(table.tool),
-        "program": repr(table.name),
-        "n_cuts": case.at_speed.n_cuts,
-        "coefficients_remedy": "measure them" if table.material else "measure them, or name the material",
-        "questions": ", ".join(dict.fromkeys(question.code for question in assembly.questions)),
-        "missing": missing,
-        "missing_remedy": missing_remedy,
-    }
+    values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
+    values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    values |= {"missing": missing, "missing_remedy": missing_remedy}
     return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

@@ -184,20 +184,17 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
+    shared = ("limit", "chatter_frequency", "kind", "feed_angle", "method")
     return Verdict(
+        **{name: getattr(median, name) for name in shared},
         program=case.table,
         stability=stability,
         assembly=case.assembly,
         at_speed=case.at_speed,
-        limit=median.limit,
         limit_low=min(result.low, median.limit),
         limit_high=max(result.high, median.limit),
         chatter_risk=_estimate_chatter_risk(case, result),
         decisive_cause=cause,
-        chatter_frequency=median.chatter_frequency,
-        kind=median.kind,
-        feed_angle=median.feed_angle,
-        method=median.method,
         detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
         drive_limit=float(drive_limit[0]),
         samples=result.samples,

@@ -194,7 +194,7 @@ def _evaluate_peaks(
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return replace(sound, verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
-        return _evaluate_without_chatter(sound, peaks, teeth, immersion)
+        return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
     end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
@@ -204,7 +204,7 @@ def _evaluate_peaks(
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = replace(sound, energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
-        return _evaluate_without_chatter(sound, peaks, teeth, immersion)
+        return _evaluate_stable(sound, peaks, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
         return replace(sound, verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
@@ -213,9 +213,7 @@ def _evaluate_peaks(
     return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
 
 
-def _evaluate_without_chatter(
-    sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float
-) -> CutEvaluation:
+def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
     """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
     power, order = peaks.comb.amplitude**2, peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from lobes import StabilityLobes
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.export_columns import compute_row_lobes
 from lobewatch.logbook import Analysis

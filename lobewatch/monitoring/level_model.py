@@ -1,7 +1,5 @@
 """Regression model of the level of a series, with temperature and operators."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -178,7 +176,7 @@ class LevelModel:
         """Residual sum of squares of the level model for all points."""
         return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
 
-    def fit_columns(self, columns: Floats) -> ColumnFits:
+    def fit_columns(self, columns: Floats) -> "ColumnFits":
         """Fit each of some sets of k columns (j, k, n) together with the model."""
         base, crossed = self.inverse_normal_matrix, columns @ self.columns
         level, leaning = base @ self.columns.T @ self.y, crossed @ base
@@ -210,7 +208,7 @@ class ColumnFits(NamedTuple):
     freedom: int
     """Degrees of freedom; the temperature costs none, since its effect has a prior."""
 
-    def select(self, numbers: Indices) -> ColumnFits:
+    def select(self, numbers: Indices) -> "ColumnFits":
         """Select some of the fits."""
         rss, size, inverse, leaning = (values[numbers] for values in self[:4])
         return ColumnFits(rss, size, inverse, leaning, self.level, self.level_variance, self.freedom)

@@ -3,8 +3,6 @@
 Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -36,7 +34,7 @@ class ValueHistory:
     """Value of each row and its standard error, shape (n, 2)."""
     has_questions: Flags
     """True for each row with unanswered questions, shape (n,)."""
-    other_direction: ValueHistory | None = None
+    other_direction: "ValueHistory | None" = None
     """Same value in the other direction; None if unknown or irrelevant."""
     scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
     """Prior scatter of the series."""

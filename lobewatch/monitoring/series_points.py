@@ -1,7 +1,5 @@
 """Points of a series: readings, clampings, days of use, outliers and scatter."""
 
-from __future__ import annotations
-
 from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +67,7 @@ class Readings:
         return np.empty(0, np.intp) if other is None else np.flatnonzero(np.isfinite(other))
 
     @property
-    def mean_of_directions(self) -> Readings:
+    def mean_of_directions(self) -> "Readings":
         """Mean of both directions, at the points that both have."""
         at, other = self.shared_points, self.y if self.other_direction is None else self.other_direction
         temperature = None if self.temperature is None else self.temperature[at]

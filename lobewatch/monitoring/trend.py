@@ -1,7 +1,5 @@
 """Trend of one value of a series: points, start, alarm and forecast."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect
 from collections.abc import Iterator, Sequence
@@ -87,7 +85,7 @@ class Trend:
     today: int
     """Day of the evaluation (days since 1970)."""
 
-    def at_day(self, now: datetime) -> Trend:
+    def at_day(self, now: datetime) -> "Trend":
         """Return this trend as of another day."""
         return replace(self, today=int(days_since_epoch(now)))
 

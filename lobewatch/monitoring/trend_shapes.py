@@ -1,7 +1,5 @@
 """Shapes that a trend may have, and their fits: by least squares, and lines whose level or rate is a random walk."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -191,7 +189,7 @@ class RandomWalkFits:
     """Logarithm of the evidence for each line, relative to a steady series, shape (j,)."""
     variance: Floats
     """Variance of a point around each line, shape (j,)."""
-    points: _RotatedPoints
+    points: "_RotatedPoints"
     """Points of the series."""
 
     @property

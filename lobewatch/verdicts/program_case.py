@@ -1,7 +1,5 @@
 """A program to evaluate: its table, the tool and the spindle at speed it runs on, and the cuts on its path."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -131,11 +129,11 @@ class ProgramCase:
         """Uncertainty by cause."""
         return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
 
-    def at(self, speed_rpm: float, depth_mm: float) -> ProgramCase:
+    def at(self, speed_rpm: float, depth_mm: float) -> "ProgramCase":
         """Return the same program at another speed (rpm) and depth (mm)."""
         return self.with_changes(speed_rpm=speed_rpm, depth_mm=depth_mm)
 
-    def with_changes(self, **fields: object) -> ProgramCase:
+    def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""
         return replace(self, table=msgspec.structs.replace(self.table, **fields))
 

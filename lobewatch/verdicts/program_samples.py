@@ -1,7 +1,5 @@
 """Monte Carlo samples of a program, the cuts it makes on its path, and which samples chatter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
@@ -96,16 +94,16 @@ class ProgramSamples:
                 grown[here] = lobes.growth_rate(rows, depths[here], number)
         return grown
 
-    def __getitem__(self, places: Indices) -> ProgramSamples:
+    def __getitem__(self, places: Indices) -> "ProgramSamples":
         return replace(self, rows=self.rows[places])
 
-    def with_lowest_cuts(self, below: float, most: int | None = None) -> ProgramSamples:
+    def with_lowest_cuts(self, below: float, most: int | None = None) -> "ProgramSamples":
         """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
         wanted[0] = True
         return self.with_cuts(wanted)
 
-    def with_cuts(self, wanted: Flags) -> ProgramSamples:
+    def with_cuts(self, wanted: Flags) -> "ProgramSamples":
         """Select some cuts; the worst if there is none."""
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
@@ -123,7 +121,7 @@ class ProgramSamples:
         grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
         return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
 
-    def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> ProgramSamples:
+    def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> "ProgramSamples":
         """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]

@@ -1,7 +1,5 @@
 """Spectra of recorded cuts, their peaks above the noise, and folded frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -90,7 +88,7 @@ class SpectralPeaks:
     clearness: Floats
     """Signal-to-noise ratio of the power of each peak, shape (n,)."""
 
-    def __getitem__(self, places: Flags | Indices) -> SpectralPeaks:
+    def __getitem__(self, places: Flags | Indices) -> "SpectralPeaks":
         return SpectralPeaks(self.frequency[places], self.amplitude[places], self.clearness[places])
 
     def __len__(self) -> int:
@@ -101,7 +99,7 @@ class SpectralPeaks:
         """Energy of all peaks ((m/s^2)^2)."""
         return float(np.sum(self.amplitude**2))
 
-    def loudest(self, count: int) -> SpectralPeaks:
+    def loudest(self, count: int) -> "SpectralPeaks":
         """Return the loudest peaks, the loudest first, at most `count`."""
         return self[np.argsort(-self.amplitude)[:count]]
 

@@ -3,8 +3,6 @@
 All that is chosen here is plausible, not measured, but for cuts that chatter.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -105,7 +103,7 @@ class CutEvidence:
         """Weight of the cut, which decreases as the natural frequency changes."""
         return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
-    def is_repeat_of(self, other: CutEvidence) -> bool:
+    def is_repeat_of(self, other: "CutEvidence") -> bool:
         """Return whether another cut repeats this one: same program, material, speed and depth."""
         near = abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
         same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)

@@ -1,7 +1,5 @@
 """Posterior of the rotating spindle: samples weighted by the test cuts, and cuts whose label contradicts the others."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -50,7 +48,7 @@ class Interval(NamedTuple):
     std: float
     """Weighted standard deviation."""
 
-    def no_narrower(self, low: float, high: float) -> Interval:
+    def no_narrower(self, low: float, high: float) -> "Interval":
         """Return an interval that includes both values."""
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
@@ -103,11 +101,11 @@ class Posterior:
         usual = float(np.sum(self.weights * np.all(beside, axis=0)))
         return self.n_frequencies >= MIN_CHATTER_FREQUENCIES and usual < 1 / 2
 
-    def learn_from(self, cut: CutEvidence) -> Posterior:
+    def learn_from(self, cut: CutEvidence) -> "Posterior":
         """Update with one more cut."""
         return self.predict(cut).update()
 
-    def predict(self, cut: CutEvidence) -> NewEvidence:
+    def predict(self, cut: CutEvidence) -> "NewEvidence":
         """Predict a cut on the samples that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
         samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
@@ -119,7 +117,7 @@ class Posterior:
         random = np.random.default_rng((self.seed, 4, len(self.cuts)))
         return self.samples[_resample_indices(self.weights, count, random)]
 
-    def resample(self, count: int) -> Posterior:
+    def resample(self, count: int) -> "Posterior":
         """Resample to a number of samples of equal weight."""
         return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
 

@@ -6,8 +6,6 @@ plausible, not measured. They are joined with the uncertainty of the program. Ea
 is standard normal, so that samples can be moved without leaving the prior out of sight.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -51,10 +49,10 @@ class SpindleSamples:
     def __len__(self) -> int:
         return len(self.normal)
 
-    def __getitem__(self, places: Indices | slice) -> SpindleSamples:
+    def __getitem__(self, places: Indices | slice) -> "SpindleSamples":
         return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
-    def with_materials(self, count: int, seed: int) -> SpindleSamples:
+    def with_materials(self, count: int, seed: int) -> "SpindleSamples":
         """Add cutting coefficients from the prior until there are `count` materials."""
         missing = self._material_index(count) - self.normal.shape[1]
         if missing <= 0:

@@ -1,7 +1,5 @@
 """Suggest the next test cut by its expected gain in removal rate and its risk, on a grid of test cuts."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -110,7 +108,7 @@ class LimitCharts(NamedTuple):
     """Speed times the largest stable depth that can be set (rpm m), shape (r, s)."""
 
     @classmethod
-    def of(cls, samples: SpindleSamples, grid: CutGrid) -> LimitCharts:
+    def of(cls, samples: SpindleSamples, grid: CutGrid) -> "LimitCharts":
         """Compute the limits of samples at speed."""
         rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))

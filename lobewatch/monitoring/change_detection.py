@@ -187,7 +187,7 @@ def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats
 
 def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
     """Choose the likelier of a step and a slope in the first n (r,) points."""
-    t = [base.t_statistic(lean, n) for lean in leans]
+    t = [lean / np.sqrt(base.point_variance(lean**2, n)) for lean in leans]
     scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
     return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))

@@ -71,15 +71,11 @@ class LevelModel:
             product /= np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums)
         return product
 
-    def t_statistic(self, lean: Floats, n: Indices) -> Floats:
-        """Return Student's t of changes that explain this much in the first n, shape (r,) each."""
-        return np.asarray(lean / np.sqrt(self._point_variance(lean**2, n)))
-
     def freedom(self, n: Indices) -> Floats:
         """Return the degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
-    def _point_variance(self, explained: Floats, n: Indices) -> Floats:
+    def point_variance(self, explained: Floats, n: Indices) -> Floats:
         """Return the variance of a point in the first n, where a change explains this sum of squares, shape (r,)."""
         total, prior = self._residual_squares_up_to[n], self.scatter_prior
         left = np.maximum(total - explained, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
@@ -90,7 +86,7 @@ class LevelModel:
         until = np.array([n])
         product, square = (float(part[0, 0]) for part in self._change(kind, until[:, np.newaxis], np.array([k])))
         size = product / square
-        return size, float(np.sqrt(self._point_variance(np.array([size * product]), until)[0] / square))
+        return size, float(np.sqrt(self.point_variance(np.array([size * product]), until)[0] / square))
 
     def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
         """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
@@ -115,7 +111,7 @@ class LevelModel:
 
     def _tail(self, i: int, kind: str, n: Indices, k: Indices) -> Floats:
         """Return the product of the column of a change with the series (0) or one of the columns (from 1 on)."""
-        sums, moments = self._sums[i], self._moments[i]
+        sums, moments = (values[i] for values in self._sums)
         tail: Floats = sums[n] - sums[k]
         if i == 0:
             tail += self._newest_excess[n]
@@ -151,12 +147,10 @@ class LevelModel:
         return np.column_stack([self.y, self.columns])
 
     @cached_property
-    def _sums(self) -> Floats:
-        return _cumulative_sums(self._values).T
-
-    @cached_property
-    def _moments(self) -> Floats:
-        return _cumulative_sums(np.arange(self.y.size)[:, np.newaxis] * self._values).T
+    def _sums(self) -> tuple[Floats, Floats]:
+        """Cumulative sums and moments of the values, shape (1 + p, n + 1) each."""
+        moments = np.arange(self.y.size)[:, np.newaxis] * self._values
+        return _cumulative_sums(self._values).T, _cumulative_sums(moments).T
 
     @cached_property
     def _outer(self) -> Floats:

@@ -2,7 +2,6 @@
 
 from bisect import insort
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from math import copysign, sqrt
 from statistics import median
 from typing import NamedTuple, Self
@@ -39,8 +38,7 @@ NO_SERIES_PRIOR = SeriesScatterPrior()
 """Unknown scatter of a series."""
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """Series, point by point."""
 
     y: Floats
@@ -58,7 +56,7 @@ class Readings:
         """Return the points from one on."""
         y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
         temperature, other = (None if values is None else values[begin:] for values in optional)
-        return replace(self, y=y, temperature=temperature, operators=operators, other_direction=other)
+        return self._replace(y=y, temperature=temperature, operators=operators, other_direction=other)
 
     @property
     def shared_points(self) -> Indices:

@@ -176,7 +176,9 @@ def fit_trend(
     what is known of its scatter beforehand.
     """
     points, past = list_newest_points(taps), None
-    readings = _build_readings(points, list_newest_points(other), known)
+    percents, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
+    others = np.array([*_other_percents(points, list_newest_points(other))])
+    readings = Readings(percents, warmth, tuple(point.operator for point in points), others, known)
     if len(points) >= MIN_FORECAST_POINTS:
         past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
     return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
@@ -206,12 +208,6 @@ def _build_point(taps: Sequence[TapValue], percents: Sequence[float], first: int
     recorded = [tap.temperature for tap in taps if not math.isnan(tap.temperature)]
     warm, numbers = sum(recorded) / len(recorded) if recorded else math.nan, tuple(range(first, first + len(taps)))
     return TrendPoint(taps[0].time, changed, error, warm, taps[0].hours, taps[0].operator, numbers)
-
-
-def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], known: SeriesScatterPrior) -> Readings:
-    percents, temperatures = ([getattr(point, name) for point in points] for name in ("percent", "temperature"))
-    operators, other = tuple(point.operator for point in points), np.array([*_other_percents(points, others)])
-    return Readings(np.array(percents), np.array(temperatures), operators, other, known)
 
 
 def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) -> Iterator[float]:

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from typing import Literal, NamedTuple, Self, get_args
@@ -115,8 +114,7 @@ ColumnBuilder = Callable[[Sequence[TrendShape], Floats], Floats]
 """Function that returns the columns (j, k, d) of shapes at dates from the first point on."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeFits:
+class ShapeFits(NamedTuple):
     """Fits of shapes with equal numbers of columns to one series, with dates from its first point on."""
 
     shapes: tuple[TrendShape, ...]
@@ -143,7 +141,7 @@ class ShapeFits:
     def select(self, numbers: Indices) -> Self:
         """Select some of the shapes."""
         shapes = tuple(self.shapes[j] for j in numbers)
-        return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
+        return self._replace(shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
         """Predict mean and standard error of each at dates, shape (j, d) each."""
@@ -179,8 +177,7 @@ RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
 """Variances of a rate random walk (levels per span) over the span, relative to that of a point; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class RandomWalkFits:
+class RandomWalkFits(NamedTuple):
     """Fits of lines of one kind with random walks of different size to one series."""
 
     shapes: tuple[TrendShape, ...]
@@ -200,7 +197,7 @@ class RandomWalkFits:
     def select(self, numbers: Indices) -> Self:
         """Select some of the lines."""
         shapes = tuple(self.shapes[j] for j in numbers)
-        return replace(self, shapes=shapes, evidence=self.evidence[numbers], variance=self.variance[numbers])
+        return self._replace(shapes=shapes, evidence=self.evidence[numbers], variance=self.variance[numbers])
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
         """Predict mean and standard error of each at dates from the first point on, shape (j, d) each."""

@@ -93,16 +93,12 @@ def find_stable_pockets(
     """
     if not is_compliance_known(table, assembly):
         return []
-    program = build_cut_program(at_speed.apply_coefficients(table), assembly.tool, machine)
+    program = at_speed.apply_coefficients(table)
+    if not isinstance(program, ProgramTable):
+        place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
+        named = {"name": REFERENCE_CUT, "tool": assembly.tool}
+        program = ProgramTable(**named | msgspec.structs.asdict(program) | place)
     return SettingSearch(ProgramCase(program, assembly, machine, at_speed)).pockets(count)
-
-
-def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
-    """Build a program from a cut; speed and depth are placeholders."""
-    if isinstance(table, ProgramTable):
-        return table
-    place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
-    return ProgramTable(**{"name": REFERENCE_CUT, "tool": tool} | msgspec.structs.asdict(table) | place)
 
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"

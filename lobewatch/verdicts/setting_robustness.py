@@ -15,10 +15,8 @@ from acquisition import Remark
 from dsm import Calibration, calibrate
 from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.arrays import Floats
-from lobewatch.machine import Machine
 from lobewatch.machine.settings.cut_range import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.uncertainty import Factors
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
@@ -233,17 +231,3 @@ def _last_stable_row(grown: Floats) -> int:
     """Return the row up to which all of growth (k, samples) is negative from the first on."""
     calm = np.all(grown < 0, axis=1)
     return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
-
-
-N_TAP_INTERVALS = 2
-"""Number of tap intervals for which a setting must stay stable."""
-DEFAULT_NEEDED_DROP = 0.02
-"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
-
-
-def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
-    """Return the frequency drop that a recommended setting must tolerate: two tap intervals at the rate so far."""
-    days = N_TAP_INTERVALS * machine.machine.tap_interval_days
-    drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
-    needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops]
-    return max(needed, default=DEFAULT_NEEDED_DROP)

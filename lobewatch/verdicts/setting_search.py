@@ -16,6 +16,7 @@ import numpy as np
 from lobes import Program
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.cut_range import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
+from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples
@@ -49,6 +50,11 @@ NEXT_DEPTH_SHARE = 0.98
 N_WINDOW_SAMPLES = 24
 """Number of critical samples that bound a window before all samples decide."""
 
+N_TAP_INTERVALS = 2
+"""Number of tap intervals for which a setting must stay stable."""
+DEFAULT_NEEDED_DROP = 0.02
+"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
+
 DepthsBySpeed = dict[float, float]
 """Possibly safe depths (mm) by speed (rpm)."""
 SharesBySpeed = dict[float, float]
@@ -75,8 +81,11 @@ class SettingSearch:
 
     @cached_property
     def needed_drop(self) -> float:
-        """Relative frequency drop at which a setting must stay stable."""
-        return robustness.find_needed_drop(self.case.assembly, self.case.machine)
+        """Relative frequency drop at which a setting must stay stable: two tap intervals at the rate so far."""
+        days = N_TAP_INTERVALS * self.case.machine.machine.tap_interval_days
+        drops = [expected_frequency_drop(series, days) for series in self.case.assembly.series.values()]
+        needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, robustness.MIN_ROBUST_DROP) for drop in drops]
+        return max(needed, default=DEFAULT_NEEDED_DROP)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
@@ -177,21 +186,18 @@ class SettingSearch:
         return speed
 
     def _best_speed(self, depths: DepthsBySpeed, confirmed: SharesBySpeed) -> float:
-        """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
+        """Return the speed (rpm) of the largest removal rate, with the share likely to be confirmed; 0 without any."""
 
         def rate(speed: float) -> float:
-            return speed * depths[speed] * self._expected_share(speed, confirmed)
+            pocket = [share for other, share in confirmed.items() if self.likely_depths.is_same_pocket(speed, other)]
+            share = 1.0 if speed in confirmed or len(pocket) < MIN_FAILED_SPEEDS else max(pocket)
+            return speed * depths[speed] * share
 
         while True:
             speed = max(depths, key=rate, default=0.0)
             if not speed or self.critical[speed].chattered == self.chattered:
                 return speed
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
-
-    def _expected_share(self, speed: float, confirmed: SharesBySpeed) -> float:
-        """Return the share of its depth that is likely to be confirmed at a speed (rpm)."""
-        shares = [share for other, share in confirmed.items() if self.likely_depths.is_same_pocket(speed, other)]
-        return 1.0 if speed in confirmed or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
     def _better_neighbor(self, speed: float, depth_mm: float) -> float:
         """Return a neighboring speed (rpm) with a larger removal rate by the critical samples, or itself."""

@@ -190,13 +190,9 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
     """
     mixing = np.array([_tap_correlation(mode) for mode in (*(assembly.x or ()), *(assembly.y or ()))])
     speed, ranges = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
-    axes, wear = assembly.principal_directions, wear_factor_of(table, machine)
+    given = table.wear if isinstance(table, ProgramTable) else None
+    axes, wear = assembly.principal_directions, WEAR_FACTORS[given or machine.doubt.wear]
     return Uncertainty(_mode_uncertainty(assembly, machine.doubt), mixing, speed, *ranges, wear, axes)
-
-
-def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
-    return WEAR_FACTORS[(table.wear if isinstance(table, ProgramTable) else None) or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:

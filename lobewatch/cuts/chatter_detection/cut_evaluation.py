@@ -4,7 +4,6 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 (docs/cuts.md, How often it is right).
 """
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -41,8 +40,7 @@ END_PEAK_TOLERANCE = 1.0
 """Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
 
 
-@dataclass(frozen=True, eq=False)
-class CutEvaluation:
+class CutEvaluation(NamedTuple):
     """Evaluation of one cut in a recording with its evidence; None and NaN for steps that were not reached."""
 
     verdict: CutVerdict
@@ -107,14 +105,14 @@ def evaluate_cut(
     """
     spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
-        return replace(_evaluate_without_air(spectra, teeth, commanded_rpm / 60), reason="no-air")
+        return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
     quiet = spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
     speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
     axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
-    sounds = [replace(_evaluate_axis(*axis, speed, teeth, immersion), axis=i) for i, axis in enumerate(axes)]
+    sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
@@ -160,7 +158,7 @@ def _find_speed(
 
 def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> CutEvaluation:
     """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
-    silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
+    silence = [spectrum._replace(power=np.zeros(spectrum.power.size)) for spectrum in spectra]
     speed = spindle_speed.find_speed_of_spectra(spectra, silence, teeth, commanded)
     if speed is None:
         return _speed_not_found(spectra[0], np.nan)
@@ -192,7 +190,7 @@ def _evaluate_peaks(
     sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
-        return replace(sound, verdict="cannot tell", reason="slow-sampling")
+        return sound._replace(verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
@@ -202,15 +200,15 @@ def _evaluate_peaks(
     at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
     still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
-    sound = replace(sound, energy_ratio=ratio)
+    sound = sound._replace(energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_stable(sound, peaks, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
-        return replace(sound, verdict="cannot tell", reason="faint")
+        return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
-        return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
+        return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
-    return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
+    return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
 
 
 def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
@@ -220,7 +218,7 @@ def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, imm
     uneven = float(np.sum(power[~run_out & ~tooth]))
     is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))
     is_loud = immersion < SLOT_IMMERSION and np.sum(power[~tooth]) > MAX_RUNOUT_ENERGY * np.sum(power[tooth])
-    return replace(sound, verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
+    return sound._replace(verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
 def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
@@ -274,7 +272,7 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     air = axes[:, slice(0, 0) if reason else parts.air]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
     sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
-    return replace(sound, parts=parts, measured_rpm=measured)
+    return sound._replace(parts=parts, measured_rpm=measured)
 
 
 def _mean_speed(speed: Floats) -> float:

@@ -1,6 +1,5 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -112,7 +111,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
         level = np.maximum(level, np.where(tone > MIN_TONE_POWER_RATIO * noise, tone, 0.0))
     power = air.power.copy()
     np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)
-    return replace(air, power=power)
+    return air._replace(power=power)
 
 
 def _bins_around(middle: Floats, reach: int, last: int) -> Indices:

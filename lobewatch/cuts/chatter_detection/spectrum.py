@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -52,8 +53,7 @@ MIN_PEAK_FREQUENCY_ERROR = 0.03
 """Smallest standard error of the frequency of a peak (bins)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(NamedTuple):
     """Spectrum of a part of a recording."""
 
     frequency: Floats

@@ -132,14 +132,11 @@ def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
         inside = (place >= 0) & (place < grid.size)
         if np.any(inside):
             counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
-            votes += _smooth_votes(counted.astype(np.float64), np.sqrt(2) * sharpness / order / step)
+            width = np.sqrt(2) * sharpness / order / step
+            reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
+            spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+            votes += np.convolve(counted.astype(np.float64), spread, "same")
     return votes
-
-
-def _smooth_votes(votes: Floats, width: float) -> Floats:
-    """Spread each vote over its neighbors; width: standard deviation in grid steps."""
-    reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
-    return np.convolve(votes, np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2), "same")
 
 
 TACHOMETER_TOLERANCE = 2e-3
@@ -209,7 +206,8 @@ def find_distant_speed(
     clearest = combs.find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
     if known is None or left is None:
         return np.nan if clearest is None else clearest.frequency
-    hums = [hum for hum in HUM_FREQUENCIES if not _is_mains_speed(known, hum)]
+    mains_speeds = {hum: (known.frequency / hum, known.frequency / (2 * hum)) for hum in HUM_FREQUENCIES}
+    hums = [hum for hum, ratios in mains_speeds.items() if all(abs(ratio - 1) >= HUM_TOLERANCE for ratio in ratios)]
     mains = [find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in hums]
     plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known.agreeing]
     centres = combs.list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
@@ -234,8 +232,3 @@ def _rank_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> tupl
     """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
     comb = combs.refine_comb(frequency, peaks, bin_width)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
-
-
-def _is_mains_speed(speed: SpindleSpeed, hum: float) -> bool:
-    """Return whether a spindle turns as fast as a hum (Hz), or twice as fast."""
-    return any(abs(speed.frequency / (times * hum) - 1) < HUM_TOLERANCE for times in (1, 2))

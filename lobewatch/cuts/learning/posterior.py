@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -53,8 +53,7 @@ class Interval(NamedTuple):
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(NamedTuple):
     """Weighted samples of the rotating spindle."""
 
     samples: SpindleSamples
@@ -109,7 +108,7 @@ class Posterior:
         """Predict a cut on the samples that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
         samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
-        before = replace(self, samples=samples, log_weight=self.log_weight[likely])
+        before = self._replace(samples=samples, log_weight=self.log_weight[likely])
         return NewEvidence(before, cut, predict_cut(cut, samples))
 
     def draw(self, count: int) -> SpindleSamples:
@@ -119,7 +118,7 @@ class Posterior:
 
     def resample(self, count: int) -> "Posterior":
         """Resample to a number of samples of equal weight."""
-        return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
+        return self._replace(samples=self.draw(count), log_weight=np.zeros(count))
 
 
 class NewEvidence(NamedTuple):
@@ -136,7 +135,7 @@ class NewEvidence(NamedTuple):
         """Update the posterior with the cut."""
         prior = self.prior
         likelihood = _cut_log_likelihood(self.cut, prior.samples, self.prediction, prior.cuts)
-        posterior = replace(prior, log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
+        posterior = prior._replace(log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
@@ -174,7 +173,7 @@ def _refresh(posterior: Posterior) -> Posterior:
         taken = moved_value > least
         normal = np.where(taken[:, np.newaxis], moved.normal, samples.normal)
         samples, value = replace(samples, normal=normal), np.where(taken, moved_value, value)
-    return replace(posterior, samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
+    return posterior._replace(samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
 
 
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:

@@ -36,8 +36,7 @@ SCORE_BLOCK_ROWS = 64
 """Number of points evaluated at once, which limits memory."""
 
 ChangeKind = Literal["step", "slope"]
-CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
-MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
+MIN_POINTS_AROUND_CHANGE: dict[ChangeKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
 """Smallest number of points before and after a change of each kind."""
 
 
@@ -173,15 +172,15 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
     """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
-    points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
-    for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
-        lean = base.explained_root(CHANGE_KINDS[kind], n[:, np.newaxis], k)
+    points, leans = np.empty((2, 2, n.size), np.intp), np.empty((2, 2, n.size))
+    for number, (kind, (before, behind)) in enumerate(MIN_POINTS_AROUND_CHANGE.items()):
+        lean = base.explained_root(kind, n[:, np.newaxis], k)
         outside = k[n[0] - behind :] > n[:, np.newaxis] - behind
         for side, (worst, farthest) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
             np.copyto(lean[:, n[0] - behind :], worst, where=outside)
             lean[:, :before] = worst
-            points[side, kind] = farthest(lean, axis=1)
-            leans[side, kind] = lean[rows, points[side, kind]]
+            points[side, number] = farthest(lean, axis=1)
+            leans[side, number] = lean[rows, points[side, number]]
     return points, leans
 
 

@@ -157,7 +157,7 @@ class PastFit(NamedTuple):
     @property
     def freedom(self) -> Floats:
         """Degrees of freedom of each shape, shape (j,)."""
-        return np.concatenate([family.freedom for family in self.families])
+        return np.concatenate([np.full(len(family.shapes), family.freedom) for family in self.families])
 
     @property
     def rate(self) -> Rate:

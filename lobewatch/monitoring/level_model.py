@@ -230,19 +230,14 @@ def _cumulative_sums(values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
-def is_temperature_usable(temperature: Floats) -> bool:
-    """Return whether enough temperatures are recorded over a wide enough span."""
-    recorded = temperature[np.isfinite(temperature)]
-    return recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
-
-
 def build_level_model(readings: Readings) -> LevelModel:
     """Build the model of a series, with the temperature only if enough of it is recorded over a wide enough span."""
     rest, columns = readings.y - readings.y[:1].sum(), [np.ones(readings.y.size)]
     temperature = np.full(rest.size, np.nan) if readings.temperature is None else readings.temperature
-    is_warm = is_temperature_usable(temperature)
+    recorded = temperature[np.isfinite(temperature)]
+    is_warm = recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
     if is_warm:
-        warmer = temperature - temperature[np.isfinite(temperature)].mean()
+        warmer = temperature - recorded.mean()
         columns.append(np.where(np.isfinite(warmer), warmer, 0.0))
         rest -= STEEL_FREQUENCY_PER_KELVIN * columns[-1]
     names = dict.fromkeys(filter(None, readings.operators))

@@ -64,11 +64,9 @@ class TriggeredAlarm(NamedTuple):
     def build_alarm(self, acknowledgements: Iterable[Acknowledgement], baseline: datetime | None) -> Alarm:
         """Build the alarm, with its newest acknowledgement since it was triggered."""
         code, about = self.remark.code, self.remark.about
-        given = None
-        for word in acknowledgements:
-            if (word.code, word.about, word.baseline) == (code, about, baseline) and self.time <= word.newest:
-                given = word
-        return Alarm(code, about, self.tap_id, self.time, given)
+        words = (word for word in acknowledgements if self.time <= word.newest)
+        given = [word for word in words if (word.code, word.about, word.baseline) == (code, about, baseline)]
+        return Alarm(code, about, self.tap_id, self.time, given[-1] if given else None)
 
 
 def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now: datetime) -> tuple[Remark, ...]:

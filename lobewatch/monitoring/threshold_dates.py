@@ -67,11 +67,8 @@ def build_forecast_rows(
     fates: Mapping[str, ProgramForecast], limits: LimitForecasts
 ) -> dict[str, dict[str, dict[str, str | None]]]:
     """Return all dates of a machine for other programs, by program and by limit ("10 %")."""
-    programs = {
-        name: {"doubtful": fate.doubtful.to_row(), "not stable": fate.not_stable.to_row()}
-        for name, fate in fates.items()
-    }
-    return programs | {f"{percent:g} %": {"reached": reach.to_row()} for percent, reach in limits}
+    rows = {name: {"doubtful": f.doubtful.to_row(), "not stable": f.not_stable.to_row()} for name, f in fates.items()}
+    return rows | {f"{percent:g} %": {"reached": reach.to_row()} for percent, reach in limits}
 
 
 def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | None:

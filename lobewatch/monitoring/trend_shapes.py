@@ -127,11 +127,8 @@ class ShapeFits(NamedTuple):
     """Builder of their columns."""
     span: float
     """Span of the series."""
-
-    @property
-    def freedom(self) -> Floats:
-        """Degrees of freedom, shape (j,)."""
-        return np.full(len(self.shapes), float(self.fits.freedom))
+    freedom: float
+    """Degrees of freedom of each."""
 
     @property
     def variance(self) -> Floats:
@@ -168,7 +165,7 @@ def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], draw
     many = np.log([counts[shape.kind] / PRIOR_ODDS.get(shape.kind, 1.0) for shape in shapes])
     left = np.log(fits.rss / (base.residual_squares + np.finfo(float).tiny))
     evidence = -fits.freedom / 2 * left - many - columns / 2 * np.log(at.size)
-    return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]))
+    return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]), float(fits.freedom))
 
 
 LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
@@ -188,11 +185,8 @@ class RandomWalkFits(NamedTuple):
     """Variance of a point around each line, shape (j,)."""
     points: "_RotatedPoints"
     """Points of the series."""
-
-    @property
-    def freedom(self) -> Floats:
-        """Degrees of freedom, shape (j,)."""
-        return np.full(len(self.shapes), self.points.freedom)
+    freedom: float
+    """Degrees of freedom of each."""
 
     def select(self, numbers: Indices) -> Self:
         """Select some of the lines."""
@@ -253,11 +247,6 @@ class _RotatedPoints(NamedTuple):
     precision: Floats
     """Prior precision of the coefficients, shape (p, p)."""
 
-    @property
-    def freedom(self) -> float:
-        """Degrees of freedom."""
-        return float(self.y.size - 2)
-
     def solve(self, weight: Floats) -> tuple[Floats, Floats, Floats]:
         """Inverse of the normal matrix (p, p), coefficients (p,) and the sum of squares left, with weights (n,)."""
         weighted = self.columns.T * weight
@@ -271,17 +260,18 @@ def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWal
     points = _rotate_points(base, at, kind)
     amounts = RATE_VARIANCES if kind == "bend" else LEVEL_VARIANCES
     still, _, _ = points.solve(np.ones(at.size))
-    evidence, variance = np.empty((2, len(amounts)))
+    (evidence, variance), freedom = np.empty((2, len(amounts))), float(at.size - 2)
     for j, amount in enumerate(amounts):
         weight = 1 / (1 + amount * points.values)
         gram, _, left = points.solve(weight)
         tiny = np.finfo(float).tiny
         rss = max(float(left), MIN_RESIDUAL_SHARE * base.residual_squares + tiny)
         unsure = (np.log(weight).sum() + np.linalg.slogdet(gram)[1] - np.linalg.slogdet(still)[1]) / 2
-        evidence[j] = unsure - points.freedom / 2 * np.log(rss / (base.residual_squares + tiny))
-        variance[j] = rss / points.freedom
+        evidence[j] = unsure - freedom / 2 * np.log(rss / (base.residual_squares + tiny))
+        variance[j] = rss / freedom
     evidence += np.log(PRIOR_ODDS[kind]) - np.log(len(amounts)) - np.log(at.size) / 2
-    return RandomWalkFits(tuple(TrendShape(kind, 0.0, rate=amount) for amount in amounts), evidence, variance, points)
+    shapes = tuple(TrendShape(kind, 0.0, rate=amount) for amount in amounts)
+    return RandomWalkFits(shapes, evidence, variance, points, freedom)
 
 
 def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoints:
@@ -290,7 +280,8 @@ def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoi
     prior = np.zeros((p + 1, p + 1))
     prior[:p, :p] = base.precision(np.array([at.size]))[0]
     columns = axes.T @ np.column_stack([base.columns, share])
-    return _RotatedPoints(kind, share, float(at[-1]), np.maximum(values, 0.0), axes, columns, axes.T @ base.y, prior)
+    variances, y, span = np.maximum(values, 0.0), axes.T @ base.y, float(at[-1])
+    return _RotatedPoints(kind, share, span, variances, axes, columns, y, prior)
 
 
 def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:

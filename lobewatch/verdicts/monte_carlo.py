@@ -78,9 +78,14 @@ def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
         return settled
     tried = limits[finite, np.newaxis] * RECHECKED_LIMIT_SHARES
     near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * float(samples.limits[0]), MAX_WIDER_FEEDS)[finite]
-    crossing = _interpolate_limits(*_bracket_limits(tried, near.growth(tried)))
+    crossing = interpolate_first_crossing(tried, near.growth(tried))
     settled[finite] = np.where(np.isfinite(crossing), crossing, limits[finite])
     return settled
+
+
+def interpolate_first_crossing(tried: Floats, grown: Floats) -> Floats:
+    """Interpolate the depth at which growth first reaches zero in each row of tried depths (rows, d), or inf."""
+    return _interpolate_limits(*_bracket_limits(tried, grown))
 
 
 def _bracket_limits(tried: Floats, grown: Floats) -> Floats:

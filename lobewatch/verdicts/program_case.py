@@ -121,17 +121,23 @@ class ProgramCase:
 
     @cached_property
     def cuts(self) -> tuple[Cut, ...]:
-        """Cuts of the program on its path."""
-        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
+        """Cuts of the program on its path, in no order.
+
+        In a corner the feed turns, whatever axis it follows on the straight.
+        """
+        x, y, signs = self.spindle.x, self.spindle.y, self.spindle.principal_directions.sign_patterns
+        differ = not are_directions_equal(x, y) or signs[0] is not None
+        return tuple(
+            replace(cut, feed_angle=angle, direction=direction)
+            for cut in self.machine.engaged_cuts(self.table)
+            for direction in (MILLING_DIRECTIONS if self.any_direction and cut.immersion < 1 else (cut.direction,))
+            for angle in _feed_angles_of(self.table, cut.immersion, differ)
+        )
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Uncertainty by cause."""
         return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
-
-    def at(self, speed_rpm: float, depth_mm: float) -> "ProgramCase":
-        """Return the same program at another speed (rpm) and depth (mm)."""
-        return self.with_changes(speed_rpm=speed_rpm, depth_mm=depth_mm)
 
     def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""
@@ -154,22 +160,6 @@ MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
 """Milling directions of a cut; a slot is both at once."""
 FEED_ANGLE_STEP = math.pi / 12
 """Step of the angles between x and y (rad)."""
-
-
-def cutting_conditions_of(
-    table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
-) -> tuple[Cut, ...]:
-    """List the cuts that a program makes on its path, in no order.
-
-    In a corner the feed turns, whatever axis it follows on the straight.
-    """
-    differ = not are_directions_equal(spindle.x, spindle.y) or spindle.principal_directions.sign_patterns[0] is not None
-    return tuple(
-        replace(cut, feed_angle=angle, direction=direction)
-        for cut in machine.engaged_cuts(table)
-        for direction in (MILLING_DIRECTIONS if either and cut.immersion < 1 else (cut.direction,))
-        for angle in _feed_angles_of(table, cut.immersion, differ)
-    )
 
 
 def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:

@@ -54,11 +54,14 @@ class ProgramSamples:
 
         depth in m: one, several (d,) or those of each sample (samples, d). Returns shape (samples, d).
         """
+        return np.asarray(np.max(self.growth_by_cut(depth), axis=0))
+
+    def growth_by_cut(self, depth: float | Floats) -> Floats:
+        """Return the growth rate in each cut, shape (cuts, samples, d)."""
         wanted = np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
         cut, row = np.divmod(np.arange(len(self.cuts) * len(self.rows)), len(self.rows))
-        grown = self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape)
-        return np.asarray(np.max(grown, axis=0))
+        return self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape)
 
     def critical_growth(self, depth: float) -> Floats:
         """Return the growth rate at a depth (m) in the worst cut; clearly stable samples in the first cut only.
@@ -117,9 +120,7 @@ class ProgramSamples:
         margin = self.uncertainty.speed + FREQUENCY_MARGIN
         ends = (1 - margin) / apart, (1 + margin) * apart / (1 - drop)
         median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
-        cut, row = np.divmod(np.arange(len(self.cuts) * N_MARGIN_SPEEDS), N_MARGIN_SPEEDS)
-        grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
-        return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
+        return np.asarray(np.max(median.growth_by_cut(depth)[..., 0], axis=1))
 
     def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> "ProgramSamples":
         """Repeat all samples with each of several factors (k,), k times as many."""

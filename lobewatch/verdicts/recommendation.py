@@ -230,19 +230,18 @@ def _list_alternatives(search: SettingSearch, best: Setting | None, rpm: float |
 
 
 def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
-    """Explain why there is no setting, with remedies."""
+    """Explain why there is no setting, with remedies, that of the decisive uncertainty first."""
     reach = search.cut_range
     if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
         return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
     reason = f"no safe {named} in {reach.text}" if set_rpm is None else f"no safe depth at {set_rpm:g} rpm"
-    return reason, _list_remedies(search, depth_mm)
-
-
-def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
-    """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
-    probe = search.case.at(float(likely.speeds[int(np.argmax(likely.depths))]), depth_mm or DEPTH_STEP_MM)
+    speed = float(likely.speeds[int(np.argmax(likely.depths))])
+    probe = search.case.with_changes(speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)
     verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES))
+    return reason, (
+        *settles,
+        *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES),
+    )

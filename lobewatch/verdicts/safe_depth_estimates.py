@@ -18,6 +18,7 @@ from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
+from lobewatch.verdicts.monte_carlo import interpolate_first_crossing
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import FREQUENCY_MARGIN, ProgramSamples, draw_likely_samples
 from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR, StiffnessAt
@@ -236,9 +237,4 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
     if not depths.size:
         return np.empty(0)
     grown = growth_rate(rows, depths / 1e3, count_pieces(rows, float(np.max(depths)) / 1e3, COARSE_CYCLES_PER_PIECE))
-    first, row = np.argmax(grown >= 0, axis=1), np.arange(len(grown))
-    before = np.maximum(first - 1, 0)
-    low, high = grown[row, before], grown[row, first]
-    share = np.where(first > 0, -low / np.where(high == low, 1.0, high - low), 0.5)
-    begin = np.where(first > 0, depths[row, before], 0.0)
-    return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
+    return interpolate_first_crossing(depths, grown)

@@ -235,7 +235,7 @@ class SettingSearch:
         """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
         depth = depth_mm / 1e3
         deep = robustness.ROBUST_DEPTH_FACTOR * depth
-        case = self.case.at(speed, depth_mm)
+        case = self.case.with_changes(speed_rpm=speed, depth_mm=depth_mm)
         worst = find_worst_limit(case)
         limit, samples = worst.limit.limit, draw_samples(case, worst)
         if limit < depth * (1 + robustness.MIN_DEPTH_MARGIN):

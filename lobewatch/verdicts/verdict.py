@@ -184,6 +184,8 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
+    worst = result.samples.with_lowest_cuts(0.0)
+    chattering = result.chatters if case.at_speed.n_cuts else draw_rotating_samples(worst).growth(case.depth)[1:] >= 0
     shared = ("limit", "chatter_frequency", "kind", "feed_angle", "method")
     return Verdict(
         **{name: getattr(median, name) for name in shared},
@@ -193,7 +195,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         at_speed=case.at_speed,
         limit_low=min(result.low, median.limit),
         limit_high=max(result.high, median.limit),
-        chatter_risk=_estimate_chatter_risk(case, result),
+        chatter_risk=float(np.mean(chattering)),
         decisive_cause=cause,
         detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
         drive_limit=float(drive_limit[0]),
@@ -235,13 +237,6 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
         return f"it rests on a tap test in question ({', '.join(codes)})", cure
     return None
-
-
-def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:
-    """Estimate the chatter risk with the spindle rotating: as learned, or with plausible differences."""
-    if case.at_speed.n_cuts:
-        return float(np.mean(result.chatters))
-    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(case.depth)[1:] >= 0))
 
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:

@@ -138,7 +138,7 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
     """Return whether the median and the critical samples allow a setting."""
-    at = search.case.at(speed, depth_mm)
+    at = search.case.with_changes(speed_rpm=speed, depth_mm=depth_mm)
     worst = find_worst_limit(at)
     if worst.limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
         return False

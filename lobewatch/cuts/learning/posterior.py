@@ -139,14 +139,12 @@ class NewEvidence(NamedTuple):
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
-def build_prior(
-    median: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0
-) -> Posterior:
+def build_prior(rest: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
     """Build the posterior before the first cut.
 
-    middle: the spindle at rest in the median estimate (a row).
+    rest: the spindle at rest in the median estimate (a row).
     """
-    return Posterior(sample_prior(median, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(rest, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(
@@ -277,8 +275,7 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
 def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
     """Find the cuts to reject, of those that were learned from."""
     few = posterior.resample(N_CHECK_SAMPLES)
-    rejected = (find_contradiction(few.predict(cut)) for cut in posterior.cuts)
-    return tuple(uncertainty for uncertainty in rejected if uncertainty is not None)
+    return tuple(filter(None, (find_contradiction(few.predict(cut)) for cut in posterior.cuts)))
 
 
 def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[InconsistentCut], about: str) -> Iterator[Remark]:

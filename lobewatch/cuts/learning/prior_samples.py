@@ -98,7 +98,7 @@ class SpindleSamples:
 
     def _material_index(self, material: int) -> int:
         """Place of the first number of a material."""
-        return _count_spindle_numbers(self.at_rest) + NUMBERS_PER_MATERIAL * material
+        return self.at_rest.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL * material
 
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""
@@ -124,13 +124,8 @@ class SpindleSamples:
 def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
-    size = count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL
+    size = count, median.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL
     return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty)
-
-
-def _count_spindle_numbers(rows: MillingRows) -> int:
-    """Return the count of normal numbers per sample that belong to the spindle."""
-    return rows.direction.size + NUMBERS_PER_SPINDLE
 
 
 def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:

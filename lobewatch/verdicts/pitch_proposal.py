@@ -79,8 +79,7 @@ class PitchProposal(NamedTuple):
     @property
     def proposed(self) -> PitchEvaluation | None:
         """Proposed pitches; None if equal pitches are as good."""
-        best = next(iter(self.unequal), None)
-        return best if best is not None and best.low >= MIN_PITCH_GAIN * self.equal.low else None
+        return next((best for best in self.unequal[:1] if best.low >= MIN_PITCH_GAIN * self.equal.low), None)
 
 
 def propose_pitch(

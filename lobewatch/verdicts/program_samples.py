@@ -103,7 +103,6 @@ class ProgramSamples:
     def with_lowest_cuts(self, below: float, most: int | None = None) -> "ProgramSamples":
         """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
-        wanted[0] = True
         return self.with_cuts(wanted)
 
     def with_cuts(self, wanted: Flags) -> "ProgramSamples":

@@ -243,5 +243,5 @@ def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float |
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
     return reason, (
         *settles,
-        *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES),
+        *(CUT_REMEDIES if probe.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES),
     )

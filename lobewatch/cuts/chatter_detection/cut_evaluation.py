@@ -158,17 +158,16 @@ def _find_speed(
 
 def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> CutEvaluation:
     """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
-    silence = [spectrum._replace(power=np.zeros(spectrum.power.size)) for spectrum in spectra]
-    speed = spindle_speed.find_speed_of_spectra(spectra, silence, teeth, commanded)
+    air = [spectrum._replace(power=np.zeros(spectrum.power.size)) for spectrum in spectra]
+    speed = spindle_speed.find_speed_of_spectra(spectra, air, teeth, commanded)
     if speed is None:
         return _speed_not_found(spectra[0], np.nan)
-    peaks = classification.find_cut_peaks(spectra, silence)
+    peaks = classification.find_cut_peaks(spectra, air)
     reach = spectral.PEAK_TOLERANCE * spectra[0].bin_width
     others = peaks[spectral.fold_frequency(peaks.frequency, speed.frequency) > reach]
-    if len(others):
-        distant = 60 * spindle_speed.find_distant_speed(spectra, silence, teeth, commanded, speed, others)
-        if np.isfinite(distant):
-            return _speed_not_found(spectra[0], distant)
+    distant = spindle_speed.find_distant_speed(spectra, air, teeth, commanded, speed, others) if len(others) else np.nan
+    if np.isfinite(distant):
+        return _speed_not_found(spectra[0], 60 * distant)
     return CutEvaluation("cannot tell", "no-air", spindle_speed=speed, spectrum=spectra[0])
 
 

@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import recommend
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 

@@ -13,10 +13,11 @@ import msgspec
 from acquisition import Remark
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
 from lobewatch.machine.folder_files import compute_change_mark
-from lobewatch.monitoring.alarm import Alarm, add_acknowledgements
 from lobewatch.monitoring.status_rules import (
     UNREADABLE_NEXT_STEP,
+    Alarm,
     StatusLevel,
+    add_acknowledgements,
     add_damage_remarks,
     count_days_left,
     date_remarks,

@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from lobewatch.cuts.learning.verdict_at_speed import evaluate_at_speed
+from lobewatch.cuts.learning.program_learning import evaluate_at_speed
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
@@ -13,8 +13,8 @@ from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.frequency_drop import build_stored_verdict, is_verdict_missing
 from lobewatch.verdicts.recommendation import Advice, advise
+from lobewatch.verdicts.setting_robustness import build_stored_verdict, is_verdict_missing
 from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 
 MAX_CACHED_VERDICT_SETS = 8

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import DataError, Frf, Remark
 from dsm import Modes, Spindle, WhirlMap, mode_shapes, natural_frequencies, stiffness_curve, whirl_map
 from lobes import PocketShift, match_pockets
-from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
+from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine

@@ -12,7 +12,7 @@ from lobewatch.logbook.recordings.store_recordings import group_by_message
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import find_excludable_entry
 from lobewatch.measurement import FileModes, fit_file_modes
-from lobewatch.monitoring.alarm import Alarm, select_alarms
+from lobewatch.monitoring.status_rules import Alarm, select_alarms
 from modal import ModeEdits
 
 

@@ -8,7 +8,7 @@ import msgspec
 
 from acquisition import DataError
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
-from lobewatch.cuts.learning.verdict_at_speed import learn_spindle
+from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
@@ -20,8 +20,8 @@ from lobewatch.machine.settings.requested_cut import (
     find_common_speed,
 )
 from lobewatch.verdicts.pitch_proposal import PitchProposal, propose_pitch
+from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import Recommendation, recommend
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict
 
 

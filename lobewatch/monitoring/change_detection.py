@@ -36,8 +36,7 @@ SCORE_BLOCK_ROWS = 64
 """Number of points evaluated at once, which limits memory."""
 
 ChangeKind = Literal["step", "slope"]
-CHANGE_KINDS: tuple[ChangeKind, ...] = ("step", "slope")
-MIN_POINTS_AROUND_CHANGE = ((2, 2), (1, 3))
+MIN_POINTS_AROUND_CHANGE: dict[ChangeKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
 """Smallest number of points before and after a change of each kind."""
 
 
@@ -173,21 +172,21 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
     """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
-    points, leans = np.empty((2, len(CHANGE_KINDS), n.size), np.intp), np.empty((2, len(CHANGE_KINDS), n.size))
-    for kind, (before, behind) in enumerate(MIN_POINTS_AROUND_CHANGE):
-        lean = base.explained_root(CHANGE_KINDS[kind], n[:, np.newaxis], k)
+    points, leans = np.empty((2, 2, n.size), np.intp), np.empty((2, 2, n.size))
+    for number, (kind, (before, behind)) in enumerate(MIN_POINTS_AROUND_CHANGE.items()):
+        lean = base.explained_root(kind, n[:, np.newaxis], k)
         outside = k[n[0] - behind :] > n[:, np.newaxis] - behind
         for side, (worst, farthest) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
             np.copyto(lean[:, n[0] - behind :], worst, where=outside)
             lean[:, :before] = worst
-            points[side, kind] = farthest(lean, axis=1)
-            leans[side, kind] = lean[rows, points[side, kind]]
+            points[side, number] = farthest(lean, axis=1)
+            leans[side, number] = lean[rows, points[side, number]]
     return points, leans
 
 
 def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
     """Choose the likelier of a step and a slope in the first n (r,) points."""
-    t = [base.t_statistic(lean, n) for lean in leans]
+    t = [lean / np.sqrt(base.point_variance(lean**2, n)) for lean in leans]
     scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
     return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
@@ -218,8 +217,7 @@ class DetectedDrop(NamedTuple):
     """Kind and beginning when it was triggered, and present size."""
 
 
-@dataclass(frozen=True, eq=False)
-class Detection:
+class Detection(NamedTuple):
     """Changes detected in a series."""
 
     scores: Floats
@@ -247,13 +245,14 @@ def detect_changes(readings: Readings) -> Detection:
     begin = judged = 0
     while judged < count:
         down, up = monitor_drops_and_rises(readings.since(begin))
-        end = count if up.first_alarm is None else begin + up.first_alarm + 1
+        risen = up.first_alarm
+        end = count if risen is None else begin + risen + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
         drops += _find_drops(down, begin, judged, end)
         judged = end
-        if up.first_alarm is not None:
-            seen = up.change_at(up.first_alarm)
-            rise, begin = seen._replace(point=begin + seen.point), begin + up.first_alarm
+        if risen is not None:
+            seen = up.change_at(risen)
+            rise, begin = seen._replace(point=begin + seen.point), begin + risen
     return Detection(scores, tuple(drops), rise)
 
 

@@ -6,17 +6,16 @@ random numbers.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats
+from lobewatch.monitoring import trend_shapes
 from lobewatch.monitoring.level_model import build_level_model
-from lobewatch.monitoring.random_walk import RandomWalkFits, fit_random_walks
 from lobewatch.monitoring.series_points import Readings
-from lobewatch.monitoring.trend_shapes import SHAPE_KINDS, ShapeFits, TrendShape, fit_shapes
+from lobewatch.monitoring.trend_shapes import SHAPE_KINDS, FitFamily, TrendShape
 
 MIN_FORECAST_POINTS = 8
 """Smallest number of points for a forecast; chosen."""
@@ -37,9 +36,6 @@ QUANTILE_HALVINGS = 40
 """Number of halvings in the search for a quantile."""
 FAN_STANDARD_ERRORS = 50
 """Standard errors around the means within which all quantiles are searched."""
-
-FitFamily = ShapeFits | RandomWalkFits
-"""Fits of one sort of shapes to a series."""
 
 
 class DateRange(NamedTuple):
@@ -64,8 +60,7 @@ class Rate(NamedTuple):
     """97.5 % quantile."""
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(NamedTuple):
     """Mixture of all shapes of a trend."""
 
     shapes: tuple[TrendShape, ...]
@@ -134,8 +129,7 @@ def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Float
     return fit_past(dates, Readings(y, temperature)).forecast(horizon)
 
 
-@dataclass(frozen=True, eq=False)
-class PastFit:
+class PastFit(NamedTuple):
     """Fits of all shapes to a series, the part of a forecast that does not depend on today."""
 
     families: tuple[FitFamily, ...]
@@ -163,7 +157,7 @@ class PastFit:
     @property
     def freedom(self) -> Floats:
         """Degrees of freedom of each shape, shape (j,)."""
-        return np.concatenate([family.freedom for family in self.families])
+        return np.concatenate([np.full(len(family.shapes), family.freedom) for family in self.families])
 
     @property
     def rate(self) -> Rate:
@@ -180,15 +174,15 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {MIN_FORECAST_POINTS}")
     places = _average_neighbors(at)
     base = build_level_model(_average_readings(readings))
-    families = fit_shapes(base, places)
-    walks = fit_random_walks(base, places, "wander"), fit_random_walks(base, places, "bend")
+    families = trend_shapes.fit_shapes(base, places)
+    walks = [trend_shapes.fit_random_walks(base, places, kind) for kind in ("wander", "bend")]
     kept, weight = _select_heaviest([*families, *walks])
     first = _average_neighbors(y)[0]
     fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
     return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))
 
 
-def _point_spread(families: Sequence[ShapeFits]) -> float:
+def _point_spread(families: Sequence[trend_shapes.ShapeFits]) -> float:
     evidence = np.concatenate([family.evidence for family in families])
     variance = np.concatenate([family.variance for family in families])
     weight = np.exp(evidence - evidence.max())

@@ -1,7 +1,5 @@
 """Regression model of the level of a series, with temperature and operators."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -73,15 +71,11 @@ class LevelModel:
             product /= np.sqrt(_change_square(kind, n - k) - 1 / n * sums * sums)
         return product
 
-    def t_statistic(self, lean: Floats, n: Indices) -> Floats:
-        """Return Student's t of changes that explain this much in the first n, shape (r,) each."""
-        return np.asarray(lean / np.sqrt(self._point_variance(lean**2, n)))
-
     def freedom(self, n: Indices) -> Floats:
         """Return the degrees of freedom of a change in the first n, shape (r,) each."""
         return np.asarray(n - 2 + self.scatter_prior.freedom, dtype=np.float64)
 
-    def _point_variance(self, explained: Floats, n: Indices) -> Floats:
+    def point_variance(self, explained: Floats, n: Indices) -> Floats:
         """Return the variance of a point in the first n, where a change explains this sum of squares, shape (r,)."""
         total, prior = self._residual_squares_up_to[n], self.scatter_prior
         left = np.maximum(total - explained, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
@@ -92,7 +86,7 @@ class LevelModel:
         until = np.array([n])
         product, square = (float(part[0, 0]) for part in self._change(kind, until[:, np.newaxis], np.array([k])))
         size = product / square
-        return size, float(np.sqrt(self._point_variance(np.array([size * product]), until)[0] / square))
+        return size, float(np.sqrt(self.point_variance(np.array([size * product]), until)[0] / square))
 
     def change_sizes(self, fell: Flags, n: Indices, k: Indices) -> Floats:
         """Return the sizes of changes from points k (r,) on in the first n (r,): steps, or slopes a point."""
@@ -117,7 +111,7 @@ class LevelModel:
 
     def _tail(self, i: int, kind: str, n: Indices, k: Indices) -> Floats:
         """Return the product of the column of a change with the series (0) or one of the columns (from 1 on)."""
-        sums, moments = self._sums[i], self._moments[i]
+        sums, moments = (values[i] for values in self._sums)
         tail: Floats = sums[n] - sums[k]
         if i == 0:
             tail += self._newest_excess[n]
@@ -153,12 +147,10 @@ class LevelModel:
         return np.column_stack([self.y, self.columns])
 
     @cached_property
-    def _sums(self) -> Floats:
-        return _cumulative_sums(self._values).T
-
-    @cached_property
-    def _moments(self) -> Floats:
-        return _cumulative_sums(np.arange(self.y.size)[:, np.newaxis] * self._values).T
+    def _sums(self) -> tuple[Floats, Floats]:
+        """Cumulative sums and moments of the values, shape (1 + p, n + 1) each."""
+        moments = np.arange(self.y.size)[:, np.newaxis] * self._values
+        return _cumulative_sums(self._values).T, _cumulative_sums(moments).T
 
     @cached_property
     def _outer(self) -> Floats:
@@ -178,7 +170,7 @@ class LevelModel:
         """Residual sum of squares of the level model for all points."""
         return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
 
-    def fit_columns(self, columns: Floats) -> ColumnFits:
+    def fit_columns(self, columns: Floats) -> "ColumnFits":
         """Fit each of some sets of k columns (j, k, n) together with the model."""
         base, crossed = self.inverse_normal_matrix, columns @ self.columns
         level, leaning = base @ self.columns.T @ self.y, crossed @ base
@@ -210,7 +202,7 @@ class ColumnFits(NamedTuple):
     freedom: int
     """Degrees of freedom; the temperature costs none, since its effect has a prior."""
 
-    def select(self, numbers: Indices) -> ColumnFits:
+    def select(self, numbers: Indices) -> "ColumnFits":
         """Select some of the fits."""
         rss, size, inverse, leaning = (values[numbers] for values in self[:4])
         return ColumnFits(rss, size, inverse, leaning, self.level, self.level_variance, self.freedom)
@@ -238,19 +230,14 @@ def _cumulative_sums(values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
-def is_temperature_usable(temperature: Floats) -> bool:
-    """Return whether enough temperatures are recorded over a wide enough span."""
-    recorded = temperature[np.isfinite(temperature)]
-    return recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
-
-
 def build_level_model(readings: Readings) -> LevelModel:
     """Build the model of a series, with the temperature only if enough of it is recorded over a wide enough span."""
     rest, columns = readings.y - readings.y[:1].sum(), [np.ones(readings.y.size)]
     temperature = np.full(rest.size, np.nan) if readings.temperature is None else readings.temperature
-    is_warm = is_temperature_usable(temperature)
+    recorded = temperature[np.isfinite(temperature)]
+    is_warm = recorded.size >= MIN_TEMPERATURE_POINTS and bool(np.ptp(recorded) >= MIN_TEMPERATURE_SPAN)
     if is_warm:
-        warmer = temperature - temperature[np.isfinite(temperature)].mean()
+        warmer = temperature - recorded.mean()
         columns.append(np.where(np.isfinite(warmer), warmer, 0.0))
         rest -= STEEL_FREQUENCY_PER_KELVIN * columns[-1]
     names = dict.fromkeys(filter(None, readings.operators))

@@ -17,11 +17,10 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatte
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
 from lobewatch.monitoring import status_rules as rules
-from lobewatch.monitoring.alarm import Alarm, TriggeredAlarm, add_acknowledgements
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SeriesChange
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
-from lobewatch.monitoring.status_rules import StatusLevel
+from lobewatch.monitoring.status_rules import Alarm, StatusLevel, TriggeredAlarm, add_acknowledgements
 from lobewatch.monitoring.trend import Trend
 from lobewatch.verdicts.verdict import Stability
 

@@ -3,8 +3,6 @@
 Made once for a status and handed on with it. What is worked out of it lasts as long as it does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -22,7 +20,7 @@ from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.monitoring.change_detection import SeriesChange, find_newest_change
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, SeriesScatterPrior
-from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_percents
+from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +35,7 @@ class ValueHistory:
     """Value of each row and its standard error, shape (n, 2)."""
     has_questions: Flags
     """True for each row with unanswered questions, shape (n,)."""
-    other_direction: ValueHistory | None = None
+    other_direction: "ValueHistory | None" = None
     """Same value in the other direction; None if unknown or irrelevant."""
     scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
     """Prior scatter of the series."""
@@ -105,11 +103,9 @@ class ValueHistory:
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
         """Find the change that the newest points are sure of, and its time, or None."""
-        rows, numbers = self.trend_values
-        reclamped = [row.conditions.reclamped for row in rows]
-        times, percents = list_newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
-        change = find_newest_change(np.array(percents))
-        return None if change is None else (times[change.point], change)
+        points = list_newest_points(self.tap_values)
+        change = find_newest_change(np.array([point.percent for point in points]))
+        return None if change is None else (points[change.point].time, change)
 
     @property
     def trend_values(self) -> tuple[tuple[HistoryRow, ...], Floats]:

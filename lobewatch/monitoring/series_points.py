@@ -1,11 +1,7 @@
 """Points of a series: readings, clampings, days of use, outliers and scatter."""
 
-from __future__ import annotations
-
 from bisect import insort
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from collections.abc import Sequence
 from math import copysign, sqrt
 from statistics import median
 from typing import NamedTuple, Self
@@ -42,8 +38,7 @@ NO_SERIES_PRIOR = SeriesScatterPrior()
 """Unknown scatter of a series."""
 
 
-@dataclass(frozen=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """Series, point by point."""
 
     y: Floats
@@ -61,7 +56,7 @@ class Readings:
         """Return the points from one on."""
         y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
         temperature, other = (None if values is None else values[begin:] for values in optional)
-        return replace(self, y=y, temperature=temperature, operators=operators, other_direction=other)
+        return self._replace(y=y, temperature=temperature, operators=operators, other_direction=other)
 
     @property
     def shared_points(self) -> Indices:
@@ -70,54 +65,13 @@ class Readings:
         return np.empty(0, np.intp) if other is None else np.flatnonzero(np.isfinite(other))
 
     @property
-    def mean_of_directions(self) -> Readings:
+    def mean_of_directions(self) -> "Readings":
         """Mean of both directions, at the points that both have."""
         at, other = self.shared_points, self.y if self.other_direction is None else self.other_direction
         temperature = None if self.temperature is None else self.temperature[at]
         operators = tuple(self.operators[i] for i in at) if self.operators else ()
         mean = (self.y[at] + other[at]) / 2
         return Readings(mean, temperature, operators, scatter_prior=SeriesScatterPrior(self.scatter_prior.common))
-
-
-SAME_CLAMPING_TIME = timedelta(hours=24)
-"""Time within which tap tests share a clamping unless recorded otherwise; chosen."""
-TapRange = tuple[int, int]
-"""Indices of the first tap test of a point, and after its last."""
-
-
-class PercentSeries(NamedTuple):
-    """One value of the tap tests of a series, oldest first."""
-
-    times: tuple[datetime, ...]
-    """Times of the tests."""
-    percents: tuple[float, ...]
-    """Changes of the value since the first test (%)."""
-    temperatures: tuple[float, ...]
-    """Temperatures of the spindle (degC); NaN if not recorded."""
-    reclamped: tuple[bool, ...]
-    """True for each test whose tool was reclamped."""
-
-    def percent(self, span: TapRange) -> float:
-        """Return the change of a point (%): mean of two, median from three on."""
-        first, end = span
-        if end - first > 2:
-            return median(self.percents[first:end])
-        return (self.percents[first] + self.percents[end - 1]) / 2
-
-    def temperature(self, span: TapRange) -> float:
-        """Return the mean of the temperatures recorded for a point, or NaN."""
-        recorded = [temperature for temperature in self.temperatures[slice(*span)] if temperature == temperature]
-        return sum(recorded) / len(recorded) if recorded else np.nan
-
-
-def divide_into_points(series: PercentSeries) -> Iterator[TapRange]:
-    """Divide the tap tests of a series, at least one, into points."""
-    first = 0
-    for tap in range(1, len(series.times)):
-        if series.reclamped[tap] or series.times[tap] - series.times[first] >= SAME_CLAMPING_TIME:
-            yield first, tap
-            first = tap
-    yield first, len(series.times)
 
 
 RECENT_USE_DAYS = 180.0

@@ -3,14 +3,11 @@
 The one form in which dates go to people, files and other programs.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from datetime import UTC, date, datetime, timedelta
+from math import inf
 
 import msgspec
-
-UNIX_EPOCH = date(1970, 1, 1)
-INF = math.inf
 
 
 class ThresholdDates(msgspec.Struct, frozen=True, rename={"forecast_end": "foretold_to"}):
@@ -70,11 +67,8 @@ def build_forecast_rows(
     fates: Mapping[str, ProgramForecast], limits: LimitForecasts
 ) -> dict[str, dict[str, dict[str, str | None]]]:
     """Return all dates of a machine for other programs, by program and by limit ("10 %")."""
-    programs = {
-        name: {"doubtful": fate.doubtful.to_row(), "not stable": fate.not_stable.to_row()}
-        for name, fate in fates.items()
-    }
-    return programs | {f"{percent:g} %": {"reached": reach.to_row()} for percent, reach in limits}
+    rows = {name: {"doubtful": f.doubtful.to_row(), "not stable": f.not_stable.to_row()} for name, f in fates.items()}
+    return rows | {f"{percent:g} %": {"reached": reach.to_row()} for percent, reach in limits}
 
 
 def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | None:
@@ -83,7 +77,7 @@ def find_next_limit(limits: LimitForecasts) -> tuple[float, ThresholdDates] | No
     Where none is in sight: the lowest of them.
     """
     ahead = ((percent, reach) for percent, reach in limits if reach.forecast_end is not None)
-    return min(ahead, key=lambda limit: (limit[1].probable or INF, limit[1].earliest or INF, limit[0]), default=None)
+    return min(ahead, key=lambda limit: (limit[1].probable or inf, limit[1].earliest or inf, limit[0]), default=None)
 
 
 def build_limit_row(limit: tuple[float, ThresholdDates] | None) -> dict[str, float | str | None] | None:
@@ -95,7 +89,7 @@ def build_limit_row(limit: tuple[float, ThresholdDates] | None) -> dict[str, flo
 
 
 def _iso_date(days: float | None) -> str | None:
-    return None if days is None else (UNIX_EPOCH + timedelta(days=days)).isoformat()
+    return None if days is None else (date(1970, 1, 1) + timedelta(days=days)).isoformat()
 
 
 def date_of_days(days: float) -> datetime:

@@ -1,13 +1,12 @@
 """Trend of one value of a series: points, start, alarm and forecast."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cached_property
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -15,19 +14,12 @@ import numpy as np
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
-from lobewatch.monitoring.series_points import (
-    NO_SERIES_PRIOR,
-    SAME_CLAMPING_TIME,
-    PercentSeries,
-    Readings,
-    SeriesScatterPrior,
-    TapRange,
-    days_of_use,
-    divide_into_points,
-)
+from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, Readings, SeriesScatterPrior, days_of_use
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
 
+SAME_CLAMPING_TIME = timedelta(hours=24)
+"""Time within which tap tests share a clamping unless recorded otherwise; chosen."""
 MAX_TREND_POINTS = 1000
 """Number of newest points that are evaluated, as the work grows with its square; chosen."""
 DAYS_PER_MONTH = 30.44
@@ -93,7 +85,7 @@ class Trend:
     today: int
     """Day of the evaluation (days since 1970)."""
 
-    def at_day(self, now: datetime) -> Trend:
+    def at_day(self, now: datetime) -> "Trend":
         """Return this trend as of another day."""
         return replace(self, today=int(days_since_epoch(now)))
 
@@ -183,47 +175,39 @@ def fit_trend(
     now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
-    points, past = _newest_points(taps), None
-    readings = _build_readings(points, _newest_points(other) if other else (), known)
+    points, past = list_newest_points(taps), None
+    percents, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
+    others = np.array([*_other_percents(points, list_newest_points(other))])
+    readings = Readings(percents, warmth, tuple(point.operator for point in points), others, known)
     if len(points) >= MIN_FORECAST_POINTS:
         past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
     return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
 
 
-def _newest_points(series: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
-    """Return the newest points of a series, oldest first."""
-    times, values, _, temperatures, _, _, reclamped = zip(*series, strict=True)
-    percents = PercentSeries(times, _log_percents(values), temperatures, reclamped)
-    return tuple(_build_point(percents, series, span) for span in [*divide_into_points(percents)][-MAX_TREND_POINTS:])
+def list_newest_points(taps: Sequence[TapValue]) -> tuple[TrendPoint, ...]:
+    """List the newest points of a series, oldest first."""
+    percents = [100 * math.log(tap.value / taps[0].value) for tap in taps]
+    spans = [*_divide_into_points(taps)][-MAX_TREND_POINTS:]
+    return tuple(_build_point(taps[first:end], percents[first:end], first) for first, end in spans)
 
 
-def _build_point(percents: PercentSeries, series: Sequence[TapValue], span: TapRange) -> TrendPoint:
-    first, end = span
-    error = math.sqrt(sum(tap.error**2 for tap in series[first:end])) / (end - first)
-    changed, warm = percents.percent(span), percents.temperature(span)
-    begun = series[first]
-    return TrendPoint(begun.time, changed, error, warm, begun.hours, begun.operator, tuple(range(first, end)))
+def _divide_into_points(taps: Sequence[TapValue]) -> Iterator[tuple[int, int]]:
+    """Divide the tap tests of a series into points: indices of the first test of each, and after its last."""
+    first = 0
+    for end, tap in enumerate(taps):
+        if end and (tap.reclamped or tap.time - taps[first].time >= SAME_CLAMPING_TIME):
+            yield first, end
+            first = end
+    if taps:
+        yield first, len(taps)
 
 
-def list_newest_percents(
-    times: Sequence[datetime], values: Sequence[float], reclamped: Sequence[bool]
-) -> tuple[list[datetime], list[float]]:
-    """Return times and percents of the newest points of a series without temperatures, oldest first."""
-    series = PercentSeries(tuple(times), _log_percents(values), (math.nan,) * len(times), tuple(reclamped))
-    spans = [*divide_into_points(series)][-MAX_TREND_POINTS:] if times else []
-    return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
-
-
-def _log_percents(values: Sequence[float]) -> tuple[float, ...]:
-    """Return 100 ln of each value over the first."""
-    log, first = math.log, values[0] if values else 1.0
-    return tuple([100 * log(value / first) for value in values])
-
-
-def _build_readings(points: Sequence[TrendPoint], others: Sequence[TrendPoint], known: SeriesScatterPrior) -> Readings:
-    percents, temperatures = ([getattr(point, name) for point in points] for name in ("percent", "temperature"))
-    operators, other = tuple(point.operator for point in points), np.array([*_other_percents(points, others)])
-    return Readings(np.array(percents), np.array(temperatures), operators, other, known)
+def _build_point(taps: Sequence[TapValue], percents: Sequence[float], first: int) -> TrendPoint:
+    error = math.sqrt(sum(tap.error**2 for tap in taps)) / len(taps)
+    changed = median(percents) if len(taps) > 2 else (percents[0] + percents[-1]) / 2
+    recorded = [tap.temperature for tap in taps if not math.isnan(tap.temperature)]
+    warm, numbers = sum(recorded) / len(recorded) if recorded else math.nan, tuple(range(first, first + len(taps)))
+    return TrendPoint(taps[0].time, changed, error, warm, taps[0].hours, taps[0].operator, numbers)
 
 
 def _other_percents(points: Sequence[TrendPoint], others: Sequence[TrendPoint]) -> Iterator[float]:

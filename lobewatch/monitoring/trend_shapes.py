@@ -1,8 +1,7 @@
-"""Shapes that a trend may have, and their fits by least squares."""
+"""Shapes that a trend may have, and their fits: by least squares, and lines whose level or rate is a random walk."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 from typing import Literal, NamedTuple, Self, get_args
@@ -10,7 +9,7 @@ from typing import Literal, NamedTuple, Self, get_args
 import numpy as np
 
 from lobewatch.arrays import Floats, Indices
-from lobewatch.monitoring.level_model import ColumnFits, LevelModel
+from lobewatch.monitoring.level_model import MIN_RESIDUAL_SHARE, ColumnFits, LevelModel
 
 EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
 """Rates of the exponential curves, per span of the series; chosen."""
@@ -115,8 +114,7 @@ ColumnBuilder = Callable[[Sequence[TrendShape], Floats], Floats]
 """Function that returns the columns (j, k, d) of shapes at dates from the first point on."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShapeFits:
+class ShapeFits(NamedTuple):
     """Fits of shapes with equal numbers of columns to one series, with dates from its first point on."""
 
     shapes: tuple[TrendShape, ...]
@@ -129,11 +127,8 @@ class ShapeFits:
     """Builder of their columns."""
     span: float
     """Span of the series."""
-
-    @property
-    def freedom(self) -> Floats:
-        """Degrees of freedom, shape (j,)."""
-        return np.full(len(self.shapes), float(self.fits.freedom))
+    freedom: float
+    """Degrees of freedom of each."""
 
     @property
     def variance(self) -> Floats:
@@ -143,7 +138,7 @@ class ShapeFits:
     def select(self, numbers: Indices) -> Self:
         """Select some of the shapes."""
         shapes = tuple(self.shapes[j] for j in numbers)
-        return replace(self, shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
+        return self._replace(shapes=shapes, evidence=self.evidence[numbers], fits=self.fits.select(numbers))
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
         """Predict mean and standard error of each at dates, shape (j, d) each."""
@@ -170,4 +165,130 @@ def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], draw
     many = np.log([counts[shape.kind] / PRIOR_ODDS.get(shape.kind, 1.0) for shape in shapes])
     left = np.log(fits.rss / (base.residual_squares + np.finfo(float).tiny))
     evidence = -fits.freedom / 2 * left - many - columns / 2 * np.log(at.size)
-    return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]))
+    return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]), float(fits.freedom))
+
+
+LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
+"""Variances of a level random walk over the span, relative to that of a point; chosen."""
+RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
+"""Variances of a rate random walk (levels per span) over the span, relative to that of a point; chosen."""
+
+
+class RandomWalkFits(NamedTuple):
+    """Fits of lines of one kind with random walks of different size to one series."""
+
+    shapes: tuple[TrendShape, ...]
+    """Lines, j of them; the rate of each is the size of its random walk."""
+    evidence: Floats
+    """Logarithm of the evidence for each line, relative to a steady series, shape (j,)."""
+    variance: Floats
+    """Variance of a point around each line, shape (j,)."""
+    points: "_RotatedPoints"
+    """Points of the series."""
+    freedom: float
+    """Degrees of freedom of each."""
+
+    def select(self, numbers: Indices) -> Self:
+        """Select some of the lines."""
+        shapes = tuple(self.shapes[j] for j in numbers)
+        return self._replace(shapes=shapes, evidence=self.evidence[numbers], variance=self.variance[numbers])
+
+    def predict(self, at: Floats) -> tuple[Floats, Floats]:
+        """Predict mean and standard error of each at dates from the first point on, shape (j, d) each."""
+        ahead = at / self.points.span
+        is_bend = self.points.kind == "bend"
+        variance = ahead**3 / 3 if is_bend else ahead
+        return self._predict(_walk_covariance(is_bend, self.points.share, ahead), variance, ahead, 1.0)
+
+    def rate(self) -> tuple[Floats, Floats]:
+        """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
+        is_bend, span = self.points.kind == "bend", self.points.span
+        crossed = is_bend * self.points.share[:, np.newaxis] ** 2 / 2
+        rate, error = self._predict(crossed, np.array([float(is_bend)]), np.ones(1), 0.0)
+        return rate[:, 0] / span, error[:, 0] / span
+
+    def _predict(self, crossed: Floats, variance: Floats, slope: Floats, level: float) -> tuple[Floats, Floats]:
+        """Best linear predictions of level + slope (d,) of the line and what wanders, shape (j, d) each.
+
+        crossed: covariance of what wanders with the points (n, d); variance: its own (d,).
+        """
+        points, means, errors = self.points, list[Floats](), list[Floats]()
+        wanted = np.zeros((slope.size, points.columns.shape[1]))
+        wanted[:, 0], wanted[:, -1] = level, slope
+        turned = points.vectors.T @ crossed
+        for shape, point in zip(self.shapes, self.variance, strict=True):
+            weight = 1 / (1 + shape.rate * points.values)
+            gram, line, _ = points.solve(weight)
+            lever = shape.rate * turned * weight[:, np.newaxis]
+            means.append(wanted @ line + lever.T @ (points.y - points.columns @ line))
+            away = wanted - lever.T @ points.columns
+            unknown = shape.rate * (variance - np.einsum("nd,nd->d", turned, lever))
+            errors.append(np.sqrt(point * np.maximum(unknown + np.einsum("dp,pq,dq->d", away, gram, away), 0.0)))
+        return np.array(means), np.array(errors)
+
+
+class _RotatedPoints(NamedTuple):
+    """Series rotated into the directions in which the random walk is independent."""
+
+    kind: ShapeKind
+    """Kind: "wander" or "bend"."""
+    share: Floats
+    """Elapsed share of the span at each point, shape (n,)."""
+    span: float
+    """Span of the series."""
+    values: Floats
+    """Variance of a unit random walk in each direction, shape (n,)."""
+    vectors: Floats
+    """Directions, shape (n, n)."""
+    columns: Floats
+    """Rotated columns of level model and line, shape (n, p)."""
+    y: Floats
+    """Rotated values, shape (n,)."""
+    precision: Floats
+    """Prior precision of the coefficients, shape (p, p)."""
+
+    def solve(self, weight: Floats) -> tuple[Floats, Floats, Floats]:
+        """Inverse of the normal matrix (p, p), coefficients (p,) and the sum of squares left, with weights (n,)."""
+        weighted = self.columns.T * weight
+        gram: Floats = np.asarray(np.linalg.inv(weighted @ self.columns + self.precision), dtype=np.float64)
+        line = gram @ weighted @ self.y
+        return gram, line, np.asarray(self.y * weight @ (self.y - self.columns @ line))
+
+
+def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWalkFits:
+    """Fit lines whose level ("wander") or rate ("bend") is a random walk; at: dates, shape (n,)."""
+    points = _rotate_points(base, at, kind)
+    amounts = RATE_VARIANCES if kind == "bend" else LEVEL_VARIANCES
+    still, _, _ = points.solve(np.ones(at.size))
+    (evidence, variance), freedom = np.empty((2, len(amounts))), float(at.size - 2)
+    for j, amount in enumerate(amounts):
+        weight = 1 / (1 + amount * points.values)
+        gram, _, left = points.solve(weight)
+        tiny = np.finfo(float).tiny
+        rss = max(float(left), MIN_RESIDUAL_SHARE * base.residual_squares + tiny)
+        unsure = (np.log(weight).sum() + np.linalg.slogdet(gram)[1] - np.linalg.slogdet(still)[1]) / 2
+        evidence[j] = unsure - freedom / 2 * np.log(rss / (base.residual_squares + tiny))
+        variance[j] = rss / freedom
+    evidence += np.log(PRIOR_ODDS[kind]) - np.log(len(amounts)) - np.log(at.size) / 2
+    shapes = tuple(TrendShape(kind, 0.0, rate=amount) for amount in amounts)
+    return RandomWalkFits(shapes, evidence, variance, points, freedom)
+
+
+def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoints:
+    share, p = at / at[-1], base.columns.shape[1]
+    values, axes = np.linalg.eigh(_walk_covariance(kind == "bend", share, share))
+    prior = np.zeros((p + 1, p + 1))
+    prior[:p, :p] = base.precision(np.array([at.size]))[0]
+    columns = axes.T @ np.column_stack([base.columns, share])
+    variances, y, span = np.maximum(values, 0.0), axes.T @ base.y, float(at[-1])
+    return _RotatedPoints(kind, share, span, variances, axes, columns, y, prior)
+
+
+def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:
+    """Return the covariance of the random walk, its amount being 1, at two sets of shares of the span, shape (n, d)."""
+    first = np.minimum(share[:, np.newaxis], ahead)
+    return first**3 / 3 + first**2 * np.abs(share[:, np.newaxis] - ahead) / 2 if is_bend else first
+
+
+FitFamily = ShapeFits | RandomWalkFits
+"""Fits of one sort of shapes to a series."""

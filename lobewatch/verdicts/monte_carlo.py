@@ -1,7 +1,6 @@
 """Evaluate a program on all Monte Carlo samples: limits, band of limits, samples that chatter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,9 +11,8 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts import program_samples
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import ProgramSamples, WorstLimit, build_median_row
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
@@ -51,13 +49,13 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
     tried = np.tile(MAX_PROGRAM_DEPTH_RATIO * depth * UNLIMITED_DEPTH_SHARES, (len(softness), 1))
     if np.isfinite(limit):
         tried = softness * limit * TRIED_LIMIT_SHARES
-    low, high, at_low, at_high = _bracket_limits(tried, worst.growth(tried))
+    bracket = _bracket_limits(tried, worst.growth(tried))
+    low, high, at_low, at_high = bracket
     open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
     if open_ones.size:
         further = np.hstack((low[open_ones, np.newaxis], softness[open_ones] * limit * FURTHER_LIMIT_SHARES))
-        brackets = _bracket_limits(further, worst[open_ones].growth(further))
-        low[open_ones], high[open_ones], at_low[open_ones], at_high[open_ones] = brackets
-    limits = _interpolate_limits(low, high, at_low, at_high)
+        bracket[:, open_ones] = _bracket_limits(further, worst[open_ones].growth(further))
+    limits = _interpolate_limits(*bracket)
     order = np.argsort(limits)
     ends = np.unique(np.concatenate((order[:N_REFINED_EXTREMES], order[-N_REFINED_EXTREMES:])))
     ends = ends[np.isfinite(limits[ends])]
@@ -66,7 +64,7 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
         above = value >= 0
         low[ends], at_low[ends] = np.where(above, low[ends], limits[ends]), np.where(above, at_low[ends], value)
         high[ends], at_high[ends] = np.where(above, limits[ends], high[ends]), np.where(above, value, at_high[ends])
-        limits[ends] = _interpolate_limits(low[ends], high[ends], at_low[ends], at_high[ends])
+        limits[ends] = _interpolate_limits(*bracket[:, ends])
     return limits
 
 
@@ -80,20 +78,24 @@ def refine_sample_limits(samples: ProgramSamples, limits: Floats) -> Floats:
         return settled
     tried = limits[finite, np.newaxis] * RECHECKED_LIMIT_SHARES
     near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * float(samples.limits[0]), MAX_WIDER_FEEDS)[finite]
-    low, high, at_low, at_high = _bracket_limits(tried, near.growth(tried))
-    crossing = _interpolate_limits(low, high, at_low, at_high)
+    crossing = interpolate_first_crossing(tried, near.growth(tried))
     settled[finite] = np.where(np.isfinite(crossing), crossing, limits[finite])
     return settled
 
 
-def _bracket_limits(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return depths on both sides of the first change to growth in each row, and the growth there."""
+def interpolate_first_crossing(tried: Floats, grown: Floats) -> Floats:
+    """Interpolate the depth at which growth first reaches zero in each row of tried depths (rows, d), or inf."""
+    return _interpolate_limits(*_bracket_limits(tried, grown))
+
+
+def _bracket_limits(tried: Floats, grown: Floats) -> Floats:
+    """Return depths on both sides of the first change to growth in each row, and the growth there, shape (4, rows)."""
     depth = np.pad(tried, ((0, 0), (1, 1)))
     depth[:, -1] = np.inf
     value = np.pad(grown, ((0, 0), (1, 1)), constant_values=1.0)
     value[:, 0] = -np.abs(grown[:, 0])
     first, row = np.argmax(value >= 0, axis=1), np.arange(len(value))
-    return depth[row, first - 1], depth[row, first], value[row, first - 1], value[row, first]
+    return np.array([depth[row, first - 1], depth[row, first], value[row, first - 1], value[row, first]])
 
 
 def _interpolate_limits(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
@@ -139,31 +141,15 @@ class MonteCarloResult(NamedTuple):
         return self.median.stable and not np.any(self.chatters)
 
 
-class SampledProgram(NamedTuple):
-    """Program with its samples before they are checked."""
-
-    depth: float
-    """Axial depth of cut (m)."""
-    worst: WorstLimit
-    """Limit of the median estimate, with its worst principal directions."""
-    samples: ProgramSamples
-    """Samples of the whole uncertainty."""
-
-
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
     """Evaluate a program on all its samples by semi-discretization."""
-    return evaluate_samples(sample_program(case))
-
-
-def sample_program(case: ProgramCase) -> SampledProgram:
-    """Find the median limit of a program and sample its samples."""
     worst = program_samples.find_worst_limit(case)
-    return SampledProgram(case.depth, worst, program_samples.draw_samples(case, worst))
+    return evaluate_samples(case.depth, worst, program_samples.draw_samples(case, worst))
 
 
-def evaluate_samples(program: SampledProgram) -> MonteCarloResult:
-    """Evaluate all samples of a program: limits, quantiles, samples that chatter."""
-    depth, (median, _, axes_ratio), samples = program
+def evaluate_samples(depth: float, worst: WorstLimit, samples: ProgramSamples) -> MonteCarloResult:
+    """Evaluate all samples of a program at its depth (m): limits, quantiles, samples that chatter."""
+    median, _, axes_ratio = worst
     limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
     below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
@@ -201,8 +187,7 @@ UNLIMITED_DEPTH = 1e3
 """Depth that represents no limit (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class LimitBand:
+class LimitBand(NamedTuple):
     """Band between the 1 % and 99 % quantiles of the limits, at the speeds of a diagram."""
 
     speed_rpm: Floats

@@ -6,7 +6,8 @@ which of each kind is best; and what is said of that is the evaluation's, sample
 """
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -18,10 +19,9 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.safe_depth_estimates import find_deepest_stable
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, evaluate_program
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
@@ -41,8 +41,7 @@ MIN_PITCH_GAIN = 1.05
 """Smallest gain at the low end of the limit for which unequal pitches are proposed; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class PitchEvaluation:
+class PitchEvaluation(NamedTuple):
     """Cutter pitches with the evaluation of the cut."""
 
     pattern: PitchPattern
@@ -65,8 +64,7 @@ class PitchEvaluation:
     """Share of the samples in which equal pitch has the higher limit."""
 
 
-@dataclass(frozen=True, eq=False)
-class PitchProposal:
+class PitchProposal(NamedTuple):
     """Value of unequal pitches for one cut at one speed."""
 
     verdict: Verdict
@@ -81,8 +79,7 @@ class PitchProposal:
     @property
     def proposed(self) -> PitchEvaluation | None:
         """Proposed pitches; None if equal pitches are as good."""
-        best = next(iter(self.unequal), None)
-        return best if best is not None and best.low >= MIN_PITCH_GAIN * self.equal.low else None
+        return next((best for best in self.unequal[:1] if best.low >= MIN_PITCH_GAIN * self.equal.low), None)
 
 
 def propose_pitch(
@@ -100,7 +97,9 @@ def propose_pitch(
     limits = _pitch_limits(verdict.samples, case.depth)
     half_wave = half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
     search = PitchSearch(case, verdict.samples, limits)
-    unequal = search.find_best_of_each(half_wave) if np.isfinite(verdict.limit) else []
+    patterns = pitch_patterns(table.teeth, half_wave) if np.isfinite(verdict.limit) else ()
+    kinds = itertools.groupby(patterns, key=lambda pattern: pattern.name)
+    unequal = [search.find_best(list(alike)) for _, alike in kinds]
     if present := machine.build_cut(table).pitch:
         unequal.append(search.evaluate(PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is"))[0])
     band = verdict.limit, verdict.limit_low, verdict.limit_high
@@ -108,8 +107,7 @@ def propose_pitch(
     return PitchProposal(verdict, evaluation, tuple(sorted(unequal, key=lambda judged: -judged.low)), half_wave)
 
 
-@dataclass(frozen=True, eq=False)
-class PitchSearch:
+class PitchSearch(NamedTuple):
     """Search for the pitches of one cut."""
 
     case: ProgramCase
@@ -119,13 +117,8 @@ class PitchSearch:
     equal_limits: Floats
     """Limits with equal pitch (m), the median first."""
 
-    def find_best_of_each(self, half_wave: float) -> list[PitchEvaluation]:
-        """Find the pattern of each kind with the highest 1 % limit."""
-        kinds = itertools.groupby(pitch_patterns(self.case.table.teeth, half_wave), key=lambda pattern: pattern.name)
-        return [self._find_best(list(patterns)) for _, patterns in kinds]
-
-    def _find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
-        """Find the best pattern of one kind."""
+    def find_best(self, patterns: list[PitchPattern]) -> PitchEvaluation:
+        """Find the pattern of one kind with the highest 1 % limit."""
         places = np.argsort(self.equal_limits)[:N_LOWEST_PITCH_SAMPLES].tolist()
         places += range(0, self.equal_limits.size, PITCH_SAMPLE_STEP)
         judged = dict[PitchPattern, PitchEvaluation]()

@@ -1,20 +1,92 @@
-"""A program to evaluate: its table, the tool and spindle it runs on, and the cuts on its path."""
-
-from __future__ import annotations
+"""A program to evaluate: its table, the tool and the spindle at speed it runs on, and the cuts on its path."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import msgspec
 import numpy as np
 
+from acquisition import Remark
 from lobes import Cut, Direction, Program
-from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
+from lobewatch.arrays import Floats
+from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty import Uncertainty, uncertainty_of
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields, uncertainty_of
+
+AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
+
+
+@dataclass(frozen=True, eq=False)
+class SpindleAtSpeed:
+    """Spindle at speed, as learned from the test cuts of a program; without any, the spindle as tapped."""
+
+    n_cuts: int = 0
+    """Number of test cuts that it was learned from."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on rejected cuts and unusual frequencies."""
+    uncertainty: Uncertainty | None = None
+    """Uncertainty after the cuts; None if nothing was learned."""
+    factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
+    """Frequency, damping ratio and stiffness in the median over those tapped, modes in x, then y, shape (n, 3)."""
+    tangential: float = math.nan
+    """Cutting coefficient Kt in the learned median (N/mm2)."""
+    radial: float = math.nan
+    """Cutting coefficient Kr in the learned median (N/mm2)."""
+    prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
+    """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential", ...)."""
+    posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
+    """95 % intervals with the cuts, by the same names."""
+
+    def scale_modes(self, assembly: Assembly) -> Assembly:
+        """Scale the modes of a tool to the learned median; unchanged where nothing was learned.
+
+        Parameters
+        ----------
+        assembly
+            Tool as tapped.
+
+        Returns
+        -------
+        Assembly
+            Tool with the learned modes.
+        """
+        if self.uncertainty is None:
+            return assembly
+        count = len(assembly.x or ())
+        x, y = _scale_modes(assembly.x, self.factors[:count]), _scale_modes(assembly.y, self.factors[count:])
+        return replace(assembly, x=x, y=y)
+
+    def apply_coefficients(self, table: AnyCutTable) -> AnyCutTable:
+        """Set the learned cutting coefficients of a cut; unchanged where none were learned.
+
+        Parameters
+        ----------
+        table
+            Program or cut as in machine.toml.
+
+        Returns
+        -------
+        ProgramTable or CutTable
+            The same with the learned Kt and Kr.
+        """
+        if self.uncertainty is None:
+            return table
+        return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
+
+
+NO_TEST_CUTS = SpindleAtSpeed()
+"""Nothing learned: the spindle is evaluated as it was tapped."""
+
+
+def _scale_modes(modes: TipModes, factors: Floats) -> TipModes:
+    """Scale frequency, damping ratio and stiffness of modes by factors (n, 3)."""
+    unfitted = [replace(mode, covariance=None, jackknife=None, n_hits=0) for mode in modes or ()]
+    pairs = zip(unfitted, factors.tolist(), strict=True)
+    return modes and [scale_fields(mode, frequency=f, damping_ratio=zeta, stiffness=k) for mode, (f, zeta, k) in pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +121,25 @@ class ProgramCase:
 
     @cached_property
     def cuts(self) -> tuple[Cut, ...]:
-        """Cuts of the program on its path."""
-        return cutting_conditions_of(self.table, self.machine, self.spindle, self.any_direction)
+        """Cuts of the program on its path, in no order.
+
+        In a corner the feed turns, whatever axis it follows on the straight.
+        """
+        x, y, signs = self.spindle.x, self.spindle.y, self.spindle.principal_directions.sign_patterns
+        differ = not are_directions_equal(x, y) or signs[0] is not None
+        return tuple(
+            replace(cut, feed_angle=angle, direction=direction)
+            for cut in self.machine.engaged_cuts(self.table)
+            for direction in (MILLING_DIRECTIONS if self.any_direction and cut.immersion < 1 else (cut.direction,))
+            for angle in _feed_angles_of(self.table, cut.immersion, differ)
+        )
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
         """Uncertainty by cause."""
         return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
 
-    def at(self, speed_rpm: float, depth_mm: float) -> ProgramCase:
-        """Return the same program at another speed (rpm) and depth (mm)."""
-        return self.with_changes(speed_rpm=speed_rpm, depth_mm=depth_mm)
-
-    def with_changes(self, **fields: object) -> ProgramCase:
+    def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""
         return replace(self, table=msgspec.structs.replace(self.table, **fields))
 
@@ -82,22 +160,6 @@ MILLING_DIRECTIONS: tuple[Direction, ...] = ("down", "up")
 """Milling directions of a cut; a slot is both at once."""
 FEED_ANGLE_STEP = math.pi / 12
 """Step of the angles between x and y (rad)."""
-
-
-def cutting_conditions_of(
-    table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False
-) -> tuple[Cut, ...]:
-    """List the cuts that a program makes on its path, in no order.
-
-    In a corner the feed turns, whatever axis it follows on the straight.
-    """
-    differ = not are_directions_equal(spindle.x, spindle.y) or spindle.principal_directions.sign_patterns[0] is not None
-    return tuple(
-        replace(cut, feed_angle=angle, direction=direction)
-        for cut in machine.engaged_cuts(table)
-        for direction in (MILLING_DIRECTIONS if either and cut.immersion < 1 else (cut.direction,))
-        for angle in _feed_angles_of(table, cut.immersion, differ)
-    )
 
 
 def _feed_angles_of(table: ProgramTable, immersion: float, differ: bool) -> tuple[float, ...]:

@@ -11,8 +11,8 @@ from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
-from lobewatch.verdicts.uncertainty_causes import UNCERTAINTY_CAUSES, UNTAPPED
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
+from lobewatch.verdicts.uncertainty_causes import QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -101,56 +101,46 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
     if table.immersion < NARROW_CUT_IMMERSION and is_plain:
         yield _corner_remark(case, result)
     if case.machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
-        yield Remark(
-            "helix-not-written",
-            table.name,
-            f"helix_deg is not written, and taken as 0: at a/D {min(table.immersions):.2g} edges with a helix may have "
-            "0.7 to 1.7 times the limit",
-            "write helix_deg, 0 for straight edges",
-        )
+        risk = f"at a/D {min(table.immersions):.2g} edges with a helix may have 0.7 to 1.7 times the limit"
+        text = f"helix_deg is not written, and taken as 0: {risk}"
+        yield Remark("helix-not-written", table.name, text, "write helix_deg, 0 for straight edges")
     if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
-        yield Remark(
-            CROSS_NOT_TAPPED_CODE,
-            table.name,
-            "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
-            f"its limit by up to {100 * (result.axes_ratio - 1):.0f} %",
-            "tap Circumstances.direction xy: hit in x, sensor in y",
-        )
+        effect = f"which direct taps leave open, move its limit by up to {100 * (result.axes_ratio - 1):.0f} %"
+        text = f"x and y show the same modes, taken as askew at their worst: the axes, {effect}"
+        yield Remark(CROSS_NOT_TAPPED_CODE, table.name, text, "tap Circumstances.direction xy: hit in x, sensor in y")
 
 
 def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
+    """Warn about a corner, by the zero-order limit at its immersion in the worst feed direction."""
     table = case.table
     radius = ASSUMED_CORNER_FACTOR * table.tool_diameter_mm / 2
     inside, radial = table.corner_immersion(radius), table.radial_mm[1]
-    limit = _limit_at_immersion(inside, case, result.samples)
-    share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
-    return Remark(
-        "one-engagement",
-        table.name,
-        f"judged at {radial:g} mm radial depth all the way: a corner of {radius:g} mm radius takes as much as "
-        f"{inside * table.tool_diameter_mm:.2g} mm, and the limit is about {1e3 * limit:.2g} mm there{share}",
-        f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; [{radial:g}, {radial:g}] where the path is "
-        "straight",
-    )
-
-
-def _limit_at_immersion(immersion: float, case: ProgramCase, samples: ProgramSamples) -> float:
-    """Return the median limit (m) by the zero-order approximation at another immersion, in the worst feed direction."""
-    cut, median = replace(case.program.cut, immersion=immersion), samples.rows[np.array([0])]
+    cut, median = replace(case.program.cut, immersion=inside), result.samples.rows[np.array([0])]
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
-    speed = np.array([case.table.speed_rpm])
-    return min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
+    speed = np.array([table.speed_rpm])
+    limit = min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
+    share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
+    corner = f"a corner of {radius:g} mm radius takes as much as {inside * table.tool_diameter_mm:.2g} mm"
+    limited = f"the limit is about {1e3 * limit:.2g} mm there{share}"
+    text = f"judged at {radial:g} mm radial depth all the way: {corner}, and {limited}"
+    straight = f"[{radial:g}, {radial:g}] where the path is straight"
+    cure = f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; {straight}"
+    return Remark("one-engagement", table.name, text, cure)
 
 
 N_CAUSE_SAMPLES = 60
 """Number of chattering samples that are analyzed for the cause."""
 
 
-def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
-    """Find the cause of uncertainty without which most chattering samples would be stable at a depth (m).
+def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
+    """Find the cause of uncertainty that decides a doubtful verdict: most chattering samples would be stable without.
 
     Where none of them chatters a direction that was not tapped is all that is left open.
     """
+    if case.assembly.questions:
+        return QUESTION.name
+    if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
+        return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
     if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
         return UNTAPPED.name
@@ -158,7 +148,7 @@ def find_decisive_cause(result: MonteCarloResult, depth: float) -> str:
     shares = {}
     for cause in uncertainty.causes:
         rows = uncertainty.sample(median, N_PROGRAM_SAMPLES, without=cause)[places]
-        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(depth) < 0))
+        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(case.depth) < 0))
     return max(shares, key=lambda cause: shares[cause])
 
 
@@ -166,15 +156,10 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     """Name the decisive cause of uncertainty, and what would reduce it."""
     table, assembly, record = case.table, case.assembly, UNCERTAINTY_CAUSES[cause]
     missing, missing_remedy = assembly.missing_direction
+    measure = "measure them" if table.material else "measure them, or name the material"
+    asked = ", ".join(dict.fromkeys(question.code for question in assembly.questions))
     tangential = result.median.limit / case.depth * case.program.cut.tangential
-    values = {
-        "kt": f"{tangential / 1e6:.0f}",
-        "tool": repr(table.tool),
-        "program": repr(table.name),
-        "n_cuts": case.at_speed.n_cuts,
-        "coefficients_remedy": "measure them" if table.material else "measure them, or name the material",
-        "questions": ", ".join(dict.fromkeys(question.code for question in assembly.questions)),
-        "missing": missing,
-        "missing_remedy": missing_remedy,
-    }
+    values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
+    values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    values |= {"missing": missing, "missing_remedy": missing_remedy}
     return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

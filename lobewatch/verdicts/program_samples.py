@@ -1,7 +1,5 @@
 """Monte Carlo samples of a program, the cuts it makes on its path, and which samples chatter."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
@@ -15,7 +13,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engage
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.uncertainty import Uncertainty
+from lobewatch.verdicts.uncertainty import Factors, Uncertainty, scale_fields
 
 N_PROGRAM_SAMPLES = 300
 """Number of samples: if all are stable, at most 1 % of the uncertainty chatters at 95 % confidence."""
@@ -56,11 +54,14 @@ class ProgramSamples:
 
         depth in m: one, several (d,) or those of each sample (samples, d). Returns shape (samples, d).
         """
+        return np.asarray(np.max(self.growth_by_cut(depth), axis=0))
+
+    def growth_by_cut(self, depth: float | Floats) -> Floats:
+        """Return the growth rate in each cut, shape (cuts, samples, d)."""
         wanted = np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
         cut, row = np.divmod(np.arange(len(self.cuts) * len(self.rows)), len(self.rows))
-        grown = self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape)
-        return np.asarray(np.max(grown, axis=0))
+        return self.growth_in_cuts(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape)
 
     def critical_growth(self, depth: float) -> Floats:
         """Return the growth rate at a depth (m) in the worst cut; clearly stable samples in the first cut only.
@@ -96,16 +97,15 @@ class ProgramSamples:
                 grown[here] = lobes.growth_rate(rows, depths[here], number)
         return grown
 
-    def __getitem__(self, places: Indices) -> ProgramSamples:
+    def __getitem__(self, places: Indices) -> "ProgramSamples":
         return replace(self, rows=self.rows[places])
 
-    def with_lowest_cuts(self, below: float, most: int | None = None) -> ProgramSamples:
+    def with_lowest_cuts(self, below: float, most: int | None = None) -> "ProgramSamples":
         """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
-        wanted[0] = True
         return self.with_cuts(wanted)
 
-    def with_cuts(self, wanted: Flags) -> ProgramSamples:
+    def with_cuts(self, wanted: Flags) -> "ProgramSamples":
         """Select some cuts; the worst if there is none."""
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
@@ -119,22 +119,14 @@ class ProgramSamples:
         margin = self.uncertainty.speed + FREQUENCY_MARGIN
         ends = (1 - margin) / apart, (1 + margin) * apart / (1 - drop)
         median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
-        cut, row = np.divmod(np.arange(len(self.cuts) * N_MARGIN_SPEEDS), N_MARGIN_SPEEDS)
-        grown = median.growth_in_cuts(cut, row, np.full((cut.size, 1), depth))
-        return np.asarray(np.max(grown.reshape(-1, N_MARGIN_SPEEDS), axis=1))
+        return np.asarray(np.max(median.growth_by_cut(depth)[..., 0], axis=1))
 
-    def scale(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramSamples:
-        """Scale speed, frequencies and stiffnesses of all samples."""
-        return self.sweep(np.array([speed]), np.array([frequency]), np.array([stiffness]))
-
-    def sweep(self, speed: Floats, frequency: Floats | float = 1.0, stiffness: Floats | float = 1.0) -> ProgramSamples:
+    def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> "ProgramSamples":
         """Repeat all samples with each of several factors (k,), k times as many."""
         factors = np.broadcast_arrays(speed, frequency, stiffness)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
         n, f, k = (np.repeat(factor, len(self.rows))[:, np.newaxis] for factor in factors)
-        speed_rpm = rows.speed_rpm * n[:, 0]
-        rows = replace(rows, speed_rpm=speed_rpm, frequency=rows.frequency * f, stiffness=rows.stiffness * k)
-        return replace(self, rows=rows)
+        return replace(self, rows=scale_fields(rows, speed_rpm=n[:, 0], frequency=f, stiffness=k))
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
@@ -206,12 +198,7 @@ def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) ->
         return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
     push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
-    changed = replace(
-        rows,
-        frequency=rows.frequency * factor(*ROTATING_FREQUENCY_FACTOR, frequency),
-        damping_ratio=rows.damping_ratio * factor(*ROTATING_DAMPING_FACTOR, damping),
-        stiffness=rows.stiffness * factor(*ROTATING_STIFFNESS_FACTOR, stiffness),
-        tangential=rows.tangential * push,
-        radial=rows.radial * push,
-    )
+    f, zeta = factor(*ROTATING_FREQUENCY_FACTOR, frequency), factor(*ROTATING_DAMPING_FACTOR, damping)
+    k = factor(*ROTATING_STIFFNESS_FACTOR, stiffness)
+    changed = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=push, radial=push)
     return replace(samples, rows=changed)

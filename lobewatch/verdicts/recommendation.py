@@ -14,12 +14,10 @@ from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_remarks import missing_tool_remarks
-from lobewatch.verdicts.setting_robustness import Setting
+from lobewatch.verdicts.setting_robustness import Setting, find_tolerable_drop, model_softening
 from lobewatch.verdicts.setting_search import SettingSearch
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program, find_open_question, is_compliance_known
 
 
@@ -95,16 +93,12 @@ def find_stable_pockets(
     """
     if not is_compliance_known(table, assembly):
         return []
-    program = build_cut_program(at_speed.apply_coefficients(table), assembly.tool, machine)
+    program = at_speed.apply_coefficients(table)
+    if not isinstance(program, ProgramTable):
+        place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
+        named = {"name": REFERENCE_CUT, "tool": assembly.tool}
+        program = ProgramTable(**named | msgspec.structs.asdict(program) | place)
     return SettingSearch(ProgramCase(program, assembly, machine, at_speed)).pockets(count)
-
-
-def build_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
-    """Build a program from a cut; speed and depth are placeholders."""
-    if isinstance(table, ProgramTable):
-        return table
-    place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
-    return ProgramTable(**{"name": REFERENCE_CUT, "tool": tool} | msgspec.structs.asdict(table) | place)
 
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
@@ -125,16 +119,6 @@ REQUESTED_KEYS = ("speed_rpm", "depth_mm")
 """Keys of a program that are ignored if a setting is requested."""
 
 
-@dataclass(frozen=True)
-class Alternative:
-    """Alternative to the recommended setting."""
-
-    label: str
-    """Label of its advantage."""
-    setting: Setting
-    """Speed and depth."""
-
-
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """Answer to a request for speed and depth."""
@@ -151,8 +135,8 @@ class Recommendation:
     """Reason why there is no setting."""
     remedies: tuple[str, ...] = ()
     """Measures that would allow one."""
-    alternatives: tuple[Alternative, ...] = ()
-    """Alternative settings, at most two."""
+    alternatives: tuple[tuple[str, Setting], ...] = ()
+    """Alternative settings with the label of their advantage, at most two."""
     feed_mm: tuple[float, float] | None = None
     """Smallest and largest feed per tooth (mm): that of the program, else the tool limits; None if unknown."""
     remarks: tuple[Remark, ...] = ()
@@ -177,15 +161,13 @@ def recommend(
     if isinstance(tool, DataError):
         tap = f"tap it: TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
-    if gap := _find_gap(table, tool, machine):
+    if gap := _find_gap(table, tool, machine) or _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
-    if too_fast := _find_speed_conflict(CutRange.of(machine, table)):
-        return Recommendation(table, either, reason=too_fast[0], remedies=too_fast[1:])
     search = SettingSearch(ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed, either))
     if is_set and present_rpm is not None:
         setting = search.deepest_at(present_rpm, search.cut_range.deepest_mm)
     else:
-        setting = search.best if depth_mm is None else search.fastest_window(depth_mm)
+        setting = search.best if depth_mm is None else search.nearest_window(depth_mm, search.cut_range.high_rpm)
     others = tuple(_list_alternatives(search, setting, present_rpm))
     if setting is None:
         reason, cures = _explain_gap(search, depth_mm, present_rpm if is_set else None)
@@ -237,31 +219,30 @@ def _feed_range(search: SettingSearch, table: ProgramTable) -> tuple[float, floa
     return (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
 
 
-def _list_alternatives(search: SettingSearch, setting: Setting | None, own_rpm: float | None) -> Iterator[Alternative]:
-    places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
+def _list_alternatives(search: SettingSearch, best: Setting | None, rpm: float | None) -> Iterator[tuple[str, Setting]]:
+    places = {(best.speed_rpm, best.depth_mm)} if best else set[tuple[float, float]]()
     wanted = {MAX_REMOVAL_LABEL: search.best}
-    if own_rpm is not None:
-        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(own_rpm, search.cut_range.deepest_mm)
+    if rpm is not None:
+        wanted[PRESENT_SPEED_LABEL] = search.deepest_at(rpm, search.cut_range.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
-            yield Alternative(what, other)
+            yield what, other
 
 
 def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> tuple[str, tuple[str, ...]]:
-    """Explain why there is no setting, with remedies."""
+    """Explain why there is no setting, with remedies, that of the decisive uncertainty first."""
     reach = search.cut_range
     if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
         return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
     reason = f"no safe {named} in {reach.text}" if set_rpm is None else f"no safe depth at {set_rpm:g} rpm"
-    return reason, _list_remedies(search, depth_mm)
-
-
-def _list_remedies(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
-    """List what would make a setting safe, the remedy of the decisive uncertainty first."""
     likely = search.likely_depths
-    probe = search.case.at(float(likely.speeds[int(np.argmax(likely.depths))]), depth_mm or DEPTH_STEP_MM)
+    speed = float(likely.speeds[int(np.argmax(likely.depths))])
+    probe = search.case.with_changes(speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)
     verdict = evaluate_program(probe.table, probe.assembly, probe.machine, probe.at_speed)
     settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
-    return (*settles, *(CUT_REMEDIES if search.case.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES))
+    return reason, (
+        *settles,
+        *(CUT_REMEDIES if probe.table.immersion > THIN_CUT_IMMERSION else NEW_TOOL_REMEDIES),
+    )

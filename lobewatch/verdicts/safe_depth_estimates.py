@@ -6,8 +6,8 @@ that what it does not see (low immersion, flip) counts. Nothing is evaluated yet
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -18,10 +18,10 @@ from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.frequency_drop import StiffnessAt
+from lobewatch.verdicts.monte_carlo import interpolate_first_crossing
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import ProgramSamples, draw_likely_samples
-from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR
+from lobewatch.verdicts.program_samples import FREQUENCY_MARGIN, ProgramSamples, draw_likely_samples
+from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR, StiffnessAt
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
 N_GROWING_SAMPLES = 24
@@ -40,8 +40,7 @@ MIN_SEARCHED_DEPTH = 1e-5
 """Smallest searched depth (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class CriticalSamples:
+class CriticalSamples(NamedTuple):
     """Critical samples of a cut at one speed."""
 
     likely_depth: float
@@ -61,15 +60,15 @@ class CriticalSamples:
 
     def deepest_stable(self, most: float) -> float:
         """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth margin."""
-        few, depth = self.selected, ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
+        few, depth = self.selected, robustness.ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
-        while calm == depth < ROBUST_DEPTH_FACTOR * most:
-            depth = min(DEPTH_GROWTH_FACTOR * depth, ROBUST_DEPTH_FACTOR * most)
+        while calm == depth < robustness.ROBUST_DEPTH_FACTOR * most:
+            depth = min(DEPTH_GROWTH_FACTOR * depth, robustness.ROBUST_DEPTH_FACTOR * most)
             calm = find_deepest_stable(few, depth)
         while calm == 0 and depth > MIN_SEARCHED_DEPTH:
             depth *= DEPTH_SHRINK_FACTOR
             calm = find_deepest_stable(few, depth)
-        return calm / ROBUST_DEPTH_FACTOR
+        return calm / robustness.ROBUST_DEPTH_FACTOR
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
         """Return the largest growth of the selected samples at relative speeds and depths (m) (k,).
@@ -77,7 +76,7 @@ class CriticalSamples:
         In the worst direction of feed: it says where to look, no more.
         """
         few = self.selected.with_lowest_cuts(0.0)
-        wanted = np.repeat(ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
+        wanted = np.repeat(robustness.ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
         return np.asarray(np.max(few.sweep(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
 
 
@@ -95,7 +94,7 @@ def select_critical_samples(
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
     median = likely.rows[np.zeros(1, dtype=np.intp)]
-    push = (1 + MIN_DEPTH_MARGIN) / ROBUST_DEPTH_FACTOR
+    push = (1 + robustness.MIN_DEPTH_MARGIN) / robustness.ROBUST_DEPTH_FACTOR
     median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     growing, flexible = np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES]
     first = np.unique(np.concatenate((growing, flexible, [grown.size])))
@@ -134,16 +133,13 @@ MIN_REMOVAL_SHARE = 0.75
 """Possible removal rate at a speed, as a share of the largest zero-order rate, below which it is not checked."""
 MAX_DEPTH_FACTOR = 1.3
 """Largest distinguished limit over the largest allowed depth including its margin."""
-LIKELY_FREQUENCY_MARGIN = 0.003
-"""Relative frequency margin in addition to speed uncertainty and frequency drop."""
 MIN_PEAK_SPEED_DISTANCE, MIN_OTHER_SPEED_DISTANCE = 0.02, 0.05
 """Smallest relative distance of two checked maxima, and of other checked speeds."""
 POCKET_VALLEY_SHARE = 0.8
 """Likely depth between two separate pockets, as a share of the shallower pocket, at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class LikelyDepths:
+class LikelyDepths(NamedTuple):
     """Likely safe depths over speed."""
 
     speeds: Floats
@@ -153,7 +149,9 @@ class LikelyDepths:
 
     def window_centers(self, depth_mm: float) -> list[float]:
         """Return the center (rpm) of each speed window in which a depth (mm) is likely safe."""
-        return [float(self.speeds[run[run.size // 2]]) for run in _split_runs(self.depths >= depth_mm)]
+        places = np.flatnonzero(self.depths >= depth_mm)
+        runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+        return [float(self.speeds[run[run.size // 2]]) for run in runs if run.size]
 
     def removal_peaks(self, count: int) -> list[tuple[float, float]]:
         """Return speeds (rpm) and depths (mm) of local maxima of the removal rate, then of others apart."""
@@ -185,9 +183,9 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
     lobes = [lowest_zero_order_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross) for cut in cuts]
     by_cut = np.array([each.depth for each in lobes]) * 1e3
-    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + MIN_DEPTH_MARGIN)
+    deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
-    margin = uncertainty.speed + LIKELY_FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    margin = uncertainty.speed + FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
     steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:
@@ -239,16 +237,4 @@ def _interpolate_crossing(rows: MillingRows, depths: Floats) -> Floats:
     if not depths.size:
         return np.empty(0)
     grown = growth_rate(rows, depths / 1e3, count_pieces(rows, float(np.max(depths)) / 1e3, COARSE_CYCLES_PER_PIECE))
-    first, row = np.argmax(grown >= 0, axis=1), np.arange(len(grown))
-    before = np.maximum(first - 1, 0)
-    low, high = grown[row, before], grown[row, first]
-    share = np.where(first > 0, -low / np.where(high == low, 1.0, high - low), 0.5)
-    begin = np.where(first > 0, depths[row, before], 0.0)
-    return np.where(np.any(grown >= 0, axis=1), begin + share * (depths[row, first] - begin), np.inf)
-
-
-def _split_runs(wanted: Flags) -> list[Indices]:
-    """Split into runs of consecutive places."""
-    places: Indices = np.flatnonzero(wanted)
-    runs: Sequence[Indices] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    return [run for run in runs if run.size]
+    return interpolate_first_crossing(depths, grown)

@@ -1,21 +1,159 @@
-"""Robustness of a setting against changes of speed, depth and natural frequency.
+"""Frequency drops before a program chatters, and robustness of a setting against changes of speed, depth and frequency.
 
 The depth that only just is safe is so at one speed alone: the tip of a pocket has no width. A setting is recommended
 where there is room on all sides, and no nearer to an edge.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
+from acquisition import Remark
+from dsm import Calibration, calibrate
+from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.arrays import Floats
-from lobewatch.machine import Machine
 from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.tap_series import expected_frequency_drop
-from lobewatch.verdicts.frequency_drop import StiffnessAt
 from lobewatch.verdicts.program_samples import ProgramSamples
+from lobewatch.verdicts.uncertainty import Factors
+from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
+
+CALIBRATED_DROPS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
+"""Relative frequency drops for which the model is recalibrated; between them its stiffness is interpolated."""
+N_DROP_STEPS = 101
+"""Number of checked frequency drops from zero to the largest."""
+N_DROP_PARTS = 8
+"""Number of parts in which these drops are checked, up to the part with the first chatter."""
+MAX_CACHED_CALIBRATIONS = 8
+"""Number of cached calibrated models, the most recently used."""
+
+StiffnessAt = Callable[[float], float]
+
+
+def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
+    """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
+
+    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a
+    model it stays.
+    """
+    ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
+    clause = "stiffness does not (no model)"
+    if ratios.size > 1:
+        drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
+        clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {drop:.0f} %)"
+    text = f"fall left: all modes fall alike, damping does not change, {clause}"
+
+    def stiffness_at(drop: float) -> float:
+        return float(np.interp(drop, CALIBRATED_DROPS[: ratios.size], ratios))
+
+    return stiffness_at, Remark("decay-assumption", assembly.tool, text)
+
+
+@lru_cache(maxsize=MAX_CACHED_CALIBRATIONS)
+def _stiffness_ratios(calibration: Calibration) -> Floats:
+    """Return the modal stiffness at the tip for each of `CALIBRATED_DROPS` over that for none."""
+    stiffness: list[float] = []
+    for drop in CALIBRATED_DROPS:
+        try:
+            softer = calibrate(calibration.spindle, calibration.frequency * (1 - drop), mode=calibration.mode)
+            stiffness.append(softer.modal_stiffness_after)
+        except (ValueError, ArithmeticError):
+            break
+    return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
+
+
+def apply_drops(samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0) -> ProgramSamples:
+    """Apply each of some frequency drops (k,) to all samples, one after the other; speed: relative, one or (k,)."""
+    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]))
+
+
+def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
+    """Find the largest relative drop up to which a depth (m) stays stable in the median.
+
+    0.0 where it is unstable now, inf where nothing happens down to 80 %. Looks every 0.2 % of fall.
+    """
+    drops, worst = np.linspace(0, CALIBRATED_DROPS[-1], N_DROP_STEPS), np.empty(0)
+    for part in np.array_split(drops, N_DROP_PARTS):
+        median = apply_drops(samples[np.array([0])], part, stiffness_at)
+        worst = np.append(worst, np.max(median.growth(depth * np.array(CHECKED_DEPTH_SHARES)), axis=1))
+        if np.any(worst >= 0):
+            break
+    else:
+        return math.inf
+    first = int(np.argmax(worst >= 0))
+    if first == 0:
+        return 0.0
+    before, after = worst[first - 1], worst[first]
+    return float(drops[first - 1] + (drops[first] - drops[first - 1]) * before / (before - after))
+
+
+DROP_SEARCH_STEP = 0.0125
+"""Step of the relative frequency drop at which all samples are checked."""
+DROP_SLOPE_STEP = 1e-3
+"""Step of the relative frequency drop over which growth is assumed linear."""
+DROP_HALVINGS = 4
+"""Halvings of the step at which the first sample chatters."""
+N_DROP_ERROR_SAMPLES = 12
+"""Number of samples of damping and stiffness for the error of the frequency drop."""
+
+
+def find_critical_drop(verdict: Verdict) -> CriticalDrop:
+    """Find the frequency drops that change the stability of a program, up to 20 %."""
+    samples = verdict.samples
+    if verdict.assembly is None or samples is None or verdict.stability is Stability.UNKNOWN:
+        return CriticalDrop(math.nan, math.nan, math.nan)
+    if verdict.stability is Stability.NOT_STABLE:
+        return CriticalDrop(0.0, 0.0, 0.0)
+    stiffness_at, _ = model_softening(verdict.assembly)
+    depth = verdict.program.depth_mm / 1e3
+    last = find_tolerable_drop(samples, depth, stiffness_at)
+    first = _first_doubtful_drop(samples, depth, last, stiffness_at) if verdict.stability is Stability.STABLE else 0.0
+    error = _drop_error(samples, depth, last, stiffness_at) if last < math.inf else 0.0
+    return CriticalDrop(min(first, last), last, error)
+
+
+def build_stored_verdict(verdict: Verdict, drops: bool) -> StoredVerdict:
+    """Build the stored verdict; drops: with the critical frequency drops, which take as long as the verdict itself."""
+    return verdict.stored._replace(critical=find_critical_drop(verdict)) if drops else verdict.stored
+
+
+def is_verdict_missing(ruling: StoredVerdict | None, drops: bool) -> bool:
+    """Return whether a program has to be evaluated for its stored verdict; drops: with the critical drops."""
+    return ruling is None or (drops and ruling.critical is None)
+
+
+def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
+    """Return the largest drop up to which no sample chatters."""
+    most = min(last, float(CALIBRATED_DROPS[-1]))
+
+    def chatters(drop: float) -> bool:
+        return bool(np.any(apply_drops(samples, np.array([drop]), stiffness_at).growth(depth) >= 0))
+
+    good = 0.0
+    for bad in np.linspace(0, most, math.ceil(most / DROP_SEARCH_STEP) + 1)[1:].tolist():
+        if chatters(bad):
+            break
+        good = bad
+    else:
+        return last
+    for _ in range(DROP_HALVINGS):
+        median = (good + bad) / 2
+        good, bad = (good, median) if chatters(median) else (median, bad)
+    return good
+
+
+def _drop_error(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
+    """Return the error of the drop at which the median chatters, from damping and stiffness of some samples."""
+    rows, median = samples.rows[np.arange(1, N_DROP_ERROR_SAMPLES + 1)], samples[np.array([0])]
+    alike = samples.rows[np.zeros(N_DROP_ERROR_SAMPLES, dtype=np.intp)]
+    scattered = replace(samples, rows=replace(alike, damping_ratio=rows.damping_ratio, stiffness=rows.stiffness))
+    spread = np.std(apply_drops(scattered, np.array([last]), stiffness_at).growth(depth))
+    drops = last + np.array([-DROP_SLOPE_STEP, DROP_SLOPE_STEP])
+    before, after = apply_drops(median, drops, stiffness_at).growth(depth)[:, 0]
+    return float(spread * 2 * DROP_SLOPE_STEP / abs(after - before)) if after != before else 0.0
 
 
 @dataclass(frozen=True)
@@ -50,16 +188,13 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
-    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1], [0, drop], stiffness_at)
+    return apply_drops(samples, np.array([0, drop]), stiffness_at, np.array([1 / ROBUST_SPEED_FACTOR, 1]))
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
     """Sweep all samples over both speeds, the frequency drop and half of it."""
-    return _sweep(samples, [1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR], [0, drop, drop / 2, 0], stiffness_at)
-
-
-def _sweep(samples: ProgramSamples, speeds: list[float], drops: list[float], stiffness: StiffnessAt) -> ProgramSamples:
-    return samples.sweep(np.array(speeds), 1 - np.array(drops), np.array([stiffness(drop) for drop in drops]))
+    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR])
+    return apply_drops(samples, np.array([0, drop, drop / 2, 0]), stiffness_at, speeds)
 
 
 def find_speed_window(
@@ -75,7 +210,7 @@ def find_speed_window(
 
 def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
     """Find the relative frequency drop up to which a depth (m) is stable on these samples."""
-    grown = _sweep(hardest, [1.0] * CHECKED_DROPS.size, CHECKED_DROPS.tolist(), stiffness_at).critical_growth(depth)
+    grown = apply_drops(hardest, CHECKED_DROPS, stiffness_at).critical_growth(depth)
     return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
 
 
@@ -87,7 +222,7 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
         last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
         if last < steps[-1]:
             break
-    while last > 0 and np.any(near.scale(speed=float(ratio[last])).critical_growth(depth) >= 0):
+    while last > 0 and np.any(near.sweep(ratio[last : last + 1]).critical_growth(depth) >= 0):
         last //= 2
     return float(ratio[last])
 
@@ -96,17 +231,3 @@ def _last_stable_row(grown: Floats) -> int:
     """Return the row up to which all of growth (k, samples) is negative from the first on."""
     calm = np.all(grown < 0, axis=1)
     return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
-
-
-N_TAP_INTERVALS = 2
-"""Number of tap intervals for which a setting must stay stable."""
-DEFAULT_NEEDED_DROP = 0.02
-"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
-
-
-def find_needed_drop(assembly: Assembly, machine: Machine) -> float:
-    """Return the frequency drop that a recommended setting must tolerate: two tap intervals at the rate so far."""
-    days = N_TAP_INTERVALS * machine.machine.tap_interval_days
-    drops = [expected_frequency_drop(series, days) for series in assembly.series.values()]
-    needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, MIN_ROBUST_DROP) for drop in drops]
-    return max(needed, default=DEFAULT_NEEDED_DROP)

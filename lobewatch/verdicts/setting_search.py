@@ -7,8 +7,8 @@ Where no speed of the grid has such a depth, nothing is recommended.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,14 +16,14 @@ import numpy as np
 from lobes import Program
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
+from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.frequency_drop import StiffnessAt, model_softening
-from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples, sample_program
+from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_samples, find_worst_limit
 from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths, find_deepest_stable
-from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, ROBUST_SPEED_FACTOR, Setting
+from lobewatch.verdicts.setting_robustness import Setting, StiffnessAt, model_softening
 
 MAX_DEPTH_MARGIN = 20.0
 """Largest searched depth margin, which also represents no limit."""
@@ -49,6 +49,11 @@ NEXT_DEPTH_SHARE = 0.98
 """Largest next depth over one at which samples chatter."""
 N_WINDOW_SAMPLES = 24
 """Number of critical samples that bound a window before all samples decide."""
+
+N_TAP_INTERVALS = 2
+"""Number of tap intervals for which a setting must stay stable."""
+DEFAULT_NEEDED_DROP = 0.02
+"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
 
 DepthsBySpeed = dict[float, float]
 """Possibly safe depths (mm) by speed (rpm)."""
@@ -76,8 +81,11 @@ class SettingSearch:
 
     @cached_property
     def needed_drop(self) -> float:
-        """Relative frequency drop at which a setting must stay stable."""
-        return robustness.find_needed_drop(self.case.assembly, self.case.machine)
+        """Relative frequency drop at which a setting must stay stable: two tap intervals at the rate so far."""
+        days = N_TAP_INTERVALS * self.case.machine.machine.tap_interval_days
+        drops = [expected_frequency_drop(series, days) for series in self.case.assembly.series.values()]
+        needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, robustness.MIN_ROBUST_DROP) for drop in drops]
+        return max(needed, default=DEFAULT_NEEDED_DROP)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
@@ -105,11 +113,12 @@ class SettingSearch:
 
     def nearest_window(self, depth_mm: float, speed_rpm: float) -> Setting | None:
         """Find a depth (mm) in the speed window nearest to a speed (rpm)."""
-        return self._first_safe(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
-
-    def fastest_window(self, depth_mm: float) -> Setting | None:
-        """Find a depth (mm) in the fastest speed window."""
-        return self._first_safe(depth_mm, lambda speed: -speed)
+        for speed in self._candidate_speeds(depth_mm, speed_rpm):
+            if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
+                setting = self.verify(speed, depth_mm)
+                if isinstance(setting, Setting):
+                    return setting
+        return None
 
     def deepest_at(self, speed_rpm: float, most_mm: float) -> Setting | None:
         """Find the deepest setting at a speed (rpm), up to a depth (mm)."""
@@ -117,22 +126,14 @@ class SettingSearch:
             return None
         return self._deepest_setting(speed_rpm, min(most_mm, self._deepest_stable(speed_rpm)))
 
-    def _first_safe(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
-        """Find a depth (mm) in the first safe speed window, the lowest rank first."""
-        for speed in self._candidate_speeds(depth_mm, rank):
-            if self.cut_range.contains(speed, depth_mm) and self._deepest_stable(speed) >= depth_mm:
-                setting = self.verify(speed, depth_mm)
-                if isinstance(setting, Setting):
-                    return setting
-        return None
-
-    def _candidate_speeds(self, depth_mm: float, rank: Callable[[float], float]) -> Iterator[float]:
-        """Yield speeds (rpm) at which a depth (mm) is likely safe; the speed of the best setting last."""
+    def _candidate_speeds(self, depth_mm: float, near_rpm: float) -> Iterator[float]:
+        """Yield speeds (rpm) at which a depth (mm) is likely safe, the nearest first; that of the best setting last."""
         if self.cut_range.is_empty:
             return
         depths = depth_mm, NEARLY_SAFE_SHARE * depth_mm
         middles = {center for depth in depths for center in self.likely_depths.window_centers(depth)}
-        yield from map(_round_speed, sorted(middles, key=rank)[:MAX_SEARCHED_SPEEDS])
+        nearest = sorted(middles, key=lambda speed: abs(math.log(speed / near_rpm)))
+        yield from map(_round_speed, nearest[:MAX_SEARCHED_SPEEDS])
         if self.best is not None:
             yield self.best.speed_rpm
 
@@ -185,21 +186,18 @@ class SettingSearch:
         return speed
 
     def _best_speed(self, depths: DepthsBySpeed, confirmed: SharesBySpeed) -> float:
-        """Return the speed (rpm) of the largest expected removal rate; 0 without any."""
+        """Return the speed (rpm) of the largest removal rate, with the share likely to be confirmed; 0 without any."""
 
         def rate(speed: float) -> float:
-            return speed * depths[speed] * self._expected_share(speed, confirmed)
+            pocket = [share for other, share in confirmed.items() if self.likely_depths.is_same_pocket(speed, other)]
+            share = 1.0 if speed in confirmed or len(pocket) < MIN_FAILED_SPEEDS else max(pocket)
+            return speed * depths[speed] * share
 
         while True:
             speed = max(depths, key=rate, default=0.0)
             if not speed or self.critical[speed].chattered == self.chattered:
                 return speed
             depths[speed] = min(depths[speed], self.cut_range.round_down_depth(self._deepest_stable(speed)))
-
-    def _expected_share(self, speed: float, confirmed: SharesBySpeed) -> float:
-        """Return the share of its depth that is likely to be confirmed at a speed (rpm)."""
-        shares = [share for other, share in confirmed.items() if self.likely_depths.is_same_pocket(speed, other)]
-        return 1.0 if speed in confirmed or len(shares) < MIN_FAILED_SPEEDS else max(shares)
 
     def _better_neighbor(self, speed: float, depth_mm: float) -> float:
         """Return a neighboring speed (rpm) with a larger removal rate by the critical samples, or itself."""
@@ -214,16 +212,13 @@ class SettingSearch:
     def _deepest_stable(self, speed: float) -> float:
         """Return the deepest depth (mm) at a speed (rpm) by the critical samples, now and later."""
         most = float(self.cut_range.depth_limits(np.array([speed]))[0]) / 1e3
-        hard = self.critical[speed] = replace(self._critical_samples(speed), chattered=frozenset(self.chattered))
+        if speed not in self.critical:
+            likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
+            program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
+            few = estimates.select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
+            self.critical[speed] = few
+        hard = self.critical[speed] = self.critical[speed]._replace(chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest_stable(most)
-
-    def _critical_samples(self, speed: float) -> CriticalSamples:
-        """Return the critical samples at a speed (rpm)."""
-        if speed in self.critical:
-            return self.critical[speed]
-        likely = float(np.interp(speed, self.likely_depths.speeds, self.likely_depths.depths)) / 1e3
-        program = Program(self.case.machine.build_cut(self.case.table), speed, max(likely, DEPTH_STEP_MM / 1e3))
-        return estimates.select_critical_samples(self.case, program, self.needed_drop, self.stiffness_at)
 
     def _deepest_setting(self, speed: float, depth_mm: float) -> Setting | None:
         """Find the deepest setting up to a depth (mm)."""
@@ -239,22 +234,23 @@ class SettingSearch:
     def verify(self, speed: float, depth_mm: float) -> Setting | float:
         """Verify a setting on all samples, now and at the next tap test; else return a depth (mm) to try."""
         depth = depth_mm / 1e3
-        deep = ROBUST_DEPTH_FACTOR * depth
-        program = sample_program(self.case.at(speed, depth_mm))
-        limit = program.worst.limit.limit
-        if limit < depth * (1 + MIN_DEPTH_MARGIN):
-            return 1e3 * limit / (1 + MIN_DEPTH_MARGIN)
-        grown = program.samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, ROBUST_SPEED_FACTOR)
-        near = program.samples.with_cuts(grown >= 0)
+        deep = robustness.ROBUST_DEPTH_FACTOR * depth
+        case = self.case.with_changes(speed_rpm=speed, depth_mm=depth_mm)
+        worst = find_worst_limit(case)
+        limit, samples = worst.limit.limit, draw_samples(case, worst)
+        if limit < depth * (1 + robustness.MIN_DEPTH_MARGIN):
+            return 1e3 * limit / (1 + robustness.MIN_DEPTH_MARGIN)
+        grown = samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, robustness.ROBUST_SPEED_FACTOR)
+        near = samples.with_cuts(grown >= 0)
         around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(deep)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        result = evaluate_samples(program)
+        result = evaluate_samples(depth, worst, samples)
         if not result.is_stable_throughout:
             places = 1 + np.flatnonzero(result.chatters)
             self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-            calm = min(find_deepest_stable(program.samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
+            calm = min(find_deepest_stable(samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
             return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
@@ -266,8 +262,8 @@ class SettingSearch:
         """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
-        calm = find_deepest_stable(samples[places], ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
-        return min(1e3 * calm / ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
+        calm = find_deepest_stable(samples[places], robustness.ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
+        return min(1e3 * calm / robustness.ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
 
 
 def _round_speed(speed: float) -> float:

@@ -4,8 +4,7 @@ A stiffness stretches all limits alike and moves none of them along the speeds, 
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,8 +30,7 @@ SPEEDS_ONLY_CODE = "speeds-alone"
 """Code of the remark on speed pockets."""
 
 
-@dataclass(frozen=True)
-class SpeedPocket:
+class SpeedPocket(NamedTuple):
     """Stable pocket of unknown depth."""
 
     speed_rpm: float
@@ -82,16 +80,12 @@ def _frequency_uncertainty(assembly: Assembly, direction: str, machine: Machine)
     return math.hypot(error if math.isfinite(error) else 0.0, scatter if given is None else given / 100)
 
 
-def format_pockets(best: Sequence[SpeedPocket]) -> str:
-    """Format the speeds of pockets; windows are rounded inward."""
-    windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
-    return ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
-
-
 def speed_pocket_remarks(table: CutTable, name: str, assembly: Assembly, machine: Machine) -> tuple[Remark, ...]:
     """Return the remark on pockets with unknown depth, if there are any."""
     best = find_speed_pockets(table, assembly, machine)
     if not best:
         return ()
-    text = f"pockets by frequency and damping: {format_pockets(best)}; how deep, test cuts tell"
+    windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
+    speeds = ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
+    text = f"pockets by frequency and damping: {speeds}; how deep, test cuts tell"
     return (Remark(SPEEDS_ONLY_CODE, name, text, "pocket_depth.find_pocket_depths leads to a depth in five test cuts"),)

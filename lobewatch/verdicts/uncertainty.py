@@ -5,7 +5,7 @@ Half-widths of independent uniform distributions, or posterior samples where tes
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,16 @@ WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients by tool wear; chosen."""
 
 
+RecordT = TypeVar("RecordT", MillingRows, Mode)
+Factors = Floats | float
+"""Factors of several rows, or of all."""
+
+
+def scale_fields(record: RecordT, **factors: Factors) -> RecordT:
+    """Multiply fields of a record by factors."""
+    return replace(record, **{name: getattr(record, name) * factor for name, factor in factors.items()})
+
+
 class FactorRange(NamedTuple):
     """Lowest and highest value of a quantity, as factors on its median or on the value not rotating."""
 
@@ -37,8 +47,7 @@ class FactorRange(NamedTuple):
     """Highest factor."""
 
 
-@dataclass(frozen=True, eq=False)
-class LearnedSamples:
+class LearnedSamples(NamedTuple):
     """Spindles at speed that explain the test cuts, r of equal weight, around their mean; n modes in x, then y."""
 
     frequency: Floats
@@ -60,15 +69,10 @@ class LearnedSamples:
         rows, spindle = median[np.zeros(count, dtype=np.intp)], float(without != causes.TEST_CUTS.name)
         is_counted = without != causes.COEFFICIENTS.name
         force, direction = (1 + (factor[take] - 1) * is_counted for factor in (self.tangential, self.ratio))
-        return replace(
-            rows,
-            frequency=rows.frequency * (1 + (self.frequency[take] - 1) * spindle),
-            damping_ratio=rows.damping_ratio * (1 + (self.damping_ratio[take] - 1) * spindle),
-            stiffness=rows.stiffness * (1 + (self.stiffness[take] - 1) * spindle),
-            phase=rows.phase + self.phase_change[take] * spindle,
-            tangential=rows.tangential * force,
-            radial=rows.radial * force * direction,
-        )
+        factors = self.frequency, self.damping_ratio, self.stiffness
+        f, zeta, k = (1 + (factor[take] - 1) * spindle for factor in factors)
+        rows = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=force, radial=force)
+        return replace(rows, phase=rows.phase + self.phase_change[take] * spindle, radial=rows.radial * direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,22 +130,26 @@ class Uncertainty:
         MillingRows
             Sampled systems, `count` rows.
         """
-        rows = self._sample_new_edges(median, count, seed, without)
+        random = np.random.default_rng(seed)
+        if self.learned is None:
+            rows = self._sample_modes(median[np.zeros(count, dtype=np.intp)], random, seed, without)
+        else:
+            rows = self.learned.build_rows(median, count, without)
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != causes.SPEED.name)
+        rows = scale_fields(rows, speed_rpm=np.maximum(speed, MIN_SAMPLE_FACTOR))
+        if self.learned is None:
+            rows = self._sample_coefficients(rows, random, without)
+        if self.axes is not None and self.axes.are_uncertain and without != causes.CROSS.name:
+            rows = replace(rows, vector=self.axes.sample(count, seed))
         if self.wear == 1 or without == causes.WEAR.name:
             return rows
         worn = np.empty(count)
         worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
-        return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
+        return scale_fields(rows, tangential=worn, radial=worn)
 
-    def _sample_new_edges(self, median: MillingRows, count: int, seed: int, without: str) -> MillingRows:
-        if self.learned is not None:
-            rows = self.learned.build_rows(median, count, without)
-            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != causes.SPEED.name)
-            rows = replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR))
-            return self._with_sampled_axes(rows, seed, without)
-        random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
-        factor = np.ones((count, median.frequency.shape[1], 3))
-        turned = np.zeros(factor.shape[:2])
+    def _sample_modes(self, rows: MillingRows, random: np.random.Generator, seed: int, without: str) -> MillingRows:
+        phases = np.random.default_rng((seed, 1))
+        factor, turned = np.ones((*rows.frequency.shape, 3)), np.zeros(rows.frequency.shape)
         for cause, widths in self.modes.items():
             uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
             numbers = np.concatenate(uniform, axis=-1)
@@ -151,29 +159,16 @@ class Uncertainty:
             if cause != without:
                 factor *= np.maximum(1 + moved[..., :3], MIN_SAMPLE_FACTOR)
                 turned += moved[..., 3]
-        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != causes.SPEED.name)
-        spans = self.tangential, self.ratio
-        tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in spans)
-        if without == causes.COEFFICIENTS.name:
-            tangential, ratio = np.ones((2, count))
-        rows = median[np.zeros(count, dtype=np.intp)]
-        samples = replace(
-            rows,
-            frequency=rows.frequency * factor[..., 0],
-            damping_ratio=rows.damping_ratio * factor[..., 1],
-            stiffness=rows.stiffness * factor[..., 2],
-            phase=np.clip(rows.phase + turned, -MAX_MODE_PHASE, MAX_MODE_PHASE),
-            speed_rpm=rows.speed_rpm * np.maximum(speed, MIN_SAMPLE_FACTOR),
-            tangential=rows.tangential * np.maximum(tangential, MIN_SAMPLE_FACTOR),
-            radial=rows.radial * np.maximum(tangential, MIN_SAMPLE_FACTOR) * np.maximum(ratio, 0.0),
-        )
-        return self._with_sampled_axes(samples, seed, without)
+        rows = scale_fields(rows, frequency=factor[..., 0], damping_ratio=factor[..., 1], stiffness=factor[..., 2])
+        return replace(rows, phase=np.clip(rows.phase + turned, -MAX_MODE_PHASE, MAX_MODE_PHASE))
 
-    def _with_sampled_axes(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
-        """Sample the open principal directions."""
-        if self.axes is None or not self.axes.are_uncertain or without == causes.CROSS.name:
+    def _sample_coefficients(self, rows: MillingRows, random: np.random.Generator, without: str) -> MillingRows:
+        spans = self.tangential, self.ratio
+        tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, len(rows)) for span in spans)
+        if without == causes.COEFFICIENTS.name:
             return rows
-        return replace(rows, vector=self.axes.sample(len(rows), seed))
+        push = np.maximum(tangential, MIN_SAMPLE_FACTOR)
+        return scale_fields(scale_fields(rows, tangential=push, radial=push), radial=np.maximum(ratio, 0.0))
 
 
 def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Uncertainty:
@@ -195,13 +190,9 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
     """
     mixing = np.array([_tap_correlation(mode) for mode in (*(assembly.x or ()), *(assembly.y or ()))])
     speed, ranges = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
-    axes, wear = assembly.principal_directions, wear_factor_of(table, machine)
+    given = table.wear if isinstance(table, ProgramTable) else None
+    axes, wear = assembly.principal_directions, WEAR_FACTORS[given or machine.doubt.wear]
     return Uncertainty(_mode_uncertainty(assembly, machine.doubt), mixing, speed, *ranges, wear, axes)
-
-
-def wear_factor_of(table: CutTable, machine: Machine) -> float:
-    """Return the largest wear factor on the cutting coefficients, of the program or of [doubt]."""
-    return WEAR_FACTORS[(table.wear if isinstance(table, ProgramTable) else None) or machine.doubt.wear]
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:

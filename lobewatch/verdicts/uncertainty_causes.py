@@ -1,12 +1,11 @@
 """Causes of uncertainty with their names, labels and remedies."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 
 
-@dataclass(frozen=True)
-class Cause:
+class Cause(NamedTuple):
     """A cause of uncertainty with its texts, templates for `program_remarks.uncertainty_advice`."""
 
     name: str

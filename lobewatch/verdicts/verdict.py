@@ -15,11 +15,9 @@ from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS, SpindleAtSpeed
-from lobewatch.verdicts.uncertainty_causes import QUESTION, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -183,9 +181,11 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
     if stability is Stability.DOUBTFUL:
-        cause = _find_decisive_cause(case, result)
+        cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
+    worst = result.samples.with_lowest_cuts(0.0)
+    chattering = result.chatters if case.at_speed.n_cuts else draw_rotating_samples(worst).growth(case.depth)[1:] >= 0
     return Verdict(
         program=case.table,
         stability=stability,
@@ -194,7 +194,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         limit=median.limit,
         limit_low=min(result.low, median.limit),
         limit_high=max(result.high, median.limit),
-        chatter_risk=_estimate_chatter_risk(case, result),
+        chatter_risk=float(np.mean(chattering)),
         decisive_cause=cause,
         chatter_frequency=median.chatter_frequency,
         kind=median.kind,
@@ -240,22 +240,6 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
         return f"it rests on a tap test in question ({', '.join(codes)})", cure
     return None
-
-
-def _find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
-    """Return the name of the cause of uncertainty that decides a doubtful verdict."""
-    if case.assembly.questions:
-        return QUESTION.name
-    if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
-        return WORKPIECE.name
-    return program_remarks.find_decisive_cause(result, case.depth)
-
-
-def _estimate_chatter_risk(case: ProgramCase, result: MonteCarloResult) -> float:
-    """Estimate the chatter risk with the spindle rotating: as learned, or with plausible differences."""
-    if case.at_speed.n_cuts:
-        return float(np.mean(result.chatters))
-    return float(np.mean(draw_rotating_samples(result.samples.with_lowest_cuts(0.0)).growth(case.depth)[1:] >= 0))
 
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:

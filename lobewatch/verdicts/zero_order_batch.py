@@ -9,8 +9,6 @@ Exact where the force does not change over the turn (a slot cut by four teeth), 
 Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -75,7 +73,7 @@ class ZeroOrderBatch:
     """Mean force matrix of each (Pa) in machine x and y, shape (r, 2, 2)."""
 
     @classmethod
-    def of(cls, rows: MillingRows) -> ZeroOrderBatch:
+    def of(cls, rows: MillingRows) -> "ZeroOrderBatch":
         """Build the batch from rows, each fed in its own direction."""
         unit = replace(rows.cut, tangential=1.0, radial=0.0, feed_angle=0.0)
         tangential = mean_force(unit)

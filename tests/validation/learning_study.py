@@ -15,16 +15,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from shown_power import FEED, ShownPower
+from speed_grid import list_speeds
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, rows_at_speeds
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.expected_gain import CutGrid, list_speeds
-from lobewatch.cuts.learning.label_check import find_inconsistent_cuts
-from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.cuts.learning.suggestion import suggest_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence
+from lobewatch.cuts.learning.posterior import Posterior, build_prior, find_inconsistent_cuts
+from lobewatch.cuts.learning.suggestion import CutGrid, suggest_cut
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 

@@ -20,12 +20,11 @@ from lobes import build_milling_system, count_pieces, growth_rate, rows_at_speed
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase
 from lobewatch.verdicts.program_samples import draw_samples, find_worst_limit
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets, recommend
 from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
 from lobewatch.verdicts.setting_search import SettingSearch
-from lobewatch.verdicts.spindle_at_speed import NO_TEST_CUTS
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 
 STEP = 0.01
@@ -139,7 +138,7 @@ def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> 
 
 def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
     """Return whether the median and the critical samples allow a setting."""
-    at = search.case.at(speed, depth_mm)
+    at = search.case.with_changes(speed_rpm=speed, depth_mm=depth_mm)
     worst = find_worst_limit(at)
     if worst.limit.limit < (1 + MIN_DEPTH_MARGIN) * at.depth:
         return False

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from lobes import Cut
-from lobewatch.cuts.learning.cut_evidence import PowerEvidence, estimate_force_by_power
+from lobewatch.cuts.learning.cut_likelihood import PowerEvidence, estimate_force_by_power
 from lobewatch.machine.settings.drive_power import PowerReading
 
 DIAMETER, FEED, EDGE_LENGTH = 0.016, 1e-4, 2.5e-5

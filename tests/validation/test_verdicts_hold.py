@@ -14,7 +14,7 @@ from verdict_study import MACHINE, assembly, chattering, limit_mm, program, stud
 from lobes import count_pieces, growth_rate
 from lobewatch.machine import ToolWear
 from lobewatch.verdicts.monte_carlo import run_monte_carlo
-from lobewatch.verdicts.program_case import ProgramCase, build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase, build_program
 from lobewatch.verdicts.program_samples import build_median_row
 from lobewatch.verdicts.uncertainty import WEAR_FACTORS, uncertainty_of
 from lobewatch.verdicts.verdict import Stability, classify_stability, evaluate_program
@@ -76,7 +76,7 @@ def test_what_is_stable_in_the_whole_uncertainty_with_5_percent_to_spare_is_call
         tool, cut = assembly(milling), build_program(table, MACHINE)
         truths = uncertainty_of(tool, table, MACHINE).sample(build_median_row(cut, tool), 2000, seed=99)
         depths = np.full((2000, 1), 1.05 * cut.depth)
-        turned = [truths.with_cut(way) for way in cutting_conditions_of(table, MACHINE, tool)]
+        turned = [truths.with_cut(way) for way in ProgramCase(table, tool, MACHINE).cuts]
         if all(np.all(growth_rate(rows, depths, count_pieces(rows, 1.05 * cut.depth)) < 0) for rows in turned):
             called.append(evaluate_program(table, tool, MACHINE).stability is Stability.STABLE)
     say(f"{share(sum(called), len(called))} called stable")

@@ -21,7 +21,7 @@ from lobes import program_limit
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_case import build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase, build_program
 from lobewatch.verdicts.recommendation import advise
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode
@@ -112,7 +112,7 @@ def upper_limit(number: int, of: int) -> float:
 def limit_mm(milling: RandomMilling) -> float:
     """Deepest stable depth (mm) without uncertainty."""
     table = program(milling, 2.0)
-    cuts = cutting_conditions_of(table, MACHINE, assembly(milling))
+    cuts = ProgramCase(table, assembly(milling), MACHINE).cuts
     return 1e3 * program_limit(build_program(table, MACHINE), *_modes(milling), cuts).limit
 
 

@@ -4,7 +4,6 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 (docs/cuts.md, How often it is right).
 """
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +13,9 @@ from lobewatch.cuts.chatter_detection import peak_classification as classificati
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 from lobewatch.machine.journal.entries import CutVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -41,8 +40,7 @@ END_PEAK_TOLERANCE = 1.0
 """Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
 
 
-@dataclass(frozen=True, eq=False)
-class CutEvaluation:
+class CutEvaluation(NamedTuple):
     """Evaluation of one cut in a recording with its evidence; None and NaN for steps that were not reached."""
 
     verdict: CutVerdict
@@ -107,14 +105,14 @@ def evaluate_cut(
     """
     spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
-        return replace(_evaluate_without_air(spectra, teeth, commanded_rpm / 60), reason="no-air")
+        return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
     quiet = spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
     speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
     axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
-    sounds = [replace(_evaluate_axis(*axis, speed, teeth, immersion), axis=i) for i, axis in enumerate(axes)]
+    sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
@@ -129,14 +127,15 @@ def _evaluate_axis(
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
     unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
-    by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
-    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=by_origin, spectrum=spectrum)
-    judged = _evaluate_peaks(sound, cut, teeth, immersion)
-    if judged.reason != "unexplained-tone":
-        return judged
-    tones = classification.add_air_tones(quiet, air, by_origin.unexplained.frequency)
-    by_origin = classification.classify_peaks(peaks, spectrum, tones, speed, teeth, unsteady)
-    return _evaluate_peaks(replace(sound, peaks=by_origin), cut, teeth, immersion)
+
+    def evaluate(quiet: Spectrum) -> CutEvaluation:
+        by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
+        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion)
+
+    sound = evaluate(quiet)
+    if sound.reason != "unexplained-tone" or sound.peaks is None:
+        return sound
+    return evaluate(classification.add_air_tones(quiet, air, sound.peaks.unexplained.frequency))
 
 
 def _find_speed(
@@ -159,17 +158,16 @@ def _find_speed(
 
 def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> CutEvaluation:
     """Evaluate the speed only, if there is no air or its spectrum is that of the cut."""
-    silence = [replace(spectrum, power=np.zeros(spectrum.power.size)) for spectrum in spectra]
-    speed = spindle_speed.find_speed_of_spectra(spectra, silence, teeth, commanded)
+    air = [spectrum._replace(power=np.zeros(spectrum.power.size)) for spectrum in spectra]
+    speed = spindle_speed.find_speed_of_spectra(spectra, air, teeth, commanded)
     if speed is None:
         return _speed_not_found(spectra[0], np.nan)
-    peaks = classification.find_cut_peaks(spectra, silence)
-    reach = classification.PEAK_TOLERANCE * spectra[0].bin_width
+    peaks = classification.find_cut_peaks(spectra, air)
+    reach = spectral.PEAK_TOLERANCE * spectra[0].bin_width
     others = peaks[spectral.fold_frequency(peaks.frequency, speed.frequency) > reach]
-    if len(others):
-        distant = 60 * spindle_speed.find_distant_speed(spectra, silence, teeth, commanded, speed, others)
-        if np.isfinite(distant):
-            return _speed_not_found(spectra[0], distant)
+    distant = spindle_speed.find_distant_speed(spectra, air, teeth, commanded, speed, others) if len(others) else np.nan
+    if np.isfinite(distant):
+        return _speed_not_found(spectra[0], 60 * distant)
     return CutEvaluation("cannot tell", "no-air", spindle_speed=speed, spectrum=spectra[0])
 
 
@@ -180,23 +178,20 @@ def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
 
 def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
     """Rank an axis: chatter first, then by energy."""
-    if sound.peaks is None:
-        return False, 0.0
-    if sound.chatter is not None:
-        return True, sound.chatter.peaks.energy
-    return False, sound.peaks.comb.energy
+    peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
+    return sound.chatter is not None, peaks.energy if peaks else 0.0
 
 
-def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion: float) -> CutEvaluation:
+def _evaluate_peaks(
+    peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
+) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
-    peaks, speed, spectrum = sound.peaks, sound.spindle_speed, sound.spectrum
-    if peaks is None or speed is None or spectrum is None:
-        raise ValueError("a cut whose lines are not known cannot be judged")
+    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
-        return replace(sound, verdict="cannot tell", reason="slow-sampling")
+        return sound._replace(verdict="cannot tell", reason="slow-sampling")
     if not len(peaks.unexplained):
-        return _evaluate_without_chatter(sound, teeth, immersion)
+        return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
     end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
@@ -204,27 +199,25 @@ def _evaluate_peaks(sound: CutEvaluation, signal: Floats, teeth: int, immersion:
     at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
     still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
-    sound = replace(sound, energy_ratio=ratio)
+    sound = sound._replace(energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
-        return _evaluate_without_chatter(sound, teeth, immersion)
+        return _evaluate_stable(sound, peaks, teeth, immersion)
     if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
-        return replace(sound, verdict="cannot tell", reason="faint")
+        return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
-        return replace(sound, verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
+        return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
-    return replace(sound, verdict="flip" if half else "chatter", chatter=chatter)
+    return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
 
 
-def _evaluate_without_chatter(sound: CutEvaluation, teeth: int, immersion: float) -> CutEvaluation:
+def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
     """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
-    if sound.peaks is None:
-        return sound
-    power, order = sound.peaks.comb.amplitude**2, sound.peaks.tooth_order
+    power, order = peaks.comb.amplitude**2, peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))
     is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))
     is_loud = immersion < SLOT_IMMERSION and np.sum(power[~tooth]) > MAX_RUNOUT_ENERGY * np.sum(power[tooth])
-    return replace(sound, verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
+    return sound._replace(verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
 def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
@@ -278,7 +271,7 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     air = axes[:, slice(0, 0) if reason else parts.air]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
     sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
-    return replace(sound, parts=parts, measured_rpm=measured)
+    return sound._replace(parts=parts, measured_rpm=measured)
 
 
 def _mean_speed(speed: Floats) -> float:

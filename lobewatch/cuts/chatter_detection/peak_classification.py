@@ -1,13 +1,13 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats, Indices, Integers
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, find_peaks, fold_frequency
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
 N_STEADINESS_PARTS = 4
 """Number of parts into which a cut is divided."""
@@ -15,8 +15,6 @@ N_STEADINESS_PEAKS = 8
 """Number of checked harmonics."""
 MAX_UNSTEADINESS = 2e-3
 """Largest relative speed change that is searched."""
-MIN_UNSTEADINESS = 1e-4
-"""Relative speed variation of every spindle; chosen."""
 UNSTEADINESS_FACTOR = 3.0
 """Speed variation over that of the means of the parts, as speed also varies within a part; chosen."""
 MIN_STEADINESS_PEAKS = 3
@@ -32,7 +30,7 @@ def estimate_unsteadiness(
     comb = (np.abs(peaks.frequency - order * turning.frequency) < reach) & (order > 1)
     loudest = peaks[comb].loudest(N_STEADINESS_PEAKS)
     if not len(loudest):
-        return MIN_UNSTEADINESS
+        return spectral.MIN_UNSTEADINESS
     orders = np.round(loudest.frequency / turning.frequency)
     changes = []
     for part in np.array_split(signal, N_STEADINESS_PARTS):
@@ -40,7 +38,7 @@ def estimate_unsteadiness(
         if heard.size:
             nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
             changes.append(_speed_change(nearest / (orders * turning.frequency) - 1))
-    return max(MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
+    return max(spectral.MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
 
 
 def _speed_change(off: Floats) -> float:
@@ -52,12 +50,6 @@ def _speed_change(off: Floats) -> float:
     return abs(float(middle)) if high - low < abs(middle) else 0.0
 
 
-PEAK_TOLERANCE = 1.2
-"""Largest distance of a peak from a frequency that it belongs to (bins)."""
-MAX_AIR_POWER_RATIO = 9.0
-"""Power of a peak over its power in air, up to which it is not caused by the cut."""
-AIR_PEAK_TOLERANCE = 2.0
-"""Distance up to which a peak in air is the same peak (bins of the air spectrum)."""
 AIR_PIECE_LENGTH = 0.5
 """Length of the overlapping pieces of air that are searched for intermittent tones (s); chosen."""
 MIN_TONE_POWER_RATIO, TONE_NOISE_BINS = 12.0, 8
@@ -68,8 +60,6 @@ MAX_FOLDED_RATES = 2.0
 """Upper end of the searched harmonics (sample rates), as a device without a filter folds them back."""
 UPPER_BAND_SHARE = 0.7
 """Share of half the sample rate above which the loudest harmonic limits the folded ones (`MAX_FOLDED_AMPLITUDE`)."""
-MAX_HARMONICS = 16
-"""Number of harmonics below half the sample rate, under which any harmonic limits the folded ones; chosen."""
 MIN_TOOTH_HARMONICS = 3
 """Number of tooth passing harmonics below half the sample rate, under which folded ones may have any amplitude."""
 FOLDED_PEAK_SLACK = 1e-3
@@ -84,8 +74,7 @@ MAX_SPEED_ERRORS = 3.0
 """Standard errors of the spindle frequency within which its harmonics are searched; chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class PeaksByOrigin:
+class PeaksByOrigin(NamedTuple):
     """All peaks of a cut by origin."""
 
     comb: SpectralPeaks
@@ -102,8 +91,8 @@ class PeaksByOrigin:
 
 def is_in_air(peaks: SpectralPeaks, air: Spectrum) -> Flags:
     """Return whether each peak is in air, too."""
-    power = air.max_power_near(peaks.frequency, AIR_PEAK_TOLERANCE)
-    return np.asarray(peaks.amplitude**2 <= MAX_AIR_POWER_RATIO * power)
+    power = air.max_power_near(peaks.frequency, spectral.AIR_PEAK_TOLERANCE)
+    return np.asarray(peaks.amplitude**2 <= spectral.MAX_AIR_POWER_RATIO * power)
 
 
 def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
@@ -114,7 +103,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
-    reaches = round(AIR_PEAK_TOLERANCE), TONE_NOISE_BINS
+    reaches = round(spectral.AIR_PEAK_TOLERANCE), TONE_NOISE_BINS
     near, tolerance = (_bins_around(frequency / step, bins, size // 2) for bins in reaches)
     for begin in range(0, signal.size - size + 1, size // 2):
         power = spectral.compute_power(signal[begin : begin + size], size)
@@ -122,7 +111,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
         level = np.maximum(level, np.where(tone > MIN_TONE_POWER_RATIO * noise, tone, 0.0))
     power = air.power.copy()
     np.maximum.at(power, np.round(frequency / air.frequency[1]).astype(int), level)
-    return replace(air, power=power)
+    return air._replace(power=power)
 
 
 def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
@@ -151,10 +140,11 @@ def classify_peaks(
     order = np.round(peaks.frequency / turning.frequency)
     away = np.abs(peaks.frequency - order * turning.frequency)
     unsure = order * (MAX_SPEED_ERRORS * turning.error + unsteady * turning.frequency)
-    comb = (away < PEAK_TOLERANCE * spectrum.bin_width + unsure) & (order > 0)
+    comb = (away < spectral.PEAK_TOLERANCE * spectrum.bin_width + unsure) & (order > 0)
     foreign = ~comb & is_in_air(peaks, air)
     half = spectrum.sample_rate / 2
-    upper = comb & (peaks.frequency > (UPPER_BAND_SHARE * half if half > MAX_HARMONICS * turning.frequency else 0.0))
+    lowest = UPPER_BAND_SHARE * half if half > spectral.MAX_HARMONICS * turning.frequency else 0.0
+    upper = comb & (peaks.frequency > lowest)
     loudest = float(np.max(peaks.amplitude[upper], initial=0.0))
     is_bounded = (peaks.amplitude <= MAX_FOLDED_AMPLITUDE * loudest) | is_undersampled(spectrum, turning, teeth)
     back = _is_folded(peaks, spectrum, turning, teeth, unsteady) & is_bounded & ~(comb | foreign)
@@ -168,7 +158,8 @@ def _remove_wavering(left: SpectralPeaks, comb: SpectralPeaks, bin_width: float,
     """Remove faint peaks next to spindle harmonics, caused by a speed that wavers quickly."""
     if left.energy > MAX_WAVERING_ENERGY * comb.energy:
         return left
-    return left[fold_frequency(left.frequency, turn) > MAX_UNSTEADINESS * left.frequency + PEAK_TOLERANCE * bin_width]
+    near = MAX_UNSTEADINESS * left.frequency + spectral.PEAK_TOLERANCE * bin_width
+    return left[fold_frequency(left.frequency, turn) > near]
 
 
 def _is_folded(peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float) -> Flags:
@@ -181,7 +172,7 @@ def _is_folded(peaks: SpectralPeaks, spectrum: Spectrum, turning: SpindleSpeed, 
     slack = np.where(is_undersampled(spectrum, turning, teeth) & (orders % teeth == 0), FOLDED_PEAK_SLACK, 0.0)
     unsure = orders * (MAX_SPEED_ERRORS * turning.error + (unsteady + slack) * turning.frequency)
     away = np.abs(peaks.frequency[:, np.newaxis] - folded) - unsure
-    return np.asarray(np.min(away, axis=1, initial=np.inf) < PEAK_TOLERANCE * spectrum.bin_width)
+    return np.asarray(np.min(away, axis=1, initial=np.inf) < spectral.PEAK_TOLERANCE * spectrum.bin_width)
 
 
 MIN_CHATTER_AMPLITUDE = 0.1
@@ -198,8 +189,7 @@ MIN_FAMILY_ENERGY = 0.25
 """Smallest energy of the chosen family over that of the largest."""
 
 
-@dataclass(frozen=True, eq=False)
-class ChatterPeaks:
+class ChatterPeaks(NamedTuple):
     """One family of chatter peaks."""
 
     frequency: float
@@ -221,7 +211,7 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
     named = np.where(left.amplitude >= MIN_CHATTER_AMPLITUDE * np.max(left.amplitude), weight, 0.0)
     anchors = [i for i in np.argsort(-named)[:MAX_CHATTER_ANCHORS] if named[i] > 0]
     clear = np.where(part, np.log10(left.clearness), 0.0)
-    tops, reach = left.frequency[anchors], PEAK_TOLERANCE * bin_width
+    tops, reach = left.frequency[anchors], spectral.PEAK_TOLERANCE * bin_width
     families = [spectral.sideband_distance(left.frequency, top, tooth_frequency) < reach for top in tops]
     energy = np.array([np.sum(weight[family]) for family in families])
     explained = np.array([_find_explained(left, top, tooth_frequency, bin_width) @ clear for top in tops])
@@ -235,7 +225,7 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:
     """Return whether chatter has a peak k tooth passings or one turn away: a cut makes them, a pump does not. In Hz."""
     apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
-    return len(chatter.peaks) > 1 or bool(np.any(apart < PEAK_TOLERANCE * bin_width))
+    return len(chatter.peaks) > 1 or bool(np.any(apart < spectral.PEAK_TOLERANCE * bin_width))
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_width: float) -> Floats:
@@ -243,5 +233,5 @@ def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: floa
     explained = np.zeros(len(left))
     for order in range(1, CHATTER_HARMONICS + 1):
         apart = spectral.sideband_distance(left.frequency, order * frequency, tooth_frequency)
-        explained[apart < PEAK_TOLERANCE * bin_width * max(1.0, order / 2)] = 1.0
+        explained[apart < spectral.PEAK_TOLERANCE * bin_width * max(1.0, order / 2)] = 1.0
     return explained

@@ -1,9 +1,8 @@
 """Spectra of recorded cuts, their peaks above the noise, and folded frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -40,12 +39,21 @@ SKIRT_AMPLITUDE_RATIO = 3.0
 """Amplitude of a peak over that of a fainter one on its skirt, a tenth of its power."""
 PEAK_FREQUENCY_ERROR = 0.3
 """Standard error of the frequency of a peak times the root of its signal-to-noise ratio (bins)."""
+MIN_UNSTEADINESS = 1e-4
+"""Relative speed variation of every spindle; chosen."""
+PEAK_TOLERANCE = 1.2
+"""Largest distance of a peak from a frequency that it belongs to (bins)."""
+MAX_AIR_POWER_RATIO = 9.0
+"""Power of a peak over its power in air, up to which it is not caused by the cut."""
+AIR_PEAK_TOLERANCE = 2.0
+"""Distance up to which a peak in air is the same peak (bins of the air spectrum)."""
+MAX_HARMONICS = 16
+"""Number of harmonics below half the sample rate, under which any harmonic limits the folded ones; chosen."""
 MIN_PEAK_FREQUENCY_ERROR = 0.03
 """Smallest standard error of the frequency of a peak (bins)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Spectrum:
+class Spectrum(NamedTuple):
     """Spectrum of a part of a recording."""
 
     frequency: Floats
@@ -80,7 +88,7 @@ class SpectralPeaks:
     clearness: Floats
     """Signal-to-noise ratio of the power of each peak, shape (n,)."""
 
-    def __getitem__(self, places: Flags | Indices) -> SpectralPeaks:
+    def __getitem__(self, places: Flags | Indices) -> "SpectralPeaks":
         return SpectralPeaks(self.frequency[places], self.amplitude[places], self.clearness[places])
 
     def __len__(self) -> int:
@@ -91,7 +99,7 @@ class SpectralPeaks:
         """Energy of all peaks ((m/s^2)^2)."""
         return float(np.sum(self.amplitude**2))
 
-    def loudest(self, count: int) -> SpectralPeaks:
+    def loudest(self, count: int) -> "SpectralPeaks":
         """Return the loudest peaks, the loudest first, at most `count`."""
         return self[np.argsort(-self.amplitude)[:count]]
 

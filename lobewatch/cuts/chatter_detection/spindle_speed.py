@@ -6,10 +6,9 @@ import scipy
 from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed, refine_speed
-from lobewatch.cuts.chatter_detection.peak_classification import PEAK_TOLERANCE, find_cut_peaks
+from lobewatch.cuts.chatter_detection.peak_classification import find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, fold_frequency
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, find_comb, find_comb_by_sum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed, find_comb, find_comb_by_sum, refine_speed
 
 COMB_SPEED_TOLERANCE = 0.05
 """Relative distance from the commanded speed within which a plain comb is searched."""
@@ -48,28 +47,11 @@ MIN_AGREEING_PEAKS = 3
 """Smallest number of matching peaks, as a pump has a comb, too."""
 
 
-def find_spindle_speed(
-    cut: Floats, air: Floats, sample_rate: float, teeth: int, commanded_rpm: float
-) -> SpindleSpeed | None:
-    """Find the spindle frequency (Hz) in the steady part of a cut, near the commanded speed (rpm), or None.
-
-    cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
-
-    Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
-
-    >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
-    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
-    >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
-    >>> speed = find_spindle_speed(cut, air, 10e3, 4, 6020.0)
-    >>> round(60 * speed.frequency)
-    6000
-    """
-    spectra, quiet = (spectral.compute_spectra(part, sample_rate) for part in (cut, air))
-    return find_speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
-
-
 def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
-    """`find_spindle_speed` of the spectra of all axes; commanded in spindle frequency (Hz)."""
+    """Find the spindle frequency (Hz) in the steady part of a cut, near the commanded one (Hz), or None.
+
+    spectra: of all axes of the cut; air: of the same spindle without a cut.
+    """
     peaks, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
@@ -101,7 +83,7 @@ def find_speed_by_votes(
     sum and each peak itself votes for the frequencies that it is a harmonic of, for harmonics of the teeth twice:
     chatter f_c + k f counts as much as the harmonics k f. The best is made exact by least squares.
     """
-    loudest = cut_lines.loudest(MAX_COMB_PEAKS)
+    loudest = cut_lines.loudest(combs.MAX_COMB_PEAKS)
     if len(loudest) < 2:
         return None
     bin_width = spectrum.bin_width
@@ -150,14 +132,11 @@ def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: floa
         inside = (place >= 0) & (place < grid.size)
         if np.any(inside):
             counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
-            votes += _smooth_votes(counted.astype(np.float64), np.sqrt(2) * sharpness / order / step)
+            width = np.sqrt(2) * sharpness / order / step
+            reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
+            spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+            votes += np.convolve(counted.astype(np.float64), spread, "same")
     return votes
-
-
-def _smooth_votes(votes: Floats, width: float) -> Floats:
-    """Spread each vote over its neighbors; width: standard deviation in grid steps."""
-    reach = min(int(np.ceil(VOTE_REACH * width)), (votes.size - 1) // 2)
-    return np.convolve(votes, np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2), "same")
 
 
 TACHOMETER_TOLERANCE = 2e-3
@@ -200,10 +179,10 @@ def is_pulse_multiple(ratio: float) -> bool:
 def _use_tachometer_speed(spectra: Spectra, air: Spectra, measured: float) -> SpindleSpeed | None:
     """Return the speed of the tachometer if some peaks are its harmonics, else None."""
     peaks, bin_width = find_cut_peaks(spectra, air), spectra[0].bin_width
-    n_own = int(np.count_nonzero(fold_frequency(peaks.frequency, measured) < PEAK_TOLERANCE * bin_width))
+    n_own = int(np.count_nonzero(fold_frequency(peaks.frequency, measured) < spectral.PEAK_TOLERANCE * bin_width))
     if n_own < MIN_AGREEING_PEAKS:
         return None
-    refined = refine_speed(measured, peaks.loudest(MAX_COMB_PEAKS), bin_width)
+    refined = refine_speed(measured, peaks.loudest(combs.MAX_COMB_PEAKS), bin_width)
     return SpindleSpeed(measured, TACHOMETER_ERROR * measured, refined.share, n_own, refined.misfit)
 
 
@@ -227,12 +206,13 @@ def find_distant_speed(
     clearest = combs.find_distant_comb(peaks, *about, commanded, COMB_SPEED_TOLERANCE)
     if known is None or left is None:
         return np.nan if clearest is None else clearest.frequency
-    hums = [hum for hum in HUM_FREQUENCIES if not _is_mains_speed(known, hum)]
+    mains_speeds = {hum: (known.frequency / hum, known.frequency / (2 * hum)) for hum in HUM_FREQUENCIES}
+    hums = [hum for hum, ratios in mains_speeds.items() if all(abs(ratio - 1) >= HUM_TOLERANCE for ratio in ratios)]
     mains = [find_comb(peaks, *about, hum, HUM_TOLERANCE) for hum in hums]
     plain = [comb for comb in (clearest, *mains) if comb is not None and comb.agreeing >= known.agreeing]
     centres = combs.list_distant_centers(commanded, COMB_SPEED_TOLERANCE)
     sums = (find_comb_by_sum(spectra, air, peaks, teeth, centre, COMB_SPEED_TOLERANCE) for centre in centres)
-    loudest = peaks.loudest(MAX_COMB_PEAKS)
+    loudest = peaks.loudest(combs.MAX_COMB_PEAKS)
     width = first.bin_width
     agreeing = refine_speed(known.frequency, loudest, width).agreeing
     summed = [comb for comb in sums if comb and refine_speed(comb.frequency, loudest, width).agreeing > agreeing]
@@ -242,7 +222,7 @@ def find_distant_speed(
 
 def _is_better_comb(comb: SpindleSpeed, known: SpindleSpeed, others: SpectralPeaks, bin_width: float) -> bool:
     """Return whether most peaks that are no harmonics of a speed fit another comb, not that of half of it."""
-    belongs = fold_frequency(others.frequency, comb.frequency) < PEAK_TOLERANCE * bin_width
+    belongs = fold_frequency(others.frequency, comb.frequency) < spectral.PEAK_TOLERANCE * bin_width
     is_half = abs(2 * comb.frequency / known.frequency - 1) < SAME_SPEED_TOLERANCE
     share = np.count_nonzero(belongs) / len(others), others[belongs].energy / others.energy
     return not is_half and max(share) > MIN_DISTANT_SHARE
@@ -252,8 +232,3 @@ def _rank_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> tupl
     """Rank a comb by the tenths of peaks that are its harmonics, then by its frequency."""
     comb = combs.refine_comb(frequency, peaks, bin_width)
     return (0.0 if comb is None else round(10 * comb.share), frequency)
-
-
-def _is_mains_speed(speed: SpindleSpeed, hum: float) -> bool:
-    """Return whether a spindle turns as fast as a hum (Hz), or twice as fast."""
-    return any(abs(speed.frequency / (times * hum) - 1) < HUM_TOLERANCE for times in (1, 2))

@@ -1,19 +1,104 @@
-"""Find the comb of spindle harmonics in spectral peaks, or by a harmonic sum."""
+"""Fit spindle harmonics to spectral peaks: a grid with sidebands, or the comb alone, also by a harmonic sum."""
 
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from lobewatch.arrays import Flags, Floats
-from lobewatch.cuts.chatter_detection.harmonic_grid import MAX_GRID_ERRORS, SpindleSpeed
-from lobewatch.cuts.chatter_detection.peak_classification import AIR_PEAK_TOLERANCE, MAX_AIR_POWER_RATIO, MAX_HARMONICS
+from lobewatch.arrays import Flags, Floats, Indices
+from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, find_peaks, fold_frequency, join_peaks
 
-COMB_TOLERANCE = 1.2
-"""Distance from a harmonic within which a peak belongs to it (bins), the width of a peak (`PEAK_TOLERANCE`)."""
-COMB_SPEED_WAVER = 1e-4
-"""Relative speed variation of every spindle (`MIN_UNSTEADINESS`), by which harmonics are uncertain."""
+MAX_SIDEBAND_FAMILIES = 4
+"""Largest number of sideband families, one for each frequency that is not a harmonic."""
+MAX_GRID_ERRORS = 10.0
+"""Distance (standard errors) above which a peak is not on the harmonic grid."""
+GRID_TOLERANCES = 1.2, 0.6, 0.6, 0.6
+"""Distances (bins) within which peaks belong to the harmonic grid, one for each least-squares step; chosen.
+
+The first is a peak width (`PEAK_TOLERANCE`), since a speed by votes is rough, the others half of that."""
+MAX_SPEED_CHANGE = 0.005
+"""Relative change of the spindle frequency above which least squares have diverged; chosen."""
+
+
+class SidebandFamily(NamedTuple):
+    """Peaks at sign * r + k f with the spindle frequency f."""
+
+    indices: Indices
+    """Indices of the peaks of the family, shape (n,)."""
+    sign: Floats
+    """Sign of r in each peak, shape (n,); 0 if r is 0."""
+    order: Floats
+    """Order k of each peak, shape (n,)."""
+
+
+class SpindleSpeed(NamedTuple):
+    """True spindle speed with its error."""
+
+    frequency: float
+    """Spindle frequency (Hz)."""
+    error: float
+    """Standard error (Hz); inf unless it follows from several peaks."""
+    share: float
+    """Share of the checked peaks that it explains."""
+    agreeing: int
+    """Number of matching peaks beyond those that determine it."""
+    misfit: float
+    """Mean square distance of all peaks from it, in standard errors of each, at most `MAX_GRID_ERRORS` squared."""
+
+
+def refine_speed(frequency: float, peaks: SpectralPeaks, bin_width: float) -> SpindleSpeed:
+    """Refine a spindle frequency (Hz) by least squares over its harmonic grid; bin_width: of the spectrum (Hz)."""
+    speed = SpindleSpeed(frequency, np.inf, 0.0, 0, MAX_GRID_ERRORS**2)
+    for tolerance in GRID_TOLERANCES:
+        families = find_sideband_families(speed.frequency, peaks, tolerance * bin_width)
+        rows = np.concatenate([_design_rows(family, number, len(families)) for number, family in enumerate(families)])
+        places = np.concatenate([family.indices for family in families])
+        if np.linalg.matrix_rank(rows) < len(families):
+            return speed
+        root = 1 / peaks[places].frequency_error(bin_width)
+        scaled, measured = rows * root[:, np.newaxis], peaks.frequency[places] * root
+        solution = np.linalg.lstsq(scaled, measured, rcond=None)[0]
+        if abs(solution[0] / frequency - 1) > MAX_SPEED_CHANGE:
+            return speed
+        error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
+        away = np.minimum(np.abs(scaled @ solution - measured), MAX_GRID_ERRORS)
+        misfit = float(np.sum(away**2) + (len(peaks) - places.size) * MAX_GRID_ERRORS**2) / len(peaks)
+        share, agreeing = places.size / len(peaks), places.size - len(families)
+        speed = SpindleSpeed(float(solution[0]), error, share, agreeing, misfit)
+    return speed
+
+
+def find_sideband_families(frequency: float, peaks: SpectralPeaks, tolerance: float) -> list[SidebandFamily]:
+    """Find the harmonics of a frequency (Hz), then the sideband families of the clearest peaks left."""
+    order = np.round(peaks.frequency / frequency)
+    comb = (np.abs(peaks.frequency - order * frequency) < tolerance) & (order > 0)
+    families = [SidebandFamily(np.flatnonzero(comb), np.zeros(int(comb.sum())), order[comb])]
+    left = ~comb
+    for _ in range(MAX_SIDEBAND_FAMILIES):
+        if not np.any(left):
+            break
+        anchor = peaks.frequency[np.flatnonzero(left)[np.argmax(peaks.clearness[left])]]
+        beyond, mirrored = peaks.frequency - anchor, peaks.frequency + anchor
+        up, down = np.round(beyond / frequency), np.round(mirrored / frequency)
+        off, off_mirrored = np.abs(beyond - up * frequency), np.abs(mirrored - down * frequency)
+        members = left & (np.minimum(off, off_mirrored) < tolerance)
+        sign = np.where(off <= off_mirrored, 1.0, -1.0)
+        if np.count_nonzero(members) > 1:
+            order = np.where(sign > 0, up, down)
+            families.append(SidebandFamily(np.flatnonzero(members), sign[members], order[members]))
+        left &= ~members
+    return families
+
+
+def _design_rows(family: SidebandFamily, number: int, count: int) -> Floats:
+    """Return the rows of the least-squares problem for one family, shape (n, count)."""
+    rows = np.zeros((family.indices.size, count))
+    rows[:, number] = family.sign
+    rows[:, 0] = family.order
+    return rows
+
+
 MAX_COMB_PEAKS = 40
 """Largest number of checked peaks."""
 MAX_COMB_ANCHORS = 16
@@ -52,8 +137,9 @@ def find_comb(
     it is a harmonic of; those of the loudest are compared, after least squares, by the peaks that they explain.
     """
     peaks = peaks.loudest(MAX_COMB_PEAKS)
-    few = sample_rate / 2 < MAX_HARMONICS * frequency  # those that are folded back count too
-    folded = _folded_images(peaks, sample_rate)
+    few = sample_rate / 2 < spectral.MAX_HARMONICS * frequency  # those that are folded back count too
+    levels = peaks.frequency
+    folded = np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
     for images in (folded[:1], folded) if few else (folded[:1],):
         best = _pick_comb(peaks, images, bin_width, frequency, tolerance)
         if best is not None and _comb_chance(best, peaks, images, bin_width, teeth, tolerance) < MAX_COMB_CHANCE:
@@ -75,7 +161,7 @@ def find_distant_comb(
         if comb is None or comb.share < MIN_COMB_SHARE:
             continue
         order = np.round(peaks.frequency / comb.frequency).astype(int)
-        is_near = np.abs(peaks.frequency - order * comb.frequency) < COMB_TOLERANCE * bin_width
+        is_near = np.abs(peaks.frequency - order * comb.frequency) < spectral.PEAK_TOLERANCE * bin_width
         common = int(np.gcd.reduce(order[is_near]))
         ranked = round(comb.share, 1), common == teeth, comb.frequency
         if common and teeth % common == 0 and ranked > rank:
@@ -93,12 +179,6 @@ def refine_comb(frequency: float, peaks: SpectralPeaks, bin_width: float) -> Spi
     """Refine a frequency (Hz) by least squares over its harmonics among peaks; None without any."""
     comb = _fit_comb(frequency, peaks, peaks.frequency[np.newaxis], bin_width)
     return _comb_speed(comb, peaks, bin_width) if np.any(comb.is_member) else None
-
-
-def _folded_images(peaks: SpectralPeaks, sample_rate: float) -> Floats:
-    """Return the frequencies that may have been folded to each peak (Hz), itself first; shape (images, n)."""
-    levels = peaks.frequency
-    return np.stack([levels, sample_rate - levels, sample_rate + levels, 2 * sample_rate - levels])
 
 
 def _pick_comb(peaks: SpectralPeaks, images: Floats, width: float, frequency: float, tolerance: float) -> Comb | None:
@@ -136,12 +216,12 @@ def _build_comb(frequency: float, images: Floats, bin_width: float) -> Comb:
     beyond = np.where(orders > 0, images - orders * frequency, np.inf)
     nearest = np.argmin(np.abs(beyond), axis=0)[np.newaxis]
     order, away = (np.take_along_axis(values, nearest, axis=0)[0] for values in (orders, beyond))
-    return Comb(frequency, np.abs(away) < COMB_TOLERANCE * bin_width, order, away)
+    return Comb(frequency, np.abs(away) < spectral.PEAK_TOLERANCE * bin_width, order, away)
 
 
 def _peak_error(peaks: SpectralPeaks, bin_width: float) -> Floats:
     """Return the standard error of each peak (Hz), with the variation of the speed."""
-    return np.hypot(peaks.frequency_error(bin_width), COMB_SPEED_WAVER * peaks.frequency)
+    return np.hypot(peaks.frequency_error(bin_width), spectral.MIN_UNSTEADINESS * peaks.frequency)
 
 
 def _comb_chance(comb: Comb, peaks: SpectralPeaks, images: Floats, width: float, teeth: int, tolerance: float) -> float:
@@ -153,9 +233,9 @@ def _comb_chance(comb: Comb, peaks: SpectralPeaks, images: Floats, width: float,
     if orders.size < MIN_COMB_HARMONICS:
         return np.inf
     spacing = comb.frequency * (1 if np.any(orders % teeth) else teeth)
-    near = min(2 * COMB_TOLERANCE * width / spacing * len(images), 1.0)
-    tried = max(tolerance * float(np.max(images)) / (COMB_TOLERANCE * width), 1.0)
-    apart = np.unique(np.round(peaks.frequency / (2 * COMB_TOLERANCE * width))).size
+    near = min(2 * spectral.PEAK_TOLERANCE * width / spacing * len(images), 1.0)
+    tried = max(tolerance * float(np.max(images)) / (spectral.PEAK_TOLERANCE * width), 1.0)
+    apart = np.unique(np.round(peaks.frequency / (2 * spectral.PEAK_TOLERANCE * width))).size
     return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
 
 
@@ -204,7 +284,7 @@ def find_comb_by_sum(
     if len(peaks) >= MAX_COMB_PEAKS * len(spectra):
         return None
     first, above = spectra[0], _mean_level(spectra, air)
-    highest = int(min(MAX_HARMONICS, first.sample_rate / 2 / (center * (1 + tolerance))))
+    highest = int(min(spectral.MAX_HARMONICS, first.sample_rate / 2 / (center * (1 + tolerance))))
     lowest, most = (1 - tolerance) * center, (1 + tolerance) * center
     tried = np.arange(lowest, most, SUM_FREQUENCY_STEP * first.bin_width / max(highest, 1))
     parts = np.array([np.interp(k * tried, first.frequency, above) for k in range(1, highest + 1)])
@@ -229,8 +309,8 @@ def _mean_level(spectra: Spectra, air: Spectra) -> Floats:
     total = np.zeros(spectra[0].power.size)
     for spectrum, quiet in zip(spectra, air, strict=True):
         above = np.log10(np.maximum(spectrum.power, np.finfo(np.float64).tiny) / spectrum.noise) - MIN_HARMONIC_LEVEL
-        power = quiet.max_power_near(spectrum.frequency, AIR_PEAK_TOLERANCE)
-        above[spectrum.power <= MAX_AIR_POWER_RATIO * power] = 0.0
+        power = quiet.max_power_near(spectrum.frequency, spectral.AIR_PEAK_TOLERANCE)
+        above[spectrum.power <= spectral.MAX_AIR_POWER_RATIO * power] = 0.0
         total += np.clip(above, 0.0, MAX_HARMONIC_LEVEL)
     return total / len(spectra)
 

@@ -1,17 +1,18 @@
-"""Depths of stable pockets by test cuts only, for tap tests without a force sensor."""
+"""Test cuts of a tool as evidence, and depths of stable pockets by them only, for taps without a force sensor."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition import Remark
-from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence
-from lobewatch.cuts.learning.program_learning import collect_evidence
-from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.journal.entries import geometry_key
+from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence, estimate_force_by_power
+from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
+from lobewatch.machine.journal.entries import CutEntry, geometry_key
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
 from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.tap_series import interpolate_frequency
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
 from lobewatch.verdicts.verdict import NOT_CHECKED_CODE, Stability, Verdict
 
@@ -107,3 +108,32 @@ def _find_own_cuts(table: ProgramTable, tool: Assembly, machine: Machine, cuts: 
     evidence = collect_evidence(cuts, table, tool, machine)
     own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]
     return [replace(cut, speed_rpm=cut.speed_rpm / cut.frequency_ratio) for cut in own]
+
+
+def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine) -> Iterator[CutEvidence]:
+    """Yield the usable cuts of the same tool, oldest first."""
+    known = machine.coefficients(table)
+    materials = [(known.material, known.tangential, known.radial)]
+    for entry in cuts:
+        if entry.tool != table.tool or not entry.is_usable:
+            continue
+        material = entry.coefficients, entry.cut.tangential, entry.cut.radial
+        if material not in materials:
+            materials.append(material)
+        yield _build_evidence(entry, materials.index(material), tool)
+
+
+def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
+    angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
+    frequency = float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz
+    power = None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter)
+    made = cut.cut, cut.speed_rpm, cut.depth, cut.word, frequency, tuple(angles), material
+    return CutEvidence(*made, cut.by != "ear", _frequency_ratio(cut, tool), cut.id, power)
+
+
+def _frequency_ratio(cut: CutEntry, tool: Assembly) -> float:
+    """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
+    known = [series for series in tool.series.values() if series]
+    pairs = [(interpolate_frequency(series, cut.at), series[-1].frequency) for series in known]
+    ratios = [before / now for before, now in pairs if before is not None]
+    return float(np.mean(ratios)) if ratios else 1.0

@@ -1,18 +1,18 @@
-"""Posterior of the rotating spindle: samples from the prior, weighted by the test cuts."""
+"""Posterior of the rotating spindle: samples weighted by the test cuts, and cuts whose label contradicts the others."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
 
+from acquisition import Remark
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning import cut_likelihood
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import CutPrediction, predict_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.uncertainty import Uncertainty
 
@@ -48,13 +48,12 @@ class Interval(NamedTuple):
     std: float
     """Weighted standard deviation."""
 
-    def no_narrower(self, low: float, high: float) -> Interval:
+    def no_narrower(self, low: float, high: float) -> "Interval":
         """Return an interval that includes both values."""
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
+class Posterior(NamedTuple):
     """Weighted samples of the rotating spindle."""
 
     samples: SpindleSamples
@@ -101,15 +100,15 @@ class Posterior:
         usual = float(np.sum(self.weights * np.all(beside, axis=0)))
         return self.n_frequencies >= MIN_CHATTER_FREQUENCIES and usual < 1 / 2
 
-    def learn_from(self, cut: CutEvidence) -> Posterior:
+    def learn_from(self, cut: CutEvidence) -> "Posterior":
         """Update with one more cut."""
         return self.predict(cut).update()
 
-    def predict(self, cut: CutEvidence) -> NewEvidence:
+    def predict(self, cut: CutEvidence) -> "NewEvidence":
         """Predict a cut on the samples that are not ruled out."""
         likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE_WEIGHT))
         samples = self.samples[likely].with_materials(cut.material + 1, self.seed)
-        before = replace(self, samples=samples, log_weight=self.log_weight[likely])
+        before = self._replace(samples=samples, log_weight=self.log_weight[likely])
         return NewEvidence(before, cut, predict_cut(cut, samples))
 
     def draw(self, count: int) -> SpindleSamples:
@@ -117,13 +116,12 @@ class Posterior:
         random = np.random.default_rng((self.seed, 4, len(self.cuts)))
         return self.samples[_resample_indices(self.weights, count, random)]
 
-    def resample(self, count: int) -> Posterior:
+    def resample(self, count: int) -> "Posterior":
         """Resample to a number of samples of equal weight."""
-        return replace(self, samples=self.draw(count), log_weight=np.zeros(count))
+        return self._replace(samples=self.draw(count), log_weight=np.zeros(count))
 
 
-@dataclass(frozen=True, eq=False)
-class NewEvidence:
+class NewEvidence(NamedTuple):
     """New cut before the posterior is updated."""
 
     prior: Posterior
@@ -137,18 +135,16 @@ class NewEvidence:
         """Update the posterior with the cut."""
         prior = self.prior
         likelihood = _cut_log_likelihood(self.cut, prior.samples, self.prediction, prior.cuts)
-        posterior = replace(prior, log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
+        posterior = prior._replace(log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
-def build_prior(
-    median: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0
-) -> Posterior:
+def build_prior(rest: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
     """Build the posterior before the first cut.
 
-    middle: the spindle at rest in the median estimate (a row).
+    rest: the spindle at rest in the median estimate (a row).
     """
-    return Posterior(sample_prior(median, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(rest, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(
@@ -175,7 +171,7 @@ def _refresh(posterior: Posterior) -> Posterior:
         taken = moved_value > least
         normal = np.where(taken[:, np.newaxis], moved.normal, samples.normal)
         samples, value = replace(samples, normal=normal), np.where(taken, moved_value, value)
-    return replace(posterior, samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
+    return posterior._replace(samples=samples, log_weight=np.zeros(len(samples)), n_refreshed=posterior.n_refreshed + 1)
 
 
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
@@ -206,3 +202,114 @@ def _weighted_interval(values: Floats, weights: Floats) -> Interval:
     low, high = np.interp([(1 - INTERVAL_LEVEL) / 2, (1 + INTERVAL_LEVEL) / 2], share, values[order])
     mean = float(np.sum(weights * values))
     return Interval(mean, float(low), float(high), float(np.sqrt(np.sum(weights * (values - mean) ** 2))))
+
+
+MAX_WRONG_PROBABILITY = 0.5
+"""Chance of a wrong label, given all cuts, from which a label is rejected."""
+N_CHECK_SAMPLES = 300
+"""Number of samples used to check a cut."""
+MAX_FREQUENCY_DEVIATION = 4.0
+"""Largest credible deviation (standard deviations) of a chatter frequency or of Kt by power; chosen."""
+MIN_EXPLAINED_WEIGHT = 0.005
+"""Share of the weight by the other cuts that counts as zero; chosen."""
+
+
+class Contradiction(StrEnum):
+    """Contradiction between a cut and the model."""
+
+    FREQUENCY = "frequency"
+    """Chatter at a frequency without a mode."""
+    CHATTERS = "chatters"
+    """Chatter where most samples that explain the other cuts are stable."""
+    STABLE = "stable"
+    """Stable where most samples that explain the other cuts chatter."""
+    POWER = "power"
+    """Power with another Kt than that of the cuts before it."""
+
+
+class InconsistentCut(NamedTuple):
+    """Cut with a rejected label or power, or with a frequency of no mode."""
+
+    cut: CutEvidence
+    """Rejected cut."""
+    contradiction: Contradiction
+    """Contradiction for which it is rejected."""
+    wrong_probability: float = 0.0
+    """Chance of a wrong label."""
+
+
+def wrong_label_probability(evidence: NewEvidence) -> float:
+    """Return the probability that the verdict of a cut is wrong on spindles that explain all cuts."""
+    cut, before = evidence.cut, evidence.prior
+    wrong = cut_likelihood.mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))
+    return float(np.sum(before.weights * wrong))
+
+
+def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:
+    """Find what contradicts a cut on spindles that explain all cuts, or None."""
+    cut, prediction, weights = evidence.cut, evidence.prediction, evidence.prior.weights
+    wrong = wrong_label_probability(evidence)
+    if np.isfinite(cut.frequency) and cut.has_chatter:
+        reach = MAX_FREQUENCY_DEVIATION * cut_likelihood.CHATTER_FREQUENCY_SPREAD * cut.frequency
+        near = np.any(prediction.frequency_distances(cut) < reach, axis=0)
+        likelihood = cut_likelihood.log_likelihood(cut, prediction, _repeats_of(cut, evidence.prior))
+        others = weights * np.exp(-cut.weight * likelihood)
+        if np.sum(others * near) < MIN_EXPLAINED_WEIGHT * np.sum(others):
+            return InconsistentCut(cut, Contradiction.FREQUENCY, wrong)
+    if wrong <= MAX_WRONG_PROBABILITY:
+        return None
+    return InconsistentCut(cut, Contradiction.CHATTERS if cut.has_chatter else Contradiction.STABLE, wrong)
+
+
+def is_power_inconsistent(evidence: NewEvidence) -> bool:
+    """Return whether the power of a cut implies another Kt than all earlier cuts."""
+    cut, before = evidence.cut, evidence.prior
+    if cut.power is None:
+        return False
+    distance, variance = cut_likelihood.power_distance(cut, before.samples.force_factors(cut.material), before.cuts)
+    mean = np.sum(before.weights * distance)
+    spread = np.sqrt(np.sum(before.weights * (distance - mean) ** 2) + variance)
+    return bool(abs(mean) > MAX_FREQUENCY_DEVIATION * spread)
+
+
+def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
+    """Find the cuts to reject, of those that were learned from."""
+    few = posterior.resample(N_CHECK_SAMPLES)
+    return tuple(filter(None, (find_contradiction(few.predict(cut)) for cut in posterior.cuts)))
+
+
+def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[InconsistentCut], about: str) -> Iterator[Remark]:
+    """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
+    yield from map(_inconsistent_cut_remark, rejected)
+    if posterior.is_frequency_unusual:
+        between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
+        text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
+        yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
+
+
+def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
+    """Return the same cut as made at other times."""
+    return [other for other in posterior.cuts if other is not cut and cut.is_repeat_of(other)]
+
+
+def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
+    """Build the remark on a rejected cut."""
+    cut = contradicting.cut
+    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
+    wrong = f"by the other cuts wrong with {100 * contradicting.wrong_probability:.0f} %"
+    kind, out = contradicting.contradiction, "out with folder_updates.exclude_entry"
+    misread = "this or an earlier one misread, another feed, another depth, worn edges?"
+    text = {
+        Contradiction.FREQUENCY: f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
+        Contradiction.CHATTERS: f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
+        Contradiction.STABLE: f"stable {at}, {wrong}: a slip, another depth or speed than told?",
+        Contradiction.POWER: f"its power {at} says another Kt than what was known before: {misread}",
+    }[kind]
+    cure = {
+        Contradiction.FREQUENCY: "tap the workpiece where it is cut",
+        Contradiction.CHATTERS: f"cut it again, or take it {out}; tap again if it stays",
+        Contradiction.STABLE: f"cut it again, or take it {out}",
+        Contradiction.POWER: f"read it again, or take the cut whose power was misread {out}; its word counts",
+    }[kind]
+    return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

@@ -6,8 +6,6 @@ plausible, not measured. They are joined with the uncertainty of the program. Ea
 is standard normal, so that samples can be moved without leaving the prior out of sight.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -17,7 +15,7 @@ import scipy
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts import program_samples
-from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
+from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields
 
 ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 """Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
@@ -25,8 +23,6 @@ ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 Frequency, damping and stiffness are those of the chatter risk of a verdict (the deviation of f_n absolute)."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
 """Share of frequencies that differ more, and factor on their deviation; chosen, as no measurements exist."""
-MIN_PRIOR_FACTOR = 0.1
-"""Smallest factor over its mean."""
 MAX_SAMPLED_DAMPING = 0.95
 """Largest sampled damping ratio; modes stay underdamped."""
 OPEN_FORCE_RATIO_SHARE = 0.3
@@ -53,10 +49,10 @@ class SpindleSamples:
     def __len__(self) -> int:
         return len(self.normal)
 
-    def __getitem__(self, places: Indices | slice) -> SpindleSamples:
+    def __getitem__(self, places: Indices | slice) -> "SpindleSamples":
         return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
-    def with_materials(self, count: int, seed: int) -> SpindleSamples:
+    def with_materials(self, count: int, seed: int) -> "SpindleSamples":
         """Add cutting coefficients from the prior until there are `count` materials."""
         missing = self._material_index(count) - self.normal.shape[1]
         if missing <= 0:
@@ -88,25 +84,21 @@ class SpindleSamples:
         at_speed, normal = self.normal[:, first : first + 2].T
         force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
         mean, spread = ROTATING_FORCE_PRIOR
-        return np.asarray(mean * np.maximum(1 + spread * at_speed, MIN_PRIOR_FACTOR) * force)
+        return np.asarray(mean * np.maximum(1 + spread * at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._side_factors()[:, self.at_rest.axes[self.at_rest.direction]]
         push, ratio = self._coefficient_factors(material, tangential, radial)
-        return replace(
-            self.at_rest,
-            frequency=self.at_rest.frequency * self._frequency_factors(),
-            damping_ratio=np.minimum(self.at_rest.damping_ratio * at_side[..., 0], MAX_SAMPLED_DAMPING),
-            stiffness=self.at_rest.stiffness * at_side[..., 1],
-            speed_rpm=np.full(len(self), speed_rpm),
-            tangential=tangential * push,
-            radial=radial * push * ratio,
-        )
+        f, zeta, k = self._frequency_factors(), at_side[..., 0], at_side[..., 1]
+        rows = scale_fields(self.at_rest, frequency=f, damping_ratio=zeta, stiffness=k)
+        rows = replace(rows, damping_ratio=np.minimum(rows.damping_ratio, MAX_SAMPLED_DAMPING))
+        speeds, force = np.full(len(self), speed_rpm), tangential * push
+        return replace(rows, speed_rpm=speeds, tangential=force, radial=radial * push * ratio)
 
     def _material_index(self, material: int) -> int:
         """Place of the first number of a material."""
-        return _count_spindle_numbers(self.at_rest) + NUMBERS_PER_MATERIAL * material
+        return self.at_rest.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL * material
 
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""
@@ -120,7 +112,7 @@ class SpindleSamples:
         normal = self.normal[:, first : first + NUMBERS_PER_SPINDLE].reshape(-1, 2, 2)
         priors = program_samples.ROTATING_DAMPING_FACTOR, program_samples.ROTATING_STIFFNESS_FACTOR
         median, spread = np.array(priors).T
-        return np.asarray(median * np.maximum(1 + spread * normal, MIN_PRIOR_FACTOR))
+        return np.asarray(median * np.maximum(1 + spread * normal, program_samples.MIN_ROTATING_FACTOR))
 
     def _coefficient_factors(self, material: int, tangential: float, radial: float) -> tuple[Floats, Floats]:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""
@@ -132,13 +124,8 @@ class SpindleSamples:
 def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
-    size = count, _count_spindle_numbers(median) + NUMBERS_PER_MATERIAL
+    size = count, median.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL
     return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty)
-
-
-def _count_spindle_numbers(rows: MillingRows) -> int:
-    """Return the count of normal numbers per sample that belong to the spindle."""
-    return rows.direction.size + NUMBERS_PER_SPINDLE
 
 
 def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:

@@ -1,29 +1,34 @@
-"""Learn from the test cuts of a program, and find its next test cut."""
+"""Learn from the test cuts of a program, evaluate it with the spindle at speed, and find its next test cut."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
-from lobewatch.cuts.learning import label_check
-from lobewatch.cuts.learning.cut_evidence import CutEntries, CutEvidence, estimate_force_by_power
-from lobewatch.cuts.learning.expected_gain import SPEED_GRID_STEP, CutGrid, compare_zero_order
-from lobewatch.cuts.learning.label_check import Contradiction, InconsistentCut
-from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.cuts.learning.suggestion import Suggestion, suggest_cut
-from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
-from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from acquisition import DataError
+from lobes import StabilityLobes
+from lobewatch.arrays import Floats
+from lobewatch.cuts.learning import posterior as posteriors
+from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence
+from lobewatch.cuts.learning.pocket_depth import apply_test_cuts, collect_evidence
+from lobewatch.cuts.learning.posterior import Contradiction, InconsistentCut, Posterior
+from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
+from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
+from lobewatch.machine.journal.entries import geometry_key
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import find_by_name
-from lobewatch.tool.assembly import Assembly
-from lobewatch.tool.tap_series import interpolate_frequency
-from lobewatch.verdicts.program_case import build_program
-from lobewatch.verdicts.program_samples import build_median_row
-from lobewatch.verdicts.uncertainty import uncertainty_of
+from lobewatch.tool.assembly import Assembly, compute_tip_lobes
+from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
+from lobewatch.verdicts.program_case import NO_TEST_CUTS, SpindleAtSpeed, build_program
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row
+from lobewatch.verdicts.uncertainty import FactorRange, LearnedSamples, Uncertainty, uncertainty_of
+from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
+from lobewatch.verdicts.verdict import Verdict, evaluate_program
 
 
-@dataclass(frozen=True, eq=False)
-class LearningResult:
+class LearningResult(NamedTuple):
     """Result of learning for one program."""
 
     program: ProgramTable
@@ -48,8 +53,7 @@ class LearningResult:
         return tuple(cut for cut in self.posterior.cuts if cut not in self.rejected_cuts)
 
 
-@dataclass(frozen=True, eq=False)
-class NextCut:
+class NextCut(NamedTuple):
     """Next test cut with its basis."""
 
     learning: LearningResult
@@ -69,17 +73,19 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 
 def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    start = build_prior(build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine))
+    start = posteriors.build_prior(
+        build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine)
+    )
     posterior, odd_powers = start, []
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
-        if label_check.is_power_inconsistent(evidence):
+        if posteriors.is_power_inconsistent(evidence):
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
-            evidence = replace(evidence, cut=replace(cut, power=None))
+            evidence = evidence._replace(cut=replace(cut, power=None))
         posterior = evidence.update()
     shape = geometry_key(machine.build_cut(table))
     own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    inconsistent = (*label_check.find_inconsistent_cuts(posterior), *odd_powers)
+    inconsistent = (*posteriors.find_inconsistent_cuts(posterior), *odd_powers)
     return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 
@@ -105,39 +111,87 @@ def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> Cut
     return CutGrid(cut, angles, speeds, deepest, trust)
 
 
-def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine) -> Iterator[CutEvidence]:
-    """Yield the usable cuts of the same tool, oldest first."""
-    known = machine.coefficients(table)
-    materials = [(known.material, known.tangential, known.radial)]
-    for entry in cuts:
-        if entry.tool != table.tool or not entry.is_usable:
+INTERVAL_QUANTILES = (0.025, 0.975)
+"""Quantiles of a 95 % interval."""
+
+
+def evaluate_at_speed(table: ProgramTable, tool: Assembly | DataError, machine: Machine, cuts: CutEntries) -> Verdict:
+    """Evaluate a program, at speed as far as cuts have been learned from."""
+    posterior = NO_TEST_CUTS if isinstance(tool, DataError) else learn_spindle(table, tool, machine, cuts)
+    verdict = evaluate_program(table, tool, machine, posterior)
+    if isinstance(tool, DataError) or tool.directions or not tool.without_stiffness:
+        return verdict
+    return apply_test_cuts(verdict, tool, machine, cuts)
+
+
+def learn_spindle(table: CutTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> SpindleAtSpeed:
+    """Learn the spindle at speed from the cuts of a program; nothing for the reference cut."""
+    if not isinstance(table, ProgramTable) or not tool.directions:
+        return NO_TEST_CUTS
+    if not any(cut.tool == table.tool and cut.is_usable for cut in cuts):
+        return NO_TEST_CUTS
+    learning = learn_program(table, tool, machine, cuts)
+    remarks = tuple(posteriors.inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, table.name))
+    return replace(_build_spindle(learning, tool, machine) if learning.accepted_cuts else NO_TEST_CUTS, remarks=remarks)
+
+
+def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -> SpindleAtSpeed:
+    """Build the spindle at speed from a learning result."""
+    at_rest = build_median_row(build_program(learning.program, machine), tool)
+    samples = learning.posterior.draw(N_PROGRAM_SAMPLES)
+    rows = samples.build_rows(1.0, float(at_rest.tangential[0]), float(at_rest.radial[0]))
+    parts = [getattr(rows, name) / getattr(at_rest, name) for name in ("frequency", "damping_ratio", "stiffness")]
+    median, phases = [np.mean(part, axis=0) for part in parts], rows.phase - at_rest.phase
+    force, direction = (samples.ratios()[name] for name in ("tangential", "ratio"))
+    push, ratio = float(np.mean(force)), float(np.mean(direction))
+    frequency, damping, stiffness = (part / mean for part, mean in zip(parts, median, strict=True))
+    direction_over_mean = direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape)
+    left = LearnedSamples(frequency, damping, stiffness, phases, force / np.mean(force), direction_over_mean)
+    widths = {TEST_CUTS.name: _half_widths(parts, phases)}
+    mixing, speed = np.tile(np.eye(4), (at_rest.direction.size, 1, 1)), machine.doubt.speed_percent / 100
+    ranges, axes = (_factor_range(force), _factor_range(direction)), tool.principal_directions
+    uncertainty = Uncertainty(widths, mixing, speed, *ranges, axes=axes, learned=left)
+    kt, kr = float(at_rest.tangential[0]) * push / 1e6, float(at_rest.radial[0]) * push * ratio / 1e6
+    intervals = _factor_ranges(learning.prior), _factor_ranges(learning.posterior)
+    return SpindleAtSpeed(len(learning.accepted_cuts), (), uncertainty, np.stack(median, axis=1), kt, kr, *intervals)
+
+
+def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:
+    """Return 95 % half-widths of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
+    widths = [np.diff(np.quantile(part, INTERVAL_QUANTILES, axis=0), axis=0)[0] / 2 for part in parts]
+    relative = [width / np.mean(part, axis=0) for width, part in zip(widths, parts, strict=True)]
+    return np.stack([*relative, np.std(turned, axis=0) * 2], axis=1)
+
+
+def _factor_ranges(posterior: Posterior) -> dict[str, FactorRange]:
+    """Return the intervals of all learned factors."""
+    return {name: FactorRange(interval.low, interval.high) for name, interval in posterior.intervals.items()}
+
+
+def _factor_range(values: Floats) -> FactorRange:
+    """Return the 95 % range of samples over their mean."""
+    low, high = np.quantile(values, INTERVAL_QUANTILES) / np.mean(values) if np.mean(values) > 0 else (1.0, 1.0)
+    return FactorRange(min(float(low), 1.0), max(float(high), 1.0))
+
+
+class LobesAtSpeed(NamedTuple):
+    """Lobes of a cut by the zero-order approximation with the spindle at speed."""
+
+    n_cuts: int
+    """Number of test cuts that they were learned from."""
+    lobes: StabilityLobes
+    """Lobes of the learned median."""
+    band: LimitBand
+    """Remaining uncertainty band of the limits."""
+
+
+def compute_lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:
+    """Compute the lobes of programs with the same cut, or None without learned test cuts."""
+    for verdict in verdicts:
+        tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
+        if tool is None or not at_speed.n_cuts:
             continue
-        material = entry.coefficients, entry.cut.tangential, entry.cut.radial
-        if material not in materials:
-            materials.append(material)
-        yield _build_evidence(entry, materials.index(material), tool)
-
-
-def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
-    angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
-    return CutEvidence(
-        cut=cut.cut,
-        speed_rpm=cut.speed_rpm,
-        depth=cut.depth,
-        verdict=cut.word,
-        frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
-        feed_angles=tuple(angles),
-        material=material,
-        speed_found=cut.by != "ear",
-        frequency_ratio=_frequency_ratio(cut, tool),
-        id=cut.id,
-        power=None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter),
-    )
-
-
-def _frequency_ratio(cut: CutEntry, tool: Assembly) -> float:
-    """Return the natural frequency at the time of a cut over that of now, averaged over directions; 1 if unknown."""
-    known = [series for series in tool.series.values() if series]
-    pairs = [(interpolate_frequency(series, cut.at), series[-1].frequency) for series in known]
-    ratios = [before / now for before, now in pairs if before is not None]
-    return float(np.mean(ratios)) if ratios else 1.0
+        taught, spindle = msgspec.structs.replace(machine, all_programs=(verdict.program,)), at_speed.scale_modes(tool)
+        lobes = compute_tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name], spindle.cross)[name]
+        return LobesAtSpeed(at_speed.n_cuts, lobes, compute_limit_band(lobes, name, tool, taught, at_speed))
+    return None

@@ -11,8 +11,8 @@ from rich.table import Table
 from acquisition import Remark, merge_remarks
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
-from lobewatch.cuts.learning.label_check import inconsistent_cut_remarks
 from lobewatch.cuts.learning.pocket_depth import MAX_POCKET_CUTS, PocketDepth
+from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.logbook.cut_comparison import CutComparison

@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from acquisition import DataError, Remark
 from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook

@@ -22,7 +22,7 @@ UNIT_FEED_MM = 0.1
 
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
-    others = [{"what": other.label, **_setting_with_feed_json(other.setting, answer)} for other in answer.alternatives]
+    others = [{"what": label, **_setting_with_feed_json(setting, answer)} for label, setting in answer.alternatives]
     return (
         pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
         | {"recommended": _recommended_json(answer.setting, answer.verdict, answer), "reason": answer.reason or None}
@@ -64,7 +64,7 @@ def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> flo
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
     """Return the recommendation first, then what it rests on; remarks: on the files."""
     lines = [*_recommended_lines(answer)]
-    for label, setting in ((other.label, other.setting) for other in answer.alternatives):
+    for label, setting in answer.alternatives:
         margins = f"{robustness_text(setting)}; {_removal_rate_text(setting, answer)}"
         lines.append(f"{label}: {_setting_text(setting, answer)} {margins}")
     return [*lines, *remark_lines([*remarks, *_other_remarks(answer)])]

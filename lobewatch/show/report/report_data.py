@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition import Frf, TapTest
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.verdict_at_speed import compute_lobes_at_speed
+from lobewatch.cuts.learning.program_learning import compute_lobes_at_speed
 from lobewatch.history import HistoryRow
 from lobewatch.history.history import compute_row_lobes
 from lobewatch.history.tap_measurements import measure_excluded_taps
@@ -28,8 +28,8 @@ from lobewatch.show.programs.advice import ProgramAdvice, advise_program
 from lobewatch.show.report.section import NumberTable
 from lobewatch.tool import Assembly, compute_lobes, speed_grid
 from lobewatch.tool.assembly import compute_tip_lobes
-from lobewatch.verdicts.frequency_drop import model_softening
 from lobewatch.verdicts.monte_carlo import compute_limit_band
+from lobewatch.verdicts.setting_robustness import model_softening
 from modal import Mode
 
 MAX_LOBE_DIAGRAMS = 24

@@ -13,11 +13,10 @@ from acquisition import Channel, merge_remarks
 from dsm import format_with_error
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.monitoring.alarm import Alarm
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
-from lobewatch.monitoring.status_rules import is_early_alarm, sort_by_severity, worst_status
+from lobewatch.monitoring.status_rules import Alarm, is_early_alarm, sort_by_severity, worst_status
 from lobewatch.monitoring.threshold_dates import date_of_days
 from lobewatch.show import trend as trends
 from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall

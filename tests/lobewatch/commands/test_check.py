@@ -12,7 +12,7 @@ import pytest
 from lobes import Program, program_limit
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.verdicts import Advice, Setting
-from lobewatch.verdicts.program_case import cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase
 from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
@@ -106,7 +106,7 @@ def test_the_numbers_are_those_of_the_limit_in_the_worst_feed(shop: Shop, check:
     machine, newest = shop.folder.machine, shop.logbook.assembly()
     for entry, table in zip(check("--json").json["programs"], machine.program, strict=True):
         program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-        found = program_limit(program, newest.x, newest.y, cutting_conditions_of(table, machine, newest))
+        found = program_limit(program, newest.x, newest.y, ProgramCase(table, newest, machine).cuts)
         assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
         assert entry["stable"] == found.stable
         assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.cut.feed_angle))

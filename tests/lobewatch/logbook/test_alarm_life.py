@@ -12,7 +12,7 @@ import pytest
 from acquisition import Conditions
 from lobewatch.logbook.operator_entries import acknowledge_alarms
 from lobewatch.machine.folder_updates import add_event, exclude_entry, include_entry
-from lobewatch.monitoring.alarm import Alarm
+from lobewatch.monitoring.status_rules import Alarm
 from tests.lobewatch.commands.conftest import Run, refused, run
 from tests.lobewatch.conftest import START
 

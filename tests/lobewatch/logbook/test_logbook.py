@@ -303,7 +303,7 @@ def test_a_program_is_evaluated_once_in_an_opened_logbook(shop: Shop, monkeypatc
         asked.append(table.name)
         return evaluate_program(table, *known)
 
-    monkeypatch.setattr("lobewatch.cuts.learning.verdict_at_speed.evaluate_program", counting)
+    monkeypatch.setattr("lobewatch.cuts.learning.program_learning.evaluate_program", counting)
     shop.tap_both()
     logbook = shop.logbook
     words = [found.stability for found in logbook.verdicts()]

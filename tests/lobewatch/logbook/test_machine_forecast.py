@@ -23,7 +23,7 @@ from lobewatch.monitoring.trend import days_since_epoch
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.trend import forecast_date_rows, reach_text
 from lobewatch.verdicts import Stability
-from lobewatch.verdicts.frequency_drop import find_critical_drop, find_tolerable_drop, model_softening
+from lobewatch.verdicts.setting_robustness import find_critical_drop, find_tolerable_drop, model_softening
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -154,7 +153,7 @@ def of_today(found: Forecast) -> Forecast:
     weight = found.weight[kept] / found.weight[kept].sum()
     shapes = tuple(shape for shape, is_kept in zip(found.shapes, kept, strict=True) if is_kept)
     rows = {"mean": found.mean[kept], "error": found.error[kept], "freedom": found.freedom[kept]}
-    return replace(found, shapes=shapes, weight=weight, **rows)
+    return found._replace(shapes=shapes, weight=weight, **rows)
 
 
 @pytest.mark.parametrize("design", DESIGNS)

@@ -9,7 +9,7 @@ import pytest
 
 from lobes import program_limit
 from lobewatch.verdicts import Stability
-from lobewatch.verdicts.program_case import build_program, cutting_conditions_of
+from lobewatch.verdicts.program_case import ProgramCase, build_program
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets
 from lobewatch.verdicts.verdict import evaluate_program
 
@@ -53,9 +53,7 @@ def test_a_corner_takes_most_of_the_limit_whatever_the_feed(judged: Any, shop: S
     straight, corner = judged(0.3, 'feed = "x"'), judged(0.3, "corner_radius_mm = 15", 'feed = "x"')
     assert corner.limit < 0.4 * straight.limit
     inside = [
-        cut
-        for cut in cutting_conditions_of(corner.program, shop.folder.machine, corner.assembly)
-        if cut.immersion > 0.6
+        cut for cut in ProgramCase(corner.program, corner.assembly, shop.folder.machine).cuts if cut.immersion > 0.6
     ]
     assert len({cut.feed_angle for cut in inside}) == 12
 

@@ -12,9 +12,9 @@ import pytest
 from lobewatch.cuts.learning.program_learning import find_next_cut
 from lobewatch.machine import find_tool_limits
 from lobewatch.machine.settings.drive_power import CutRange
+from lobewatch.verdicts.program_case import SpindleAtSpeed
 from lobewatch.verdicts.program_remarks import missing_tool_remarks, tool_limit_remarks
 from lobewatch.verdicts.recommendation import find_stable_pockets
-from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""

@@ -11,8 +11,8 @@ import pytest
 from dsm import calibrate
 from lobes import Program, program_limit
 from lobewatch.verdicts import Stability
-from lobewatch.verdicts.frequency_drop import find_tolerable_drop, model_softening
 from lobewatch.verdicts.program_case import build_program
+from lobewatch.verdicts.setting_robustness import find_tolerable_drop, model_softening
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""

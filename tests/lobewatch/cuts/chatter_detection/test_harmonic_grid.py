@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from lobewatch.cuts.chatter_detection.harmonic_grid import find_sideband_families, refine_speed
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import find_sideband_families, refine_speed
 
 pytestmark = pytest.mark.quick
 

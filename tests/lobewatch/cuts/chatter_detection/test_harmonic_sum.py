@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from lobewatch.cuts.chatter_detection.cut_evaluation import evaluate_cut
 from lobewatch.cuts.chatter_detection.peak_classification import find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import compute_spectra, find_peaks
-from lobewatch.cuts.chatter_detection.spindle_speed import find_spindle_speed
+from lobewatch.cuts.chatter_detection.spindle_speed import find_speed_of_spectra
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import find_comb_by_sum
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,8 @@ def test_sixteen_weak_multiples_of_which_few_stand_clear_have_one_speed() -> Non
 
 
 def test_find_speed_detects_them_too() -> None:
-    speed = find_spindle_speed(noise(1) + comb(list(range(1, 17))), air_of(2), RATE, TEETH, 60 * TURN * 1.02)
+    spectra, quiet = (compute_spectra(part, RATE) for part in (noise(1) + comb(list(range(1, 17))), air_of(2)))
+    speed = find_speed_of_spectra(spectra, quiet, TEETH, TURN * 1.02)
     assert speed is not None
     assert speed.frequency == pytest.approx(TURN, rel=2e-4)
 
@@ -94,7 +95,10 @@ def test_of_weak_multiples_more_are_believed_near_the_speed_that_was_set() -> No
     weak, believed = comb([3, 4, 8], 0.13), []
     for off in (1.0, 1.03):
         speeds = [
-            find_spindle_speed(noise(seed) + weak, air_of(seed), RATE, TEETH, 60 * TURN * off) for seed in range(20)
+            find_speed_of_spectra(
+                compute_spectra(noise(seed) + weak, RATE), compute_spectra(air_of(seed), RATE), TEETH, TURN * off
+            )
+            for seed in range(20)
         ]
         heard = [speed.frequency for speed in speeds if speed is not None]
         assert heard == pytest.approx([TURN] * len(heard), rel=1e-3)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import PeaksByOrigin, classify_peaks, is_in_air
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
 pytestmark = pytest.mark.quick
 

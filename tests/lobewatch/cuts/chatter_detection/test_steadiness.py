@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.harmonic_grid import SpindleSpeed
 from lobewatch.cuts.chatter_detection.peak_classification import estimate_unsteadiness
 from lobewatch.cuts.chatter_detection.spectrum import compute_spectrum, find_peaks
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
 Floats = NDArray[np.float64]
 RATE, SECONDS, TURN = 25600.0, 1.2, 200.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, fold_frequency, remove_skirts
-from lobewatch.cuts.chatter_detection.spindle_speed import find_spindle_speed
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectra, fold_frequency, remove_skirts
+from lobewatch.cuts.chatter_detection.spindle_speed import find_speed_of_spectra
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import find_comb
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,9 @@ def test_the_slopes_of_two_strong_lines_are_no_spindle() -> None:
     for seed in range(30):
         random = np.random.default_rng(seed)
         cut = swelling(random, rate, turn)
-        speeds.append(find_spindle_speed(cut, random.normal(scale=0.05, size=cut.size), rate, 4, 4000.0))
+        air = random.normal(scale=0.05, size=cut.size)
+        spectra, quiet = (compute_spectra(part, rate) for part in (cut, air))
+        speeds.append(find_speed_of_spectra(spectra, quiet, 4, 4000.0 / 60))
     away = np.array([abs(speed.frequency / turn - 1) for speed in speeds if speed is not None])
     assert np.all(away < 1e-3)
     assert away.size >= 24

@@ -8,12 +8,13 @@ from functools import reduce
 
 import numpy as np
 import pytest
+from speed_grid import list_speeds
 
 from lobes import Cut, MillingRows, build_milling_system, rows_at_speeds, zero_order_lobes
 from lobes.floquet import count_pieces, largest_multipliers
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.expected_gain import CutGrid, list_speeds
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.suggestion import CutGrid
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 

@@ -11,8 +11,8 @@ import pytest
 from scipy.special import ndtr
 
 from lobes import Cut, stability_boundary, zero_order_lobes
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import (
+    CutEvidence,
     CutPrediction,
     log_likelihood,
     max_log_likelihood,

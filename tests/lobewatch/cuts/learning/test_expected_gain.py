@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lobes import zero_order_lobes
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.expected_gain import CutGrid, LimitCharts, floor_depth
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence
+from lobewatch.cuts.learning.suggestion import CutGrid, LimitCharts, floor_depth
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 pytestmark = pytest.mark.quick

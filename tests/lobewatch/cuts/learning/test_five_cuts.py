@@ -14,16 +14,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from shown_power import FEED, ShownPower
+from speed_grid import list_speeds
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, lower_envelope, rows_at_speeds, stability_boundary, zero_order_lobes
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import log_likelihood, predict_cut
-from lobewatch.cuts.learning.expected_gain import CutGrid, compare_zero_order, floor_depth, list_speeds
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, log_likelihood, predict_cut
 from lobewatch.cuts.learning.posterior import Posterior, build_prior
-from lobewatch.cuts.learning.suggestion import find_best_removal_rate, suggest_cut
+from lobewatch.cuts.learning.suggestion import (
+    CutGrid,
+    compare_zero_order,
+    find_best_removal_rate,
+    floor_depth,
+    suggest_cut,
+)
 from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.zero_order_batch import is_force_constant

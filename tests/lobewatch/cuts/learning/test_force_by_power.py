@@ -8,9 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.cut_evidence import CutEvidence, PowerEvidence, estimate_force_by_power
-from lobewatch.cuts.learning.cut_likelihood import power_distance, power_log_likelihood
-from lobewatch.cuts.learning.label_check import is_power_inconsistent
+from lobewatch.cuts.learning.cut_likelihood import (
+    CutEvidence,
+    PowerEvidence,
+    estimate_force_by_power,
+    power_distance,
+    power_log_likelihood,
+)
+from lobewatch.cuts.learning.posterior import is_power_inconsistent
 from lobewatch.machine.settings.drive_power import CutPower
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 

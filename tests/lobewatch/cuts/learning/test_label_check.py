@@ -8,16 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.cut_likelihood import CutPrediction, log_likelihood
-from lobewatch.cuts.learning.label_check import (
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, log_likelihood
+from lobewatch.cuts.learning.posterior import (
     Contradiction,
     InconsistentCut,
+    NewEvidence,
     find_contradiction,
     find_inconsistent_cuts,
     inconsistent_cut_remarks,
 )
-from lobewatch.cuts.learning.posterior import NewEvidence
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 STABLE = CutEvidence(SLOT, 12000, 3e-3, "stable", id="c7")
@@ -27,8 +26,8 @@ CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0, id="c8")
 
 def evidence(cut: CutEvidence, share: float, base: float = 150.0) -> NewEvidence:
     """Build a cut that a share of the weight predicts to chatter at a folded frequency (Hz)."""
-    before = replace(Mill().prior, log_weight=np.log([share, 1 - share]))
-    before = replace(before, samples=before.samples[:2])
+    before = Mill().prior._replace(log_weight=np.log([share, 1 - share]))
+    before = before._replace(samples=before.samples[:2])
     frequencies = np.array([base, 390.0])
     prediction = CutPrediction(np.array([5.0, -5.0]), frequencies, frequencies, np.zeros(2, dtype=bool))
     return NewEvidence(before, cut, prediction)
@@ -61,8 +60,8 @@ def test_chatter_of_half_a_percent_of_the_weight_by_the_others_is_explained(shar
     found = evidence(CHATTER, share)
     prediction = found.prediction._replace(excess=np.array([5.0, 5.0]))
     log_weight = np.log([share, 1 - share]) + log_likelihood(CHATTER, prediction)
-    learnt = replace(found.prior, log_weight=log_weight)
-    chatters = replace(found, prior=learnt, prediction=prediction)
+    learnt = found.prior._replace(log_weight=log_weight)
+    chatters = found._replace(prior=learnt, prediction=prediction)
     odd = find_contradiction(chatters)
     assert (odd and odd.contradiction) is (Contradiction.FREQUENCY if is_odd else None)
 

@@ -9,16 +9,15 @@ import pytest
 
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
-from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.cut_likelihood import (
     MISLABELED_SHARE,
     UNPITCHED_MISLABELED_SHARE,
+    CutEvidence,
     log_likelihood,
     max_log_likelihood,
     predict_cut,
 )
-from lobewatch.cuts.learning.label_check import Contradiction, find_inconsistent_cuts
-from lobewatch.cuts.learning.posterior import Posterior, build_prior
+from lobewatch.cuts.learning.posterior import Contradiction, Posterior, build_prior, find_inconsistent_cuts
 from lobewatch.machine.journal.entries import CutVerdict
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill, doubt
@@ -188,7 +187,7 @@ def test_what_contradicts_is_named_and_teaches_nothing(mill: Mill) -> None:
 def weighted(*log_weight: float, cuts: tuple[CutEvidence, ...] = ()) -> Posterior:
     """Weight the first samples of a prior."""
     learnt = Mill().prior
-    return replace(learnt, samples=learnt.samples[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
+    return learnt._replace(samples=learnt.samples[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
 
 
 def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
@@ -200,7 +199,7 @@ def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
 def test_intervals_hold_95_percent_of_the_weight() -> None:
     """For 700 samples, half with ten times the weight, against the weighted distribution."""
     log_weight = np.where(np.arange(700) % 2 == 0, 0.0, np.log(10.0))
-    learnt = replace(Mill().prior, log_weight=log_weight)
+    learnt = Mill().prior._replace(log_weight=log_weight)
     values, interval = learnt.samples.ratios()["tangential"], learnt.intervals["tangential"]
     assert np.sum(learnt.weights[values < interval.low]) == pytest.approx(0.025, abs=0.003)
     assert np.sum(learnt.weights[values > interval.high]) == pytest.approx(0.025, abs=0.003)
@@ -239,9 +238,9 @@ def test_a_spindle_is_far_off_where_more_than_half_of_the_weight_is_outside_of_9
         both = draws[np.array([place, 2000])]
         log_weight = np.log([share, 1 - share])
         assert (
-            replace(learnt, samples=both, log_weight=log_weight, cuts=(chatter, chatter)).is_frequency_unusual is is_far
+            learnt._replace(samples=both, log_weight=log_weight, cuts=(chatter, chatter)).is_frequency_unusual is is_far
         )
-        assert not replace(learnt, samples=both, log_weight=log_weight, cuts=(chatter,)).is_frequency_unusual
+        assert not learnt._replace(samples=both, log_weight=log_weight, cuts=(chatter,)).is_frequency_unusual
 
 
 def test_samples_that_are_ruled_out_are_not_inspected_any_more(mill: Mill) -> None:
@@ -276,10 +275,10 @@ def test_samples_that_are_made_again_are_those_of_prior_and_likelihood() -> None
     few, many = mill.prior, build_prior(mill.middle, doubt(), 12000, seed=1)
     for cut in cuts:
         few = few.learn_from(cut)
-        many = replace(many, log_weight=many.log_weight + log_likelihood(cut, predict_cut(cut, many.samples)))
+        many = many._replace(log_weight=many.log_weight + log_likelihood(cut, predict_cut(cut, many.samples)))
     assert few.n_refreshed >= 1
     assert len(few.samples) == 500
-    many = replace(many, cuts=few.cuts)
+    many = many._replace(cuts=few.cuts)
     assert many.effective_size > 300
     for name, interval in few.intervals.items():
         weighted_only = many.intervals[name]

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lobewatch.cuts.learning.label_check import Contradiction
+from lobewatch.cuts.learning.posterior import Contradiction
 from lobewatch.cuts.learning.program_learning import learn_program
 from lobewatch.cuts.learning.suggestion import find_best_removal_rate
 from lobewatch.machine.folder_updates import make_observed_cut

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning.cut_evidence import CutEvidence, find_cut_to_repeat, is_setting_taken
-from lobewatch.cuts.learning.label_check import find_inconsistent_cuts
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, find_cut_to_repeat, is_setting_taken
+from lobewatch.cuts.learning.posterior import find_inconsistent_cuts
 from lobewatch.cuts.learning.suggestion import suggest_cut
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lobes import Cut, StabilityLobes
-from lobewatch.cuts.learning.verdict_at_speed import LobesAtSpeed, compute_lobes_at_speed
+from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.machine.folder_updates import store_cut
 from lobewatch.machine.journal.entries import CutEntry, CutVerdict
 from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts

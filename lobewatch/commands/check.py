@@ -5,7 +5,7 @@ from __future__ import annotations
 from time import monotonic
 from typing import Annotated
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import (
     Diameter,
@@ -25,21 +25,21 @@ PROGRESS_DELAY = 5.0
 def check(
     machine: TappedMachine,
     program: Annotated[
-        list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
+        list[str] | None, Option(help="Only this program; may be repeated. All where none is named.")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(parser=number, help="Of a cut that is no program: spindle speed, rpm.")
+        float | None, Option(parser=number, help="Of a cut that is no program: spindle speed, rpm.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(parser=number, help="Its axial depth, mm.")] = None,
-    tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
+    depth: Annotated[float | None, Option(parser=number, help="Its axial depth, mm.")] = None,
+    tool: Annotated[str | None, Option(help="Its tool.")] = None,
     material: Material = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
-    radial: Annotated[float | None, typer.Option(parser=number, help="Its radial depth, mm.")] = None,
+    radial: Annotated[float | None, Option(parser=number, help="Its radial depth, mm.")] = None,
     direction: MillingDirection = None,
     accept: Annotated[
         list[str] | None,
-        typer.Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
+        Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -94,4 +94,4 @@ def check(
         *([check_summary_text(programs, len(recommendations))] if programs else ()),
     )
     if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
-        raise typer.Exit(1)
+        raise Exit(1)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
+from typer import Argument, Option
 
 import acquisition
 from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
@@ -29,42 +30,36 @@ class EmulateOptions:
     """Options of an emulator, in the order of the help page."""
 
     machine: Annotated[
-        Path,
-        typer.Argument(parser=to_folder_path, help="Machine folder with a spindle in its machine.toml: what is hit."),
+        Path, Argument(parser=to_folder_path, help="Machine folder with a spindle in its machine.toml: what is hit.")
     ]
     """Machine folder."""
-    tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
+    tcp: Annotated[bool, Option("--tcp", help="On a TCP port of this computer instead.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
-    fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False
+    fast: Annotated[bool, Option("--fast", help="As fast as the host reads, not in real time.")] = False
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings over 24 months.")] = "none"
+    story: Annotated[WearScenarioName, Option(help="What befalls the bearings over 24 months.")] = "none"
     """Wear scenario of the bearings."""
-    month: Annotated[int, typer.Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
+    month: Annotated[int, Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
     """Month of the wear scenario."""
     scatter: ReclampingScatter = 0.0
     """Reclamping repeatability of f1: standard deviation (%)."""
-    bad_clampings: Annotated[float, typer.Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
+    bad_clampings: Annotated[float, Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
     """Chance of a bad clamping (%)."""
-    temperature: Annotated[float | None, typer.Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
+    temperature: Annotated[float | None, Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
     """Swing of the temperature over the year (K)."""
-    direction: Annotated[
-        Literal["x", "y", "xy"], typer.Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")
-    ] = "x"
+    direction: Annotated[Literal["x", "y", "xy"], Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")] = "x"
     """Direction of hammer and sensor."""
     askew: Annotated[
-        float | None,
-        typer.Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
+        float | None, Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it.")
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
-    cut: Annotated[str | None, typer.Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = (
-        None
-    )
+    cut: Annotated[str | None, Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = None
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[float | None, typer.Option(help="Of the cut, as it is told (rpm).")] = None
+    speed: Annotated[float | None, Option(help="Of the cut, as it is told (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, typer.Option(help="Of the cut (mm).")] = None
+    depth: Annotated[float | None, Option(help="Of the cut (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""

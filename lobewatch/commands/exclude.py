@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
@@ -13,7 +13,7 @@ from lobewatch.show.terminal.output import Json, emit
 def exclude(
     machine: Machine,
     tap: ExcludableEntry,
-    reason: Annotated[str, typer.Option(help="Why it does not count.")],
+    reason: Annotated[str, Option(help="Why it does not count.")],
     as_json: Json = False,
 ) -> None:
     """Exclude a tap test or test cut from all results.

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
 from lobewatch.commands.shared_options import (
     AddedModes,
@@ -26,48 +26,41 @@ if TYPE_CHECKING:
 @add_file_options(without=["averages"])
 def modes(
     file: Annotated[
-        Path,
-        typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
+        Path, Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005.")
     ],
     tap: Annotated[
-        str,
-        typer.Argument(
-            help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has."
-        ),
+        str, Argument(help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has.")
     ] = "",
-    band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
-    ] = None,
+    band: Annotated[tuple[float, float] | None, Option(help="Only between these frequencies (Hz).")] = None,
+    figure: Annotated[Path | None, Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")] = None,
     window: Annotated[
         float | None,
-        typer.Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
+        Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
     ] = None,
-    window_start: Annotated[float, typer.Option(help="When that window begins (s from the record's start).")] = 0.0,
+    window_start: Annotated[float, Option(help="When that window begins (s from the record's start).")] = 0.0,
     hit_at: Annotated[
-        float | None,
-        typer.Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it."),
+        float | None, Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it.")
     ] = None,
     averages: Annotated[
-        int | None, typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
+        int | None, Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
     ] = None,
     hammer: Annotated[
-        Literal["none"] | None, typer.Option(help="No force was measured: f_n and zeta alone, from the response.")
+        Literal["none"] | None, Option(help="No force was measured: f_n and zeta alone, from the response.")
     ] = None,
     *,
     file_options: FileOptions,
     accept: Annotated[
-        list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
+        list[str] | None, Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
     conjugate: Annotated[
-        bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+        bool, Option("--conjugate", help="The file holds the complex conjugate of response over force.")
     ] = False,
     sensor_mass: Annotated[
-        float | None, typer.Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
+        float | None, Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
     ] = None,
     beside: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Another measurement of the same structure: a file, the number of another response of FILE, or where "
             "FILE is a machine folder another tap test; given twice or more. What most of them have, too, is less in "
             "doubt."
@@ -77,10 +70,10 @@ def modes(
     drop: DroppedModes = None,
     fix: FixedModes = None,
     by_fit: Annotated[
-        bool, typer.Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
+        bool, Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
     ] = False,
     everything: Annotated[
-        bool, typer.Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
+        bool, Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
     ] = False,
     as_json: Json = False,
 ) -> None:

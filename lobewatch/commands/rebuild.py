@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.output import Json, emit, print_remarks
@@ -17,11 +17,9 @@ if TYPE_CHECKING:
 
 def rebuild(
     machine: FleetFolder,
-    jobs: Annotated[
-        int, typer.Option(min=1, max=64, help="Processes that work at once; what they find is the same.")
-    ] = 1,
+    jobs: Annotated[int, Option(min=1, max=64, help="Processes that work at once; what they find is the same.")] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Address of a Dask scheduler whose workers work, such as tls://10.0.0.5:8786.")
+        str, Option(help="Address of a Dask scheduler whose workers work, such as tls://10.0.0.5:8786.")
     ] = "",
     as_json: Json = False,
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
 from lobewatch.show.terminal.output import Json, emit
@@ -12,20 +12,18 @@ from lobewatch.show.terminal.output import Json, emit
 
 def recommend(
     machine: TappedMachine,
-    tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
+    tool: Annotated[str | None, Option(help="The tool.")] = None,
     material: Material = None,
-    radial: Annotated[
-        float | None, typer.Option(parser=number, help="Radial depth, mm; a slot where none is given.")
-    ] = None,
+    radial: Annotated[float | None, Option(parser=number, help="Radial depth, mm; a slot where none is given.")] = None,
     direction: Annotated[
-        Literal["up", "down"] | None, typer.Option(help="Up or down milling; the worse where none is given.")
+        Literal["up", "down"] | None, Option(help="Up or down milling; the worse where none is given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
-    speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
+    depth: Annotated[float | None, Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
+    speed: Annotated[float | None, Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
-    feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
-    save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
+    feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth, mm.")] = None,
+    save: Annotated[str | None, Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
@@ -60,4 +58,4 @@ def recommend(
     ]
     emit(payload, as_json, *lines)
     if answer.setting is None:
-        raise typer.Exit(1)
+        raise Exit(1)

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.show.terminal.option_names import with_option_names
@@ -15,12 +15,11 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 def report(
     machine: Annotated[
-        Path,
-        typer.Argument(parser=to_folder_path, help="Machine folder with a tap test, or a folder of machine folders."),
+        Path, Argument(parser=to_folder_path, help="Machine folder with a tap test, or a folder of machine folders.")
     ],
-    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder where not given.")] = None,
-    tool: Annotated[str, typer.Option(help="The series of this tool; that of the newest test where not given.")] = "",
-    direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",
+    out: Annotated[Path | None, Option(help="The HTML file; report.html in the folder where not given.")] = None,
+    tool: Annotated[str, Option(help="The series of this tool; that of the newest test where not given.")] = "",
+    direction: Annotated[str, Option(help="x or y; that of the newest test where not given.")] = "",
     as_json: Json = False,
 ) -> None:
     """Write the report of a machine or of a folder of machines.

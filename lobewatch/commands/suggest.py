@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import TappedMachine
 from lobewatch.show.terminal.output import Json, emit
@@ -12,8 +12,8 @@ from lobewatch.show.terminal.output import Json, emit
 
 def suggest(
     machine: TappedMachine,
-    program: Annotated[str, typer.Option(help="Cutting program to find the limits of.")],
-    cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
+    program: Annotated[str, Option(help="Cutting program to find the limits of.")],
+    cuts: Annotated[int, Option(min=1, help="Test cuts that shall be made in all.")] = 5,
     as_json: Json = False,
 ) -> None:
     """Suggest the next test cut of a program.

@@ -1,6 +1,5 @@
 """Command `lobewatch ack`: acknowledge alarms."""
 
-from __future__ import annotations
 
 from datetime import UTC, datetime
 from typing import Annotated

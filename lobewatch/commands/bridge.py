@@ -1,6 +1,5 @@
 """Command `lobewatch bridge`: serve any device as a TAPS/1 device on TCP."""
 
-from __future__ import annotations
 
 import json
 from functools import partial

@@ -1,6 +1,5 @@
 """Command `lobewatch check`: verdicts on cutting programs."""
 
-from __future__ import annotations
 
 from time import monotonic
 from typing import Annotated

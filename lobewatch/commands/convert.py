@@ -1,6 +1,5 @@
 """Command `lobewatch convert`: convert a recorded file to another format."""
 
-from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path

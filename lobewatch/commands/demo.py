@@ -1,6 +1,5 @@
 """Command `lobewatch demo`: tap tests of an aging simulated spindle."""
 
-from __future__ import annotations
 
 import itertools
 from pathlib import Path

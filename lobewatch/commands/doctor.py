@@ -1,6 +1,5 @@
 """Command `lobewatch doctor`: check the computer for a tap test."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch emulate`: emulate a device, with a subcommand for each driver."""
 
-from __future__ import annotations
 
 import inspect
 import json

@@ -1,6 +1,5 @@
 """Command `lobewatch event`: record maintenance of a machine."""
 
-from __future__ import annotations
 
 from datetime import datetime
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch exclude`: exclude a tap test from its series."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

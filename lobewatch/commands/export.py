@@ -1,6 +1,5 @@
 """Command `lobewatch export`: export the tap tests of all machines."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Format help pages as plain text, with examples that can be copied."""
 
-from __future__ import annotations
 
 import shutil
 import textwrap

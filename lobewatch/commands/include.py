@@ -1,6 +1,5 @@
 """Command `lobewatch include`: include an excluded tap test again."""
 
-from __future__ import annotations
 
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit

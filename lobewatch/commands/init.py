@@ -1,6 +1,5 @@
 """Command `lobewatch init`: create a machine folder."""
 
-from __future__ import annotations
 
 import shlex
 import sys
@@ -76,7 +75,7 @@ def init(
     emit(payload, as_json, text, f"next: {next_step}")
 
 
-def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
     """Make the draft from the answers in options and at the terminal."""
     from lobewatch.machine.setup_questions.draft import MachineDraft
     from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question

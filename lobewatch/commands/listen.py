@@ -1,6 +1,5 @@
 """Command `lobewatch listen`: detect chatter in a recorded or live cut."""
 
-from __future__ import annotations
 
 import contextlib
 import itertools
@@ -102,11 +101,11 @@ def listen(
 
 
 def _store(
-    logbook: Logbook,
-    comparisons: Sequence[CutComparison],
-    signal: CutSignal,
+    logbook: "Logbook",
+    comparisons: "Sequence[CutComparison]",
+    signal: "CutSignal",
     date: datetime | None,
-    publisher: StatePublisher[CutState],
+    publisher: "StatePublisher[CutState]",
     as_json: bool,
 ) -> None:
     """Store the recorded cuts and show them."""

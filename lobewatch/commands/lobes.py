@@ -1,6 +1,5 @@
 """Command `lobewatch lobes`: stability lobes and stable pockets of a tool."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Literal

@@ -1,6 +1,5 @@
 """Command `lobewatch materials`: list materials with their cutting coefficients."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

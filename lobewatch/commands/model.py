@@ -1,6 +1,5 @@
 """Command `lobewatch model`: modes and stiffness of the spindle model."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
-from __future__ import annotations
 
 from contextlib import nullcontext
 from functools import partial
@@ -137,7 +136,7 @@ def modes(
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
 
 
-def _resolve_edits(edits: ModeEdits, by_fit: bool) -> ModeEdits | None:
+def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":
     """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
     if edits and by_fit:
         raise ValueError("--by-fit takes back all that is said by hand; leave --add, --drop and --fix out")

@@ -1,6 +1,5 @@
 """Command `lobewatch pitch`: propose unequal pitches for a cutter."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch ports`: list serial ports and the devices on them."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch rebuild`: rebuild the history or a damaged journal."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -71,7 +70,7 @@ def _find_machine_folders(path: Path) -> list[Path]:
     return sorted(folder for folder in path.glob("*/") if (folder / "machine.toml").is_file() or list_tap_files(folder))
 
 
-def _rebuild_machine(path: Path, workers: Workers) -> MachineRebuild:
+def _rebuild_machine(path: Path, workers: "Workers") -> "MachineRebuild":
     """Rebuild a machine and publish its status."""
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.rebuild_history import rebuild_history

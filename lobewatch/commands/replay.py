@@ -1,6 +1,5 @@
 """Command `lobewatch replay`: store recorded files as tap tests."""
 
-from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path

@@ -1,6 +1,5 @@
 """Command `lobewatch report`: write an HTML report."""
 
-from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path

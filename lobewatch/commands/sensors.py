@@ -1,6 +1,5 @@
 """Command `lobewatch sensors`: check hammer, accelerometer and DAQ."""
 
-from __future__ import annotations
 
 from functools import partial
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch serve`: serve the dashboard of machines."""
 
-from __future__ import annotations
 
 import time
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch status`: status of all machines, worst first."""
 
-from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -86,7 +85,7 @@ def status(
     raise Exit(1 if needs_care else 2 * (failures > 0))
 
 
-def _make_missing_summaries(fleet: Fleet, jobs: int, scheduler: str) -> None:
+def _make_missing_summaries(fleet: "Fleet", jobs: int, scheduler: str) -> None:
     """Make missing summaries in other processes."""
     from functools import partial
 

@@ -1,6 +1,5 @@
 """Command `lobewatch suggest`: suggest the next test cut."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch tap`: run a live tap test."""
 
-from __future__ import annotations
 
 import contextlib
 import sys

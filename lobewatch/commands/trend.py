@@ -1,6 +1,5 @@
 """Command `lobewatch trend`: trend and forecast of a series."""
 
-from __future__ import annotations
 
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch verify`: verify the files of a machine folder."""
 
-from __future__ import annotations
 
 import typer
 

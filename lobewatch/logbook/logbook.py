@@ -1,6 +1,5 @@
 """Open the logbook of one machine, query its analysis and add tap tests."""
 
-from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -28,11 +27,11 @@ P = ParamSpec("P")
 Answer = TypeVar("Answer")
 
 
-def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate[Logbook, P], Answer]:
+def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate["Logbook", P], Answer]:
     """Make a method of the logbook that queries its analysis."""
 
     @wraps(question)
-    def answer(logbook: Logbook, /, *arguments: P.args, **options: P.kwargs) -> Answer:
+    def answer(logbook: "Logbook", /, *arguments: P.args, **options: P.kwargs) -> Answer:
         return logbook.query(question, *arguments, **options)
 
     return answer

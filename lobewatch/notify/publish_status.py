@@ -4,7 +4,6 @@ The last published message is stored with each machine and in the folder of the 
 machine can still be reported, and an unchanged status is published once a day only.
 """
 
-from __future__ import annotations
 
 import contextlib
 import hashlib
@@ -135,7 +134,7 @@ def _forget_machine(fleet_folder: Path, key: str, present: Iterable[str]) -> Non
 
 def _find_missing_machines(
     fleet_folder: Path | None,
-    published: Mapping[str, PublishedMessage],
+    published: Mapping[str, "PublishedMessage"],
     assessed: Iterable[FleetMachine],
     now: datetime,
 ) -> Iterator[FleetMachine]:
@@ -151,7 +150,7 @@ def _assess_summary(key: str, path: Path, summary: MachineSummary, now: datetime
     return FleetMachine(key, path, summary, summary.status_at(now, path))
 
 
-def _choose_broker(path: Path, machines: Mapping[Path, Machine], last: PublishedMessage | None) -> Broker | None:
+def _choose_broker(path: Path, machines: Mapping[Path, Machine], last: "PublishedMessage | None") -> Broker | None:
     """Return the broker of machine.toml, or that of the last message if machine.toml cannot be read."""
     try:
         machine: Machine = machines.get(path) or read_machine_file(path / "machine.toml")
@@ -221,7 +220,7 @@ class PublishedMessage(msgspec.Struct, frozen=True):
         topic = f"{broker.prefix}/{machine.key.translate(TOPIC_REPLACEMENTS)}/standing"
         return cls(broker.without_password, topic, content, now)
 
-    def covers(self, other: PublishedMessage) -> bool:
+    def covers(self, other: Self) -> bool:
         """Return whether another message need not be sent."""
         is_same = (self.broker, self.topic, self.content) == (other.broker, other.topic, other.content)
         return is_same and timedelta(0) <= other.time - self.time < REPUBLISH_INTERVAL

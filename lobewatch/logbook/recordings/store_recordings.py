@@ -1,11 +1,11 @@
 """Store recorded files as tap tests of a machine, each once."""
 
-from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 from acquisition import DataError, Description
 from lobewatch.logbook.recordings.prepare_taps import (
@@ -70,7 +70,7 @@ class StoredContents:
     """Identities and directions of tap tests, by SHA-256 of the content."""
 
     @classmethod
-    def of(cls, taps: Sequence[TapEntry]) -> StoredContents:
+    def of(cls, taps: Sequence[TapEntry]) -> Self:
         """List the tap files and the recorded files of committed tap tests."""
         contents = cls({})
         for tap in taps:

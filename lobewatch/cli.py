@@ -1,6 +1,5 @@
 """Run the command line: import each command when it is needed, and print errors as one sentence."""
 
-
 import atexit
 import gc
 import inspect

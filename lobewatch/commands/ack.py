@@ -1,6 +1,5 @@
 """Command `lobewatch ack`: acknowledge alarms."""
 
-
 from datetime import UTC, datetime
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch bridge`: serve any device as a TAPS/1 device on TCP."""
 
-
 import json
 from functools import partial
 from pathlib import Path

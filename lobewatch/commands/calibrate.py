@@ -1,6 +1,5 @@
 """Command `lobewatch calibrate`: fit bearing and joint stiffness to measured natural frequencies."""
 
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch convert`: convert a recorded file to another format."""
 
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated

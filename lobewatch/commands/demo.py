@@ -1,6 +1,5 @@
 """Command `lobewatch demo`: tap tests of an aging simulated spindle."""
 
-
 import itertools
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch doctor`: check the computer for a tap test."""
 
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch emulate`: emulate a device, with a subcommand for each driver."""
 
-
 import inspect
 import json
 import math

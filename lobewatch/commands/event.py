@@ -1,6 +1,5 @@
 """Command `lobewatch event`: record maintenance of a machine."""
 
-
 from datetime import datetime
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch exclude`: exclude a tap test from its series."""
 
-
 from typing import Annotated
 
 from typer import Option

@@ -1,6 +1,5 @@
 """Command `lobewatch export`: export the tap tests of all machines."""
 
-
 from pathlib import Path
 from typing import Annotated
 

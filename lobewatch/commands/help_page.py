@@ -1,6 +1,5 @@
 """Format help pages as plain text, with examples that can be copied."""
 
-
 import shutil
 import textwrap
 from collections.abc import Collection, Iterator, Mapping

@@ -1,6 +1,5 @@
 """Command `lobewatch history`: list the tap tests and events of a machine."""
 
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch include`: include an excluded tap test again."""
 
-
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
 

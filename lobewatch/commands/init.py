@@ -1,6 +1,5 @@
 """Command `lobewatch init`: create a machine folder."""
 
-
 import shlex
 import sys
 from collections.abc import Mapping

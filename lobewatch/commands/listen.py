@@ -1,6 +1,5 @@
 """Command `lobewatch listen`: detect chatter in a recorded or live cut."""
 
-
 import contextlib
 import itertools
 from collections.abc import Sequence

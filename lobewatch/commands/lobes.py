@@ -1,6 +1,5 @@
 """Command `lobewatch lobes`: stability lobes and stable pockets of a tool."""
 
-
 from pathlib import Path
 from typing import Annotated, Literal
 

@@ -1,6 +1,5 @@
 """Command `lobewatch materials`: list materials with their cutting coefficients."""
 
-
 from typing import Annotated
 
 from typer import Argument

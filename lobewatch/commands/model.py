@@ -1,6 +1,5 @@
 """Command `lobewatch model`: modes and stiffness of the spindle model."""
 
-
 from pathlib import Path
 from typing import Annotated
 

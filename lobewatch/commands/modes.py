@@ -1,6 +1,5 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
-
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -8,21 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import (
-    AddedModes,
-    DroppedModes,
-    FileOptions,
-    FixedModes,
-    add_file_options,
-    reject_file_options,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit
 
 if TYPE_CHECKING:
     from modal import ModeEdits
 
 
-@add_file_options(without=["averages"])
+@shared.add_file_options(without=["averages"])
 def modes(
     file: Annotated[
         Path, Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005.")
@@ -47,7 +39,7 @@ def modes(
         Literal["none"] | None, Option(help="No force was measured: f_n and zeta alone, from the response.")
     ] = None,
     *,
-    file_options: FileOptions,
+    file_options: shared.FileOptions,
     accept: Annotated[
         list[str] | None, Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
@@ -65,9 +57,9 @@ def modes(
             "doubt."
         ),
     ] = None,
-    add: AddedModes = None,
-    drop: DroppedModes = None,
-    fix: FixedModes = None,
+    add: shared.AddedModes = None,
+    drop: shared.DroppedModes = None,
+    fix: shared.FixedModes = None,
     by_fit: Annotated[
         bool, Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
     ] = False,
@@ -110,7 +102,7 @@ def modes(
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
-        reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
+        shared.reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
         with nullcontext() if choice is None else publish_on_change(logbook):

@@ -1,6 +1,5 @@
 """Command `lobewatch observe`: record the result of a test cut by ear."""
 
-
 from typing import Annotated
 
 from typer import Option

@@ -1,6 +1,5 @@
 """Command `lobewatch paper`: compare with the paper of Gaber & Hashemi."""
 
-
 from pathlib import Path
 from typing import Annotated
 

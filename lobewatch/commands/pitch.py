@@ -1,6 +1,5 @@
 """Command `lobewatch pitch`: propose unequal pitches for a cutter."""
 
-
 from typing import Annotated
 
 from typer import Option

@@ -1,6 +1,5 @@
 """Command `lobewatch ports`: list serial ports and the devices on them."""
 
-
 from typing import Annotated
 
 from typer import Option

@@ -1,6 +1,5 @@
 """Command `lobewatch rebuild`: rebuild the history or a damaged journal."""
 
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch recommend`: recommend speed and depth for a tool and a material."""
 
-
 from typing import Annotated, Literal
 
 from typer import Exit, Option

@@ -1,26 +1,18 @@
 """Command `lobewatch replay`: store recorded files as tap tests."""
 
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import (
-    AddedModes,
-    DroppedModes,
-    FileOptions,
-    FixedModes,
-    Machine,
-    add_file_options,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, print_remarks
 
 
-@add_file_options()
+@shared.add_file_options()
 def replay(
-    machine: Machine,
+    machine: shared.Machine,
     files: Annotated[list[Path], Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')],
     tool: Annotated[str, Option(help="What was in the spindle; from the file, or [tap] tool, where not given.")] = "",
     direction: Annotated[
@@ -33,7 +25,7 @@ def replay(
         str, Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
     ] = "",
     *,
-    file_options: FileOptions,
+    file_options: shared.FileOptions,
     dry_run: Annotated[bool, Option("--dry-run", help="Say what would become of each file; store nothing.")] = False,
     keep_going: Annotated[
         bool, Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
@@ -48,9 +40,9 @@ def replay(
         list[str] | None,
         Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
-    add: AddedModes = None,
-    drop: DroppedModes = None,
-    fix: FixedModes = None,
+    add: shared.AddedModes = None,
+    drop: shared.DroppedModes = None,
+    fix: shared.FixedModes = None,
     temperature: Annotated[float | None, Option(help="Of the spindle then, degC.")] = None,
     hours: Annotated[float | None, Option(help="Running hours of the spindle then, h.")] = None,
     note: Annotated[str, Option(help="What else is to be remembered of these tests.")] = "",

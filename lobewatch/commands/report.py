@@ -1,6 +1,5 @@
 """Command `lobewatch report`: write an HTML report."""
 
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch sensors`: check hammer, accelerometer and DAQ."""
 
-
 from functools import partial
 from typing import Annotated
 

@@ -1,6 +1,5 @@
 """Command `lobewatch serve`: serve the dashboard of machines."""
 
-
 import time
 from typing import Annotated
 

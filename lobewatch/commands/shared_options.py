@@ -1,6 +1,5 @@
 """Options shared by several commands: facts about a file, edited modes, cuts and numbers."""
 
-
 import functools
 import inspect
 import re

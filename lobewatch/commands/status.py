@@ -1,6 +1,5 @@
 """Command `lobewatch status`: status of all machines, worst first."""
 
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 

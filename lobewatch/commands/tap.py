@@ -1,6 +1,5 @@
 """Command `lobewatch tap`: run a live tap test."""
 
-
 import contextlib
 import sys
 from typing import TYPE_CHECKING, Annotated

@@ -1,6 +1,5 @@
 """Command `lobewatch trend`: trend and forecast of a series."""
 
-
 from typing import Annotated
 
 from typer import Exit, Option

@@ -1,6 +1,5 @@
 """Command `lobewatch verify`: verify the files of a machine folder."""
 
-
 import typer
 
 from lobewatch.commands.shared_options import Machine

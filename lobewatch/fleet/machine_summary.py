@@ -13,19 +13,8 @@ import msgspec
 from acquisition import Remark
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
 from lobewatch.machine.folder_files import compute_change_mark
+from lobewatch.monitoring import status_rules
 from lobewatch.monitoring.alarm import Alarm, add_acknowledgements
-from lobewatch.monitoring.status_rules import (
-    UNREADABLE_NEXT_STEP,
-    StatusLevel,
-    add_damage_remarks,
-    count_days_left,
-    date_remarks,
-    find_next_step,
-    is_early_alarm,
-    sort_by_severity,
-    unreadable_remark,
-    worst_status,
-)
 from lobewatch.monitoring.threshold_dates import LimitForecasts, ProgramForecast
 
 SUMMARY_FILE_NAME = "standing.json"
@@ -65,7 +54,7 @@ class SeriesSummary(msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_s
 class DatedStatus(NamedTuple):
     """Status of a machine at a time."""
 
-    status: StatusLevel
+    status: status_rules.StatusLevel
     """Status of the most severe reason."""
     remarks: tuple[Remark, ...]
     """Reasons, most severe first."""
@@ -79,7 +68,7 @@ class DatedStatus(NamedTuple):
     @property
     def is_early(self) -> bool:
         """True if the alarm is a frequency drop below every limit."""
-        return is_early_alarm(self.remarks)
+        return status_rules.is_early_alarm(self.remarks)
 
     @property
     def is_readable(self) -> bool:
@@ -138,14 +127,14 @@ class MachineSummary(
         """Return the status at a time, with damage found since. `path` is that of the folder."""
         left, remarks = None, self.remarks
         if self.time is not None:
-            left = count_days_left(self.time, self.interval_days, now)
-            dated = date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
-            remarks = sort_by_severity([*remarks, *dated])
+            left = status_rules.count_days_left(self.time, self.interval_days, now)
+            dated = status_rules.date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
+            remarks = status_rules.sort_by_severity([*remarks, *dated])
         if damage:
-            remarks = add_damage_remarks(remarks, damage)
+            remarks = status_rules.add_damage_remarks(remarks, damage)
         acknowledged = add_acknowledgements(remarks, self.alarms, now)
-        next_step = find_next_step(remarks, self.default_next_step)
-        return DatedStatus(worst_status(remarks), acknowledged, next_step, left, now)
+        next_step = status_rules.find_next_step(remarks, self.default_next_step)
+        return DatedStatus(status_rules.worst_status(remarks), acknowledged, next_step, left, now)
 
     def mentions_path(self, path: str) -> bool:
         """Return whether a reason names a path."""
@@ -154,7 +143,7 @@ class MachineSummary(
 
 def summarize_unreadable(name: str, reason: str) -> MachineSummary:
     """Make the summary of a machine whose files cannot be read."""
-    return MachineSummary(name, (unreadable_remark(reason),), UNREADABLE_NEXT_STEP)
+    return MachineSummary(name, (status_rules.unreadable_remark(reason),), status_rules.UNREADABLE_NEXT_STEP)
 
 
 class _SummaryFile(msgspec.Struct, frozen=True, rename={"format_number": "make", "created": "made"}):

@@ -1,6 +1,5 @@
 """Open the logbook of one machine, query its analysis and add tap tests."""
 
-
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import wraps

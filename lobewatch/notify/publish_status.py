@@ -4,7 +4,6 @@ The last published message is stored with each machine and in the folder of the 
 machine can still be reported, and an unchanged status is published once a day only.
 """
 
-
 import contextlib
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping

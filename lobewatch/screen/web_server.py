@@ -13,25 +13,7 @@ import msgspec
 from aiohttp import web
 
 from acquisition import DeviceError, check_name
-from lobewatch.screen.access_control import (
-    HAS_FULL_ACCESS,
-    PUBLIC_ROUTE_PREFIX,
-    ConnectionLimiter,
-    check_tokens,
-    make_guarded_application,
-    open_listener,
-)
-from lobewatch.screen.live_feed import (
-    SHUTDOWN_EVENT,
-    State,
-    StateEncoder,
-    StateSource,
-    encode_curves,
-    encode_cut_state,
-    encode_plots,
-    encode_tap_state,
-    stream_states,
-)
+from lobewatch.screen import access_control, live_feed
 from lobewatch.show.terminal.terminal_screen import RunningTest
 from lobewatch.tap.cut_recording import CutState
 from lobewatch.tap.state import StatePublisher, TapState
@@ -50,7 +32,7 @@ WILDCARD_ADDRESSES = {
 Body = TypeVar("Body")
 
 
-class WatchedTest(RunningTest, StateSource[TapState], Protocol):
+class WatchedTest(RunningTest, live_feed.StateSource[TapState], Protocol):
     """Live tap test that pages follow."""
 
 
@@ -79,30 +61,30 @@ def add_pages(application: web.Application, pages: dict[str, str]) -> None:
             raise web.HTTPNotFound(text="there is no such file")
         return respond(name)
 
-    application.router.add_get("/static/{name}", static, name=f"{PUBLIC_ROUTE_PREFIX}static")
+    application.router.add_get("/static/{name}", static, name=f"{access_control.PUBLIC_ROUTE_PREFIX}static")
     for i, (path, name) in enumerate(pages.items()):
 
         async def page(_: web.Request, name: str = name) -> web.Response:
             return respond(name)
 
-        application.router.add_get(path, page, name=f"{PUBLIC_ROUTE_PREFIX}page{i}")
+        application.router.add_get(path, page, name=f"{access_control.PUBLIC_ROUTE_PREFIX}page{i}")
 
 
 def add_feed(
     application: web.Application,
     prefix: str,
-    find: Callable[[web.Request], StateSource[State]],
-    encoder: StateEncoder[State],
+    find: Callable[[web.Request], live_feed.StateSource[live_feed.State]],
+    encoder: live_feed.StateEncoder[live_feed.State],
 ) -> None:
     """Serve the feed of a source. `find` raises HTTPNotFound if there is none."""
 
     async def follow(request: web.Request) -> web.StreamResponse:
         find(request)
-        return await stream_states(request, lambda: find(request), encoder)
+        return await live_feed.stream_states(request, lambda: find(request), encoder)
 
     async def access(request: web.Request) -> web.Response:
         find(request)
-        return web.json_response({"may_alter": request[HAS_FULL_ACCESS]})
+        return web.json_response({"may_alter": request[access_control.HAS_FULL_ACCESS]})
 
     application.router.add_get(f"{prefix}feed", follow)
     application.router.add_get(f"{prefix}access", access)
@@ -121,7 +103,7 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         find(request).choose(choice.key, choice.tool)
         return web.json_response({})
 
-    add_feed(application, prefix, find, StateEncoder(encode_tap_state, encode_plots))
+    add_feed(application, prefix, find, live_feed.StateEncoder(live_feed.encode_tap_state, live_feed.encode_plots))
     for name, action in {"undo": undo_or_stop, "stop": undo_or_stop, "choose": choose}.items():
         application.router.add_post(f"{prefix}{name}", action)
 
@@ -141,12 +123,12 @@ class WebServerThread:
         """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
-        tokens = check_tokens(token, watch_token)
+        tokens = access_control.check_tokens(token, watch_token)
         self.token, self.watch_token = tokens
         self._listen = listen.lower()
-        self.limiter = ConnectionLimiter()
+        self.limiter = access_control.ConnectionLimiter()
         """Limiter that accepts and counts connections."""
-        self.application = make_guarded_application(tokens, self._listen, self.limiter)
+        self.application = access_control.make_guarded_application(tokens, self._listen, self.limiter)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
         self._ready = threading.Event()
@@ -189,16 +171,16 @@ class WebServerThread:
         return f"{self.origin}/#token={self.watch_token}"
 
     async def _serve(self) -> None:
-        self.application[SHUTDOWN_EVENT] = asyncio.Event()
+        self.application[live_feed.SHUTDOWN_EVENT] = asyncio.Event()
 
         async def signal_shutdown(application: web.Application) -> None:
-            application[SHUTDOWN_EVENT].set()
+            application[live_feed.SHUTDOWN_EVENT].set()
 
         self.application.on_shutdown.append(signal_shutdown)
         runner = web.AppRunner(self.application, access_log=None, logger=HTTP_LOG, shutdown_timeout=2.0)
         try:
             await runner.setup()
-            listener = open_listener(self._listen, self._port)
+            listener = access_control.open_listener(self._listen, self._port)
         except (OSError, ValueError) as error:  # ValueError: a name that no network can have
             self._error = error
             self._ready.set()
@@ -300,4 +282,9 @@ class CutScreenServer(WebServerThread):
         """
         super().__init__(listen, 0, token, watch_token)
         add_pages(self.application, {"/": "listen.html"})
-        add_feed(self.application, "/", lambda _: pictures, StateEncoder(encode_cut_state, encode_curves))
+        add_feed(
+            self.application,
+            "/",
+            lambda _: pictures,
+            live_feed.StateEncoder(live_feed.encode_cut_state, live_feed.encode_curves),
+        )

@@ -1,6 +1,5 @@
 """Store recorded files as tap tests of a machine, each once."""
 
-
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -3,16 +3,15 @@
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from acquisition import DataError, read_tap
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.machine import Machine, ProgramTable, TapEntry
+from lobewatch.logbook.recordings.recorded_files import parse_context
+from lobewatch.machine import ProgramTable, TapEntry
 from lobewatch.machine.folder_contents import find_file_fault
-from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 from lobewatch.tool.assembly import Assembly
@@ -87,14 +86,14 @@ def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
         path = Path(work) / "tap.h5"
         path.write_bytes(tap.content)
         try:
-            return fit_tap(read_tap(path), _parse_cached(tap.machine_toml), tap.entry.by_hand)
+            return fit_tap(read_tap(path), parse_context(tap.machine_toml).machine, tap.entry.by_hand)
         except DataError:
             return None
 
 
 def evaluate_programs(request: VerdictRequest) -> dict[str, Verdict]:
     """Evaluate all programs, by name."""
-    machine = _parse_cached(request.machine_toml)
+    machine = parse_context(request.machine_toml).machine
     return {table.name: evaluate_program(table, request.tools[table.tool], machine) for table in machine.program}
 
 
@@ -103,7 +102,7 @@ def _is_tap_fit(tap: TapFileBytes, answer: Any) -> bool:
 
 
 def _are_verdicts(request: VerdictRequest, answer: Any) -> bool:
-    programs = {table.name: table for table in _parse_cached(request.machine_toml).program}
+    programs = {table.name: table for table in parse_context(request.machine_toml).machine.program}
     return answer.keys() == programs.keys() and all(_is_verdict(programs[name], answer[name]) for name in programs)
 
 
@@ -112,8 +111,3 @@ def _is_verdict(program: ProgramTable, answer: Any) -> bool:
     is_known = answer.stability is not Stability.UNKNOWN
     is_typed = isinstance(answer, Verdict) and isinstance(answer.stability, Stability)
     return is_typed and answer.program == program and is_known == (answer.limit > 0)
-
-
-@lru_cache(maxsize=4)
-def _parse_cached(toml: str) -> Machine:
-    return parse_machine_file(toml)

@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
@@ -27,6 +28,7 @@ from acquisition.files.contents.description import Origin
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
 from lobewatch.machine import Machine, MachineFolder
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
 
 DATE_REQUEST = (
@@ -101,6 +103,12 @@ class MachineContext(NamedTuple):
     def of(cls, folder: MachineFolder) -> Self:
         """Read the present settings of a machine."""
         return cls(folder.machine, folder.toml_text)
+
+
+@lru_cache(maxsize=4)
+def parse_context(machine_toml: str) -> MachineContext:
+    """Parse the content of machine.toml."""
+    return MachineContext(parse_machine_file(machine_toml), machine_toml)
 
 
 def read_tap_test(

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import json
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -100,8 +100,8 @@ def encode_curves(curves: Mapping[str, NDArray[np.float64]], band: tuple[float, 
 
 
 def _hit_json(hit: ListedHit) -> dict[str, Any]:
-    verdict = {"good": not hit.flags, "verdict": hit.flags.words}
-    return {"number": hit.number, **verdict, "peak": hit.peak, "undone": hit.undone}
+    good, verdict = not hit.flags, hit.flags.words
+    return {"number": hit.number, "good": good, "verdict": verdict, "peak": hit.peak, "undone": hit.undone}
 
 
 def _comparison_json(comparison: CutComparison) -> dict[str, Any]:
@@ -184,10 +184,9 @@ async def stream_states(
     await socket.prepare(request)
     subscription = _FeedSubscription(find)
     # A page sends nothing, so any message from it ends the feed.
-    ends = [
-        asyncio.create_task(_set_when_done(end, subscription.changed))
-        for end in (socket.receive(), request.app[SHUTDOWN_EVENT].wait())
-    ]
+    ends = [asyncio.ensure_future(end) for end in (socket.receive(), request.app[SHUTDOWN_EVENT].wait())]
+    for end in ends:
+        end.add_done_callback(lambda _: subscription.changed.set())
     try:
         await _send_changes(socket, subscription, encoder, lambda: any(end.done() for end in ends))
         await socket.close(code=WSCloseCode.GOING_AWAY)
@@ -227,10 +226,3 @@ async def _send_changes(
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(last + (HEARTBEAT_INTERVAL if state is sent else MIN_STATE_INTERVAL)):
                 await subscription.changed.wait()
-
-
-async def _set_when_done(end: Awaitable[object], event: asyncio.Event) -> None:
-    try:
-        await end
-    finally:
-        event.set()

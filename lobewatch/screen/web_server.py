@@ -5,9 +5,10 @@ import logging
 import socket
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from importlib import resources
 from types import TracebackType
-from typing import Protocol, Self, TypeVar, cast
+from typing import Protocol, Self, TypedDict, TypeVar, Unpack, cast
 
 import msgspec
 from aiohttp import web
@@ -116,10 +117,25 @@ async def read_body(request: web.Request, kind: type[Body], hint: str) -> Body:
         raise web.HTTPBadRequest(text=hint) from None
 
 
+class ServerOptions(TypedDict, total=False):
+    """Options of a server."""
+
+    listen: str
+    """Address of this computer to listen at. Default: 127.0.0.1."""
+    port: int
+    """Port of the pages. Default: 0, any free one."""
+    token: str | None
+    """Token for full access. Default: random."""
+    watch_token: str | None
+    """Token for read-only access. Default: random."""
+
+
 class WebServerThread:
     """Thread that serves `application` while its context lasts. Add the routes before."""
 
-    def __init__(self, listen: str, port: int, token: str | None, watch_token: str | None = None) -> None:
+    def __init__(
+        self, listen: str = "127.0.0.1", port: int = 0, token: str | None = None, watch_token: str | None = None
+    ) -> None:
         """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
@@ -131,27 +147,24 @@ class WebServerThread:
         self.application = access_control.make_guarded_application(tokens, self._listen, self.limiter)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
-        self._ready = threading.Event()
-        self._error: Exception | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop = Future[asyncio.AbstractEventLoop]()
         self._stop = asyncio.Event()
 
     def __enter__(self) -> Self:
         """Start to serve. DeviceError if the address is not available."""
         self._thread.start()
-        self._ready.wait()
-        if self._error is not None:
-            why = getattr(self._error, "strerror", None) or self._error
-            text = f"cannot listen on {self._listen} port {self._port} ({why})"
-            raise DeviceError(text, "choose another port or address") from self._error
+        try:
+            self._loop.result()
+        except (OSError, ValueError) as error:
+            text = f"cannot listen on {self._listen} port {self._port} ({getattr(error, 'strerror', None) or error})"
+            raise DeviceError(text, "choose another port or address") from error
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Send the last state to every page, then close."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(self._stop.set)
+        self._loop.result().call_soon_threadsafe(self._stop.set)
         self._thread.join()
 
     @property
@@ -182,8 +195,7 @@ class WebServerThread:
             await runner.setup()
             listener = access_control.open_listener(self._listen, self._port)
         except (OSError, ValueError) as error:  # ValueError: a name that no network can have
-            self._error = error
-            self._ready.set()
+            self._loop.set_exception(error)
         else:
             with listener:
                 await self._accept(listener, cast(web.Server, runner.server))
@@ -191,9 +203,8 @@ class WebServerThread:
 
     async def _accept(self, listener: socket.socket, server: web.Server) -> None:
         self._port = listener.getsockname()[1]
-        self._loop = asyncio.get_running_loop()
-        serving = self._loop.create_task(self.limiter.serve(listener, server))
-        self._ready.set()
+        serving = asyncio.create_task(self.limiter.serve(listener, server))
+        self._loop.set_result(asyncio.get_running_loop())
         await self._stop.wait()
         serving.cancel()
         await asyncio.wait([serving])
@@ -217,36 +228,23 @@ class ScreenServer(WebServerThread):
     `url` gives full access: watch, undo and stop. `watch_url` is read-only. Without a token nothing is visible.
     """
 
-    def __init__(
-        self,
-        session: WatchedTest,
-        *,
-        listen: str = "127.0.0.1",
-        port: int = 0,
-        token: str | None = None,
-        watch_token: str | None = None,
-    ) -> None:
+    def __init__(self, session: WatchedTest, **options: Unpack[ServerOptions]) -> None:
         """Prepare the server.
 
         Parameters
         ----------
         session
             Live tap test.
-        listen
-            Address of this computer to listen at.
-        port
-            Port of the pages. 0 for any free one.
-        token
-            Token for full access. None for a random one.
-        watch_token
-            Token for read-only access. None for a random one.
+        options
+            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
+            free one. `token` for full access and `watch_token` for read-only access, by default random.
 
         Raises
         ------
         ValueError
             If a token does not fit into an address.
         """
-        super().__init__(listen, port, token, watch_token)
+        super().__init__(**options)
         add_pages(self.application, {"/": "screen.html"})
         add_session(self.application, "/", lambda _: session)
 
@@ -254,33 +252,23 @@ class ScreenServer(WebServerThread):
 class CutScreenServer(WebServerThread):
     """Read-only server of the screen of a cut recording, in a thread of its own while its context lasts."""
 
-    def __init__(
-        self,
-        pictures: StatePublisher[CutState],
-        *,
-        listen: str = "127.0.0.1",
-        token: str | None = None,
-        watch_token: str | None = None,
-    ) -> None:
-        """Prepare the server at any free port.
+    def __init__(self, pictures: StatePublisher[CutState], **options: Unpack[ServerOptions]) -> None:
+        """Prepare the server.
 
         Parameters
         ----------
         pictures
             Publisher of the states of the recording.
-        listen
-            Address of this computer to listen at.
-        token
-            Token for full access. None for a random one.
-        watch_token
-            Token for read-only access. None for a random one.
+        options
+            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
+            free one. `token` for full access and `watch_token` for read-only access, by default random.
 
         Raises
         ------
         ValueError
             If a token does not fit into an address.
         """
-        super().__init__(listen, 0, token, watch_token)
+        super().__init__(**options)
         add_pages(self.application, {"/": "listen.html"})
         add_feed(
             self.application,

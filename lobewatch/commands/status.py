@@ -55,8 +55,7 @@ def status(
         raise ValueError("--csv and --json: give one of them")
     if forget and not to_notify:
         raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
-    machines = find_machines(folder)
-    fleet = Fleet(machines, with_option_names)
+    fleet = Fleet(find_machines(folder), with_option_names)
     if jobs > 1 or scheduler:
         _make_missing_summaries(fleet, jobs, scheduler)
     assessed = fleet.assess_machines()
@@ -79,7 +78,7 @@ def status(
     if to_notify:
         from lobewatch.notify.publish_status import publish_folder
 
-        failures = len(publish_folder(folder, machines, assessed, forget))
+        failures = len(publish_folder(folder, assessed, forget))
     needs_care = any(row["light"] is StatusLevel.ALARM or not row["can_be_judged"] for row in rows)
     raise Exit(1 if needs_care else 2 * (failures > 0))
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from acquisition import Remark
-from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
+from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.monitoring import status_rules
 from lobewatch.monitoring.alarm import Alarm, add_acknowledgements
@@ -136,10 +136,6 @@ class MachineSummary(
         next_step = status_rules.find_next_step(remarks, self.default_next_step)
         return DatedStatus(status_rules.worst_status(remarks), acknowledged, next_step, left, now)
 
-    def mentions_path(self, path: str) -> bool:
-        """Return whether a reason names a path."""
-        return any(path in text for remark in self.remarks for text in (remark.text, remark.cure))
-
 
 def summarize_unreadable(name: str, reason: str) -> MachineSummary:
     """Make the summary of a machine whose files cannot be read."""
@@ -186,18 +182,14 @@ def decode_summary(folder: Path, content: bytes, now: datetime) -> MachineSummar
     summary, age = file.summary, now - file.created
     if file.mark != compute_change_mark(folder, summary.newest_file) or not timedelta(0) <= age < SUMMARY_LIFETIME:
         return None
-    return None if summary.path != str(folder) and summary.mentions_path(summary.path) else summary
+    texts = (text for remark in summary.remarks for text in (remark.text, remark.cure))
+    return None if summary.path != str(folder) and any(summary.path in text for text in texts) else summary
 
 
 def encode_summary(summary: MachineSummary, mark: tuple[int, ...], now: datetime) -> bytes:
     """Encode the content of standing.json. `mark` is the change mark of the summarized files."""
     body = _encode_file(_SummaryFile(SUMMARY_FORMAT_NUMBER, software_version(), mark, now, summary))
     return _make_crc_head(body) + body[1:]
-
-
-def write_summary(folder: Path, summary: MachineSummary, mark: tuple[int, ...], now: datetime) -> None:
-    """Write standing.json atomically. Call it under the lock. OSError if it cannot be written."""
-    atomic_write(folder / SUMMARY_FILE_NAME, encode_summary(summary, mark, now), lasting=False)
 
 
 def _read_content(folder: Path) -> bytes:

@@ -13,10 +13,10 @@ from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from acquisition import CROSS_TAP
+from acquisition.file_io import atomic_write
 from lobewatch.fleet.machine_summary import (
     SUMMARY_FILE_NAME,
     MachineSummary,
@@ -24,7 +24,6 @@ from lobewatch.fleet.machine_summary import (
     decode_summary,
     encode_summary,
     read_last_summary,
-    write_summary,
 )
 from lobewatch.history.history import History
 from lobewatch.history.row_codec import encode_row
@@ -146,7 +145,8 @@ def summarize_machine(logbook: Logbook, now: datetime | None = None, render_text
     mark = compute_change_mark(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
         with contextlib.suppress(BusyError, OSError), logbook.folder.locked(patience=0):
-            write_summary(logbook.folder.path, summary, mark, now)
+            path = logbook.folder.path / SUMMARY_FILE_NAME
+            atomic_write(path, encode_summary(summary, mark, now), lasting=False)
     return summary
 
 
@@ -176,20 +176,16 @@ def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: Ren
 
 
 def _summarize_series(series: SeriesStatus) -> SeriesSummary:
-    trend, drop = series.trend, series.drop
-    summary = SeriesSummary(
-        name=series.name,
-        tool=series.tool,
-        direction=series.direction,
-        drop=drop.value if drop.is_known else None,
-        drop_std=drop.std if drop.is_known and math.isfinite(drop.std) else None,
-        frequency=None,
-    )
+    trend, drop, names = series.trend, series.drop, (series.name, series.tool, series.direction)
+    value = drop.value if drop.is_known else None
+    std = drop.std if drop.is_known and math.isfinite(drop.std) else None
     if trend is None:
-        return summary
-    return msgspec.structs.replace(
-        summary,
-        frequency=trend.first_value * math.exp(trend.points[-1].percent / 100),
+        return SeriesSummary(*names, value, std, None)
+    return SeriesSummary(
+        *names,
+        value,
+        std,
+        trend.first_value * math.exp(trend.points[-1].percent / 100),
         alarm=trend.open_drop.change.kind if trend.open_drop is not None else "",
         scatter=estimate_scatter(trend.readings.y),
         common_scatter=estimate_scatter(trend.readings.mean_of_directions.y),

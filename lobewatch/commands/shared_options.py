@@ -96,7 +96,7 @@ class FileOptions:
     sensitivity: Annotated[str, Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')] = ""
     """Sensitivities of the channels, separated by commas."""
 
-    def description(self, **fields: Any) -> acquisition.Description:
+    def description(self, **fields: Any) -> "acquisition.Description":
         """Make the description of a file. ValueError for an invalid full scale."""
         try:
             scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()

@@ -270,7 +270,7 @@ class Logbook:
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(self, files: Sequence[Path], description: Description, **options: Any) -> recordings.ReplayOutcome:
+    def replay_all(self, files: Sequence[Path], description: Description, **options: Any) -> "recordings.ReplayOutcome":
         """Store recorded files as tap tests, each once.
 
         Parameters

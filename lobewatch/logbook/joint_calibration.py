@@ -1,7 +1,7 @@
 """Calibrate joints and bearings of the model from tap tests of several tools."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import timedelta
@@ -45,9 +45,11 @@ def compute_start_factors(spindle: dsm.Spindle, bearings: float, radial: float, 
 
 def split_tilting_groups(spindle: dsm.Spindle) -> dsm.Spindle:
     """Give the tilting stiffness of each joint a group of its own."""
-    return _replace_grouped_joints(
-        spindle, lambda joint: {"rotational_group": joint.rotational_group or f"{joint.group} tilting"}
-    )
+    joints = [
+        replace(joint, rotational_group=joint.rotational_group or f"{joint.group} tilting") if joint.group else joint
+        for joint in spindle.joints
+    ]
+    return replace(spindle, joints=joints)
 
 
 def keep_groups(spindle: dsm.Spindle) -> dsm.Spindle:
@@ -123,9 +125,12 @@ def _generate_guesses(taps: Sequence[tool_modes.TappedTool], position: float) ->
     first = taps[0]
     for radial, tilting in product(JOINT_STIFFNESS_FACTORS, repeat=2):
         with suppress(ValueError, ArithmeticError):
-            scaled = [_scale_joints(tap.spindle, radial, tilting) for tap in taps]
+            factors = {"stiffness": radial, "rotational_stiffness": tilting}
+            scaled = [replace(tap.spindle, joints=_scale_springs(tap.spindle.joints, factors)) for tap in taps]
             factor = dsm.calibrate(scaled[0], first.followed.frequency, mode=first.mode_number).factor
-            matches = _match_all(taps, [_scale_bearings(spindle, factor) for spindle in scaled], position)
+            bearings = [_scale_springs(spindle.bearings, {"stiffness": factor}) for spindle in scaled]
+            spindles = [replace(spindle, bearings=new) for spindle, new in zip(scaled, bearings, strict=True)]
+            matches = _match_all(taps, spindles, position)
             yield InitialGuess(sum(match.cost for match in matches), factor, radial, tilting, matches)
 
 
@@ -134,24 +139,10 @@ def _select_distinct(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
     return list({str(_mode_numbers(start.matches)): start for start in reversed(starts)}.values())[::-1]
 
 
-def _scale_joints(spindle: dsm.Spindle, radial: float, tilting: float) -> dsm.Spindle:
-    factors = {"stiffness": radial, "rotational_stiffness": tilting}
-    return _replace_grouped_joints(
-        spindle, lambda joint: {name: factor * getattr(joint, name) for name, factor in factors.items()}
-    )
-
-
-def _replace_grouped_joints(spindle: dsm.Spindle, changes: Callable[[dsm.Joint], dict[str, Any]]) -> dsm.Spindle:
-    joints = [replace(joint, **changes(joint)) if joint.group else joint for joint in spindle.joints]
-    return replace(spindle, joints=joints)
-
-
-def _scale_bearings(spindle: dsm.Spindle, factor: float) -> dsm.Spindle:
-    bearings = [
-        replace(bearing, stiffness=factor * bearing.stiffness) if bearing.group else bearing
-        for bearing in spindle.bearings
-    ]
-    return replace(spindle, bearings=bearings)
+def _scale_springs(springs: Sequence[Any], factors: Mapping[str, float]) -> list[Any]:
+    """Scale stiffnesses of the bearings or joints that belong to a group."""
+    scaled = [{name: factor * getattr(spring, name) for name, factor in factors.items()} for spring in springs]
+    return [replace(spring, **new) if spring.group else spring for spring, new in zip(springs, scaled, strict=True)]
 
 
 def _iterate_fit(taps: Sequence[tool_modes.TappedTool], start: InitialGuess, position: float) -> JointFit:

@@ -1,10 +1,9 @@
 """Rebuild history.rows from the tap tests, with the verdict on every program after each test."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from acquisition import DataError, read_tap
 from lobewatch.logbook.analysis import Analysis
@@ -21,8 +20,7 @@ RebuildProgress = Callable[[int, int], None]
 """Callback for progress: number of finished tap tests, and of all."""
 
 
-@dataclass(frozen=True)
-class TapFileBytes:
+class TapFileBytes(NamedTuple):
     """Content of one tap file, for a worker."""
 
     entry: TapEntry
@@ -33,8 +31,7 @@ class TapFileBytes:
     """Content of machine.toml."""
 
 
-@dataclass(frozen=True, eq=False)
-class VerdictRequest:
+class VerdictRequest(NamedTuple):
     """Request for the verdicts on all programs after one tap test, for a worker."""
 
     tools: Mapping[str, Assembly | DataError]
@@ -53,21 +50,14 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgres
         fits = share_work(fit_tap_bytes, contents, workers, _is_tap_fit)
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
-    for number, (tap_id, verdicts) in enumerate(_evaluate_all(logbook, tap_ids, toml, workers), 1):
+    verdicts_of_all: Iterable[dict[str, Verdict]] = [{}] * len(tap_ids)
+    if workers.use_other_processes:
+        requests = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
+        verdicts_of_all = share_work(evaluate_programs, requests, workers, _are_verdicts)
+    for number, (tap_id, verdicts) in enumerate(zip(tap_ids, verdicts_of_all, strict=True), 1):
         logbook.query(Analysis.stored_verdicts, tap_id, verdicts=verdicts)
         progress(number, len(tap_ids))
     return len(tap_ids)
-
-
-def _evaluate_all(
-    logbook: Logbook, tap_ids: list[str], toml: str, workers: Workers
-) -> Iterator[tuple[str, dict[str, Verdict]]]:
-    """Yield the verdicts of workers after each tap test; none without workers."""
-    if not workers.use_other_processes:
-        yield from ((tap_id, {}) for tap_id in tap_ids)
-        return
-    requests = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, share_work(evaluate_programs, requests, workers, _are_verdicts), strict=True)
 
 
 def _read_tap_bytes(logbook: Logbook, entry: TapEntry, toml: str) -> TapFileBytes:

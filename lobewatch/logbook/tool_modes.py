@@ -115,17 +115,11 @@ def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> Tapped
     low, high = machine.mode.band_hz or (0.0, math.inf)
     in_band = [mode for mode in measurement.modes if low <= mode.frequency <= high]
     scatter = tap_scatter_of(logbook.assembly(row.tool, row.tap_id), row.direction, machine.doubt)
-    return TappedTool(
-        row.tool,
-        row.tap_id,
-        row.time,
-        machine.model(row.tool),
-        number,
-        measurement.followed,
-        tuple(mode for mode in select_credible_modes(in_band).modes if mode is not measurement.followed),
-        scatter.frequency / HALF_WIDTH_95_PER_STD,
-        machine.drawing_tolerance,
-    )
+    credible = select_credible_modes(in_band).modes
+    others = tuple(mode for mode in credible if mode is not measurement.followed)
+    about = row.tool, row.tap_id, row.time, machine.model(row.tool), number
+    std = scatter.frequency / HALF_WIDTH_95_PER_STD
+    return TappedTool(*about, measurement.followed, others, std, machine.drawing_tolerance)
 
 
 class ToolModeMatch(NamedTuple):

@@ -64,10 +64,8 @@ class LiveTest(TapVisit):
         def plan(tool: str, direction: TapDirection) -> TapSession:
             return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume)
 
-        def publish(_: TapSession) -> None:
-            publish_status(Logbook.open(folder.path))
-
-        super().__init__(plan, folder.machine.tap.tool, direction, after=publish)
+        tool = folder.machine.tap.tool
+        super().__init__(plan, tool, direction, after=lambda _: publish_status(Logbook.open(folder.path)))
         self._final_state: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()

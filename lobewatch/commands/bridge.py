@@ -7,7 +7,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.output import Json, notes, results
 
 
@@ -15,7 +15,7 @@ def bridge(
     driver: Annotated[str, Argument(help="Name of the driver, as in [daq] of machine.toml.")],
     machine: Annotated[
         Path | None,
-        Argument(parser=to_folder_path, help="Machine folder whose [daq] sets the device up: port, sensors, rate."),
+        FolderArgument(help="Machine folder whose [daq] sets the device up: port, sensors, rate."),
     ] = None,
     port: Annotated[str, Option(help="Port of the device; that of [daq] where not given.")] = "",
     listen: Annotated[

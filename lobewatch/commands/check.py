@@ -69,13 +69,10 @@ def check(
             slow = True
         programs.append(show.advise_program(logbook, verdict))
     remarks = logbook.remarks
-    emit(
-        show.check_json(programs, remarks)
-        | {"recommendations": [recommendation_json(answer) for answer in recommendations]},
-        as_json,
-        *(show.check_texts(programs, remarks, logbook.machine) if programs else ()),
-        *(line for answer in recommendations for line in recommendation_lines(answer)),
-        *([show.check_summary_text(programs, len(recommendations))] if programs else ()),
-    )
+    payload = {"recommendations": [recommendation_json(answer) for answer in recommendations]}
+    texts = show.check_texts(programs, remarks, logbook.machine) if programs else []
+    lines = [line for answer in recommendations for line in recommendation_lines(answer)]
+    summary = [show.check_summary_text(programs, len(recommendations))] if programs else []
+    emit(show.check_json(programs, remarks) | payload, as_json, *texts, *lines, *summary)
     if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
         raise Exit(1)

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
-from typer import Argument, Option
+from typer import Option
 
 import acquisition
-from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName
 from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
@@ -27,9 +26,7 @@ SCENARIO_MONTHS = 24
 class EmulateOptions:
     """Options of an emulator, in the order of the help page."""
 
-    machine: Annotated[
-        Path, Argument(parser=to_folder_path, help="Machine folder with a spindle in its machine.toml: what is hit.")
-    ]
+    machine: Annotated[Path, FolderArgument(help="Machine folder with a spindle in its machine.toml: what is hit.")]
     """Machine folder."""
     tcp: Annotated[bool, Option("--tcp", help="On a TCP port of this computer instead.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
@@ -105,6 +102,7 @@ def _format_help(name: str, title: str) -> str:
 
 def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
+    from acquisition.devices import find_driver
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 
@@ -114,37 +112,34 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     story, seed, spindle = WearScenario(options.story), options.seed, None
     if story is not WearScenario.NONE or any(mounting):
         spindle = build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, seed)
-    shared = {"folder": folder, "seed": seed, "realtime": not options.fast, "tcp": options.tcp, "spindle": spindle}
+    shared = {"driver": find_driver(name), "folder": folder, "spindle": spindle, "seed": seed}
+    shared |= {"realtime": not options.fast, "tcp": options.tcp}
     cut = options.cut
-    emulation = _emulate_tap(name, options, shared) if cut is None else _emulate_cut(name, options, cut, shared)
-    _serve_until_interrupted(emulation, options)
+    _serve(_emulate_tap(options, shared) if cut is None else _emulate_cut(options, cut, shared), options)
 
 
-def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
     """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
-    from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    driver = find_driver(name)
-    emulated = emulate_machine(driver=driver, direction=options.direction, axes_angle=options.askew, **shared)
+    emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
     words = f" --direction {options.direction}" * (options.direction != "x")
     return emulated.device, truth, text, "tap", words
 
 
-def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
-    from acquisition.devices import find_driver
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 
     setting = find_cut_setting(shared["folder"].machine, program, options.speed, options.depth)
-    emulated = emulate_cut(driver=find_driver(name), setting=setting, **shared)
+    emulated = emulate_cut(setting=setting, **shared)
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
     truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
     stable = "any depth" if limit is None else f"{limit:.3g} mm"
@@ -153,7 +148,7 @@ def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mappi
     return emulated.device, truth, text, "listen", words
 
 
-def _serve_until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
+def _serve(emulation: Emulation, options: EmulateOptions) -> None:
     """Print the port and the true values, and serve until Ctrl-C."""
     emulator, truth, truth_text, next_command, next_options = emulation
     with emulator as device:

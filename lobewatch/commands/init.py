@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from typer import Argument, Option
+from typer import Option
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ Answer = str | None
 
 
 def init(
-    machine: Annotated[Path, Argument(parser=to_folder_path, help="The folder to make.")],
+    machine: Annotated[Path, FolderArgument(help="The folder to make.")],
     example: Annotated[bool, Option("--example", help="With the surrogate spindle and three programs.")] = False,
     yes: Annotated[bool, Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
     edit: Annotated[str, Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",

@@ -46,14 +46,10 @@ def recommend(
     if save is not None:
         check_program_name(logbook.machine, save)
     answer = recommend_requested(logbook, cut, save)
-    if save is not None and answer.setting is not None:
+    saved = None if answer.setting is None else save
+    if saved is not None:
         save_program(logbook.folder, answer.program)
-    saved = save if answer.setting is not None else None
     payload = recommendation_json(answer, logbook.remarks) | {"saved": saved}
-    lines = [
-        *recommendation_lines(answer, logbook.remarks),
-        *(saved_lines(logbook.folder.path, saved) if saved else ()),
-    ]
-    emit(payload, as_json, *lines)
-    if answer.setting is None:
-        raise Exit(1)
+    next_lines = saved_lines(logbook.folder.path, saved) if saved else ()
+    emit(payload, as_json, *recommendation_lines(answer, logbook.remarks), *next_lines)
+    raise Exit(int(answer.setting is None))

@@ -26,13 +26,12 @@ def number(text: str | float) -> float:
 
 
 Command = Callable[..., None]
+FolderArgument = functools.partial(Argument, parser=to_folder_path)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
-Machine = Annotated[Path, Argument(parser=to_folder_path, help="Machine folder.")]
-TappedMachine = Annotated[Path, Argument(parser=to_folder_path, help="Machine folder with at least one tap test.")]
-SpindleMachine = Annotated[
-    Path, Argument(parser=to_folder_path, help="Machine folder with a [spindle] in its machine.toml.")
-]
-FleetFolder = Annotated[Path, Argument(parser=to_folder_path, help="Machine folder, or a folder of machine folders.")]
+Machine = Annotated[Path, FolderArgument(help="Machine folder.")]
+TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at least one tap test.")]
+SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with a [spindle] in its machine.toml.")]
+FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
 ExcludableEntry = Annotated[
     str, Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1.")
 ]
@@ -103,9 +102,8 @@ class FileOptions:
         except ValueError as error:
             text = f'--full-scale {self.full_scale}: give a number for each channel, as in "500,50"'
             raise ValueError(text) from error
-        columns, sensitivity = _split_words(self.columns), _split_words(self.sensitivity)
-        lists = {"columns": columns, "full_scale": scales, "sensitivity": sensitivity}
-        return acquisition.Description(**vars(self) | lists | fields)
+        lists = {"columns": _split_words(self.columns), "sensitivity": _split_words(self.sensitivity)}
+        return acquisition.Description(**vars(self) | lists | {"full_scale": scales} | fields)
 
 
 def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Command]:
@@ -139,16 +137,7 @@ def _split_words(text: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in text.split(",")) if text else ()
 
 
-def cut_fields(
-    speed: float | None,
-    depth: float | None,
-    tool: str | None,
-    material: str | None,
-    teeth: int | None,
-    diameter: float | None,
-    radial: float | None,
-    direction: str | None,
-) -> dict[str, Any]:
-    """Collect the options of a requested cut as fields of a [[program]]."""
+def cut_fields(*values: object) -> dict[str, Any]:
+    """Collect speed, depth, tool, material, teeth, diameter, radial depth and direction as fields of a [[program]]."""
     names = ("speed_rpm", "depth_mm", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm", "direction")
-    return dict(zip(names, (speed, depth, tool, material, teeth, diameter, radial, direction), strict=True))
+    return dict(zip(names, values, strict=True))

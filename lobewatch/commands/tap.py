@@ -2,15 +2,12 @@
 
 import contextlib
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, serve_screen
-
-if TYPE_CHECKING:
-    from acquisition import TapDirection
 
 
 def tap(
@@ -57,7 +54,7 @@ def tap(
       lobewatch tap mill-3 --temperature 24 --reclamped --note "after a warm-up of 20 min"
       lobewatch tap trial --port file:taps/ID.h5
     """
-    from acquisition import Conditions, parse_direction
+    from acquisition import Conditions, TapDirection, parse_direction
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status

@@ -11,13 +11,8 @@ import lobewatch.fleet as fleet
 import lobewatch.machine as machine
 from acquisition import DataError, Remark
 from acquisition.errors import format_error
-from lobewatch.fleet.machine_summary import (
-    SUMMARY_LIFETIME,
-    DatedStatus,
-    MachineSummary,
-    read_summary,
-    summarize_unreadable,
-)
+from lobewatch.fleet import machine_summary
+from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary
 from lobewatch.machine.folder_files import compute_change_mark, format_path
 from lobewatch.monitoring.status_rules import StatusLevel
 
@@ -112,7 +107,9 @@ class Fleet:
         """
         now = now or datetime.now(UTC)
         with self._lock:
-            missing = {path: key for key, path in self.machines.items() if read_summary(path, now) is None}
+            missing = {
+                path: key for key, path in self.machines.items() if machine_summary.read_summary(path, now) is None
+            }
             for path, mark, summary in make([*missing], now) if missing else ():
                 self._summaries[missing[path]] = mark, now, summary
 
@@ -166,15 +163,15 @@ class Fleet:
         """Return the cached summary if it is up to date, else renew it."""
         last_mark, last_time, last = self._summaries.get(key, ((), now, None))
         if last is not None and last_mark == compute_change_mark(path, last.newest_file):
-            if now - last_time < SUMMARY_LIFETIME or not self._renewals_left:
+            if now - last_time < machine_summary.SUMMARY_LIFETIME or not self._renewals_left:
                 return last
             self._renewals_left -= 1
         mark = compute_change_mark(path)
         try:
-            summary = None if key in self._outdated else read_summary(path, now)
+            summary = None if key in self._outdated else machine_summary.read_summary(path, now)
             summary = summary or fleet.summarize_folder(path, now, self._render_text)
         except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
-            return summarize_unreadable(last.name if last else key, format_error(error))
+            return machine_summary.summarize_unreadable(last.name if last else key, format_error(error))
         self._outdated.discard(key)
         if mark == compute_change_mark(path):  # else another program has written meanwhile
             self._summaries[key] = compute_change_mark(path, summary.newest_file), now, summary

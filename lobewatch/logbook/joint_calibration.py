@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import timedelta
 from itertools import product
 from typing import Any, NamedTuple
@@ -86,8 +86,7 @@ class InitialGuess(NamedTuple):
     """Matched modes of each tap test."""
 
 
-@dataclass(frozen=True, eq=False)
-class JointFit:
+class JointFit(NamedTuple):
     """Spindle model fitted to the matched modes of several tap tests."""
 
     taps: Sequence[tool_modes.TappedTool]
@@ -186,8 +185,7 @@ def _fit_model(taps: Sequence[tool_modes.TappedTool], start: InitialGuess) -> Jo
     return JointFit(taps, start.matches, grouping, fit)
 
 
-@dataclass(frozen=True)
-class JointCalibration:
+class JointCalibration(NamedTuple):
     """Joint and bearing stiffness fitted to several tools."""
 
     label: str

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import NamedTuple
 
@@ -26,8 +25,7 @@ MAX_NEIGHBOR_MODES = 4
 """Number of modes next to the followed mode that are matched at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class TappedTool:
+class TappedTool(NamedTuple):
     """Tool with its newest tap test."""
 
     tool: str

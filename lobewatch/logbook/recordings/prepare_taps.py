@@ -7,7 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -37,8 +37,7 @@ class InterpretedFile(NamedTuple):
     """Fitted modes."""
 
 
-@dataclass(frozen=True)
-class TapDraft:
+class TapDraft(NamedTuple):
     """Tap file made from a recorded file."""
 
     digest: str
@@ -55,8 +54,7 @@ class TapDraft:
     """Defaults assumed for facts that the file does not state."""
 
 
-@dataclass(frozen=True)
-class FileRequest:
+class FileRequest(NamedTuple):
     """Recorded file with everything that a worker needs."""
 
     file: Path
@@ -200,4 +198,4 @@ def _write_draft(folder: MachineFolder, draft: TapDraft) -> TapDraft:
         file.write(draft.content)
         file.flush()
         os.fsync(file.fileno())
-    return replace(draft, content=b"")
+    return draft._replace(content=b"")

@@ -9,20 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from acquisition import (
-    Circumstances,
-    DataError,
-    Description,
-    Fact,
-    Recording,
-    SourceFile,
-    TapTest,
-    average_good_hits,
-    inspect_file,
-    list_formats,
-    new_tap_id,
-    parse_direction,
-)
+import acquisition
+from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest
 from acquisition.files.contents.contents import format_window
 from acquisition.files.contents.description import Origin
 from acquisition.files.readers.text_file import is_prose
@@ -74,7 +62,7 @@ def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     """Find the recordings in a folder, and the other files that are not hidden."""
     paths = [path for path in folder.rglob("*") if path.is_file()]
     files = sorted(p for p in paths if not any(part.startswith(".") for part in p.relative_to(folder).parts))
-    extensions = {extension for file_format in list_formats() for extension in file_format.extensions}
+    extensions = {extension for file_format in acquisition.list_formats() for extension in file_format.extensions}
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:
         kinds = ", ".join(sorted(extensions))
@@ -120,7 +108,7 @@ def read_tap_test(
     can be read.
     """
     before = at.stat()
-    recording = inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
+    recording = acquisition.inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
     after = at.stat()
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns) or after.st_size != len(content):
         raise DataError(f"{file}: it changes while it is read; wait until it is written")
@@ -156,7 +144,7 @@ def _build_circumstances(
     context: MachineContext, recording: Recording, description: Description, created: datetime
 ) -> Circumstances:
     try:
-        direction = parse_direction(description.direction or recording.direction or "x")
+        direction = acquisition.parse_direction(description.direction or recording.direction or "x")
     except ValueError as error:
         if description.direction:
             raise
@@ -189,12 +177,12 @@ def _find_origin(name: str, description: Description, recording: Recording) -> O
 
 def _build_tap_test(recording: Recording, about: Circumstances, source: SourceFile) -> TapTest:
     if recording.frf is not None:
-        return TapTest(new_tap_id(about), about, recording.frf, source=source)
+        return TapTest(acquisition.new_tap_id(about), about, recording.frf, source=source)
     try:
-        frf, flags = average_good_hits(recording.hits)
+        frf, flags = acquisition.average_good_hits(recording.hits)
     except DataError as error:
         raise DataError(f"{recording.path}: {error}") from error
-    return TapTest(new_tap_id(about), about, frf, recording.hits, flags, source)
+    return TapTest(acquisition.new_tap_id(about), about, frf, recording.hits, flags, source)
 
 
 def parse_date_in_name(file: Path, pattern: str) -> datetime:

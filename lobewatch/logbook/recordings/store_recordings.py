@@ -7,14 +7,8 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from acquisition import DataError, Description
-from lobewatch.logbook.recordings.prepare_taps import (
-    TapDraft,
-    explain_file_error,
-    prepare_all_taps,
-    prepare_tap,
-    prepared_path,
-    remove_prepared_files,
-)
+from lobewatch.logbook.recordings import prepare_taps
+from lobewatch.logbook.recordings.prepare_taps import TapDraft
 from lobewatch.machine import MachineFolder
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
@@ -129,11 +123,11 @@ def store_recordings(
     DataError
         If a file cannot be used. Nothing is stored then.
     """
-    remove_prepared_files(folder)
+    prepare_taps.remove_prepared_files(folder)
     digests, unread, stored, new = ReplayPlan.of(folder, files, description)
     if unread and len(files) == 1:
         raise unread[files[0]]
-    rejected = {file: explain_file_error(file, error) for file, error in unread.items()}
+    rejected = {file: prepare_taps.explain_file_error(file, error) for file, error in unread.items()}
     try:
         ready, faults = _prepare_files(folder, new, description, workers, alone=len(files) == 1, progress=progress)
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
@@ -141,10 +135,10 @@ def store_recordings(
             raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
         ready.sort(key=lambda tap: tap.created)
         if ready:
-            folder.commit_files({prepared_path(folder, tap): tap.entry for tap in ready})
+            folder.commit_files({prepare_taps.prepared_path(folder, tap): tap.entry for tap in ready})
             progress("store", len(ready), len(ready))
     finally:
-        remove_prepared_files(folder)
+        prepare_taps.remove_prepared_files(folder)
     ids = stored | {tap.digest: tap.entry.id for tap in ready}
     used = {file: ids[digests[file]] for file in files if file not in rejected}
     already_stored = {file: tap_id for file, tap_id in used.items() if new.get(digests[file]) != file}
@@ -166,9 +160,9 @@ def _prepare_files(
 ) -> tuple[list[TapDraft], dict[str, str]]:
     """Prepare files by digest. Return the reason for each unusable file, or raise its error if it is the only file."""
     if alone and not workers.scheduler:
-        return [prepare_tap(folder, file, description) for file in new.values()], {}
+        return [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
     ready, faults = list[TapDraft](), dict[str, str]()
-    results = zip(new, prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
+    results = zip(new, prepare_taps.prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
     for number, (digest, result) in enumerate(results, 1):
         if isinstance(result, str):
             faults[digest] = result

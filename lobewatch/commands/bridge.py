@@ -14,8 +14,7 @@ from lobewatch.show.terminal.output import Json, notes, results
 def bridge(
     driver: Annotated[str, Argument(help="Name of the driver, as in [daq] of machine.toml.")],
     machine: Annotated[
-        Path | None,
-        FolderArgument(help="Machine folder whose [daq] sets the device up: port, sensors, rate."),
+        Path | None, FolderArgument(help="Machine folder whose [daq] sets the device up: port, sensors, rate.")
     ] = None,
     port: Annotated[str, Option(help="Port of the device; that of [daq] where not given.")] = "",
     listen: Annotated[

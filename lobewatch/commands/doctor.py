@@ -10,8 +10,7 @@ from lobewatch.show.terminal.output import Json, emit
 
 
 def doctor(
-    machine: Annotated[Path | None, FolderArgument(help="Machine folder.")] = None,
-    as_json: Json = False,
+    machine: Annotated[Path | None, FolderArgument(help="Machine folder.")] = None, as_json: Json = False
 ) -> None:
     """Examine this computer for tap tests.
 

@@ -14,11 +14,7 @@ from lobewatch.logbook.recordings.prepare_taps import (
     is_valid_interpretation,
     work_on_files,
 )
-from lobewatch.logbook.recordings.store_recordings import (
-    LOCAL_WORKERS,
-    ReplayPlan,
-    ReplayProgressCallback,
-)
+from lobewatch.logbook.recordings.store_recordings import LOCAL_WORKERS, ProgressCallback, ReplayPlan
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit
 from modal import Mode
@@ -48,7 +44,7 @@ def preview_replay(
     logbook: Logbook,
     files: Sequence[Path],
     description: Description,
-    progress: ReplayProgressCallback = lambda _what, _done, _of: None,
+    progress: ProgressCallback = lambda _what, _done, _of: None,
     workers: Workers = LOCAL_WORKERS,
 ) -> list[ReplayPreview]:
     """Preview the replay of recorded files, in order of date; rejected and stored files come first.
@@ -68,11 +64,7 @@ def _recorded_time(preview: ReplayPreview) -> float:
 
 
 def _read_recordings(
-    logbook: Logbook,
-    files: Sequence[Path],
-    description: Description,
-    progress: ReplayProgressCallback,
-    workers: Workers,
+    logbook: Logbook, files: Sequence[Path], description: Description, progress: ProgressCallback, workers: Workers
 ) -> Iterator[ReplayPreview]:
     """Read each content once and yield a preview of each file, in the order of the files."""
     digests, unread, stored, new = ReplayPlan.of(logbook.folder, files, description)

@@ -74,9 +74,7 @@ def publish_folder(folder: Path, assessed: Sequence[FleetMachine], forget: str =
 
 
 def publish_machines(
-    assessed: Sequence[FleetMachine],
-    fleet_folder: Path | None = None,
-    now: datetime | None = None,
+    assessed: Sequence[FleetMachine], fleet_folder: Path | None = None, now: datetime | None = None
 ) -> dict[Broker, str]:
     """Publish each status that has changed or was published a day ago, if machine.toml names a broker.
 

@@ -30,7 +30,7 @@ def _join_file_names(files: list[str]) -> str:
     return ", ".join(files[:MAX_NAMED_FILES]) + (f" and {more} more" if more > 0 else "")
 
 
-ReplayProgressCallback = Callable[[str, int, int], None]
+ProgressCallback = Callable[[str, int, int], None]
 """Callback for progress: step ("read", "store", "measure"), number of finished files, and of all."""
 
 LOCAL_WORKERS = Workers()
@@ -92,7 +92,7 @@ def store_recordings(
     *,
     workers: Workers = LOCAL_WORKERS,
     keep_going: bool = False,
-    progress: ReplayProgressCallback = lambda _what, _done, _of: None,
+    progress: ProgressCallback = lambda _what, _done, _of: None,
 ) -> ReplayOutcome:
     """Store recorded files as tap tests, each once and oldest first. Call it under the lock.
 
@@ -129,7 +129,10 @@ def store_recordings(
         raise unread[files[0]]
     rejected = {file: prepare_taps.explain_file_error(file, error) for file, error in unread.items()}
     try:
-        ready, faults = _prepare_files(folder, new, description, workers, alone=len(files) == 1, progress=progress)
+        if len(files) > 1 or workers.scheduler:
+            ready, faults = _prepare_files(folder, new, description, workers, progress)
+        else:
+            ready, faults = [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
         if rejected and not (keep_going and len(rejected) < len(files)):
             raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
@@ -150,17 +153,9 @@ def store_recordings(
 
 
 def _prepare_files(
-    folder: MachineFolder,
-    new: Mapping[str, Path],
-    description: Description,
-    workers: Workers,
-    *,
-    alone: bool,
-    progress: ReplayProgressCallback,
+    folder: MachineFolder, new: dict[str, Path], description: Description, workers: Workers, progress: ProgressCallback
 ) -> tuple[list[TapDraft], dict[str, str]]:
-    """Prepare files by digest. Return the reason for each unusable file, or raise its error if it is the only file."""
-    if alone and not workers.scheduler:
-        return [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
+    """Prepare files by digest. Return the reason for each unusable file too."""
     ready, faults = list[TapDraft](), dict[str, str]()
     results = zip(new, prepare_taps.prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
     for number, (digest, result) in enumerate(results, 1):

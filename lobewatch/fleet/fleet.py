@@ -1,5 +1,6 @@
 """Assess the machines of a folder and refresh those whose files have changed."""
 
+import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -125,11 +126,7 @@ class Fleet:
         with self._lock:
             self._renewals_left = MAX_RENEWALS_PER_POLL
             machines = [self._assess_machine(key, path, now) for key, path in self.machines.items()]
-        levels = list(StatusLevel)
-        return sorted(
-            machines,
-            key=lambda m: (m.current.is_readable, levels.index(m.current.status), -_largest_drop(m.summary), m.key),
-        )
+        return sorted(machines, key=_sort_key)
 
     def verify_until(self, end: threading.Event) -> None:
         """Verify every byte of all machines, now and every few hours. Damage becomes part of the status.
@@ -178,6 +175,8 @@ class Fleet:
         return summary
 
 
-def _largest_drop(summary: MachineSummary) -> float:
-    drop = summary.series[0].drop if summary.series else 0.0
-    return float("inf") if drop is None else drop
+def _sort_key(machine: FleetMachine) -> tuple[bool, int, float, str]:
+    current, series = machine.current, machine.summary.series
+    drop = series[0].drop if series else 0.0
+    severity = [*StatusLevel].index(current.status)
+    return current.is_readable, severity, -math.inf if drop is None else -drop, machine.key

@@ -1,14 +1,12 @@
 """Rebuild history.rows from the tap tests, with the verdict on every program after each test."""
 
-import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from acquisition import DataError, read_tap
+from acquisition import DataError
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.logbook.recordings.recorded_files import parse_context
+from lobewatch.logbook.recordings.recorded_files import parse_context, read_tap_bytes
 from lobewatch.machine import ProgramTable, TapEntry
 from lobewatch.machine.folder_contents import find_file_fault
 from lobewatch.measurement.share_work import Workers, share_work
@@ -72,13 +70,10 @@ def _make_verdict_request(logbook: Logbook, tap_id: str, toml: str) -> VerdictRe
 
 def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
     """Fit the modes of a tap file. None if it cannot be read."""
-    with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
-        path = Path(work) / "tap.h5"
-        path.write_bytes(tap.content)
-        try:
-            return fit_tap(read_tap(path), parse_context(tap.machine_toml).machine, tap.entry.by_hand)
-        except DataError:
-            return None
+    try:
+        return fit_tap(read_tap_bytes(tap.content), parse_context(tap.machine_toml).machine, tap.entry.by_hand)
+    except DataError:
+        return None
 
 
 def evaluate_programs(request: VerdictRequest) -> dict[str, Verdict]:

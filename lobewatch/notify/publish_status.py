@@ -84,7 +84,8 @@ def publish_machines(
     now, before = now or datetime.now(UTC), _read_fleet_published(fleet_folder) if fleet_folder else {}
     due: dict[Broker, dict[Path, tuple[str, bytes]]] = {}
     new: dict[Path, tuple[str, PublishedMessage]] = {}
-    for machine in [*assessed, *_find_missing_machines(fleet_folder, before, assessed, now)]:
+    missing = _find_missing_machines(fleet_folder, before, assessed, now) if fleet_folder else ()
+    for machine in [*assessed, *missing]:
         last = read_json(machine.path / LAST_PUBLISHED_FILE, PublishedMessage) or before.get(machine.key)
         broker = _choose_broker(machine.path, last)
         if broker is None:
@@ -123,14 +124,9 @@ def _forget_machine(fleet_folder: Path, key: str, present: Collection[str]) -> N
 
 
 def _find_missing_machines(
-    fleet_folder: Path | None,
-    published: Mapping[str, "PublishedMessage"],
-    assessed: Iterable[FleetMachine],
-    now: datetime,
+    fleet_folder: Path, published: Mapping[str, "PublishedMessage"], assessed: Iterable[FleetMachine], now: datetime
 ) -> Iterator[FleetMachine]:
     """Yield machines that were published and are missing in the folder of the fleet."""
-    if fleet_folder is None:
-        return
     for key in sorted(published.keys() - {machine.key for machine in assessed}):
         summary = summarize_unreadable(key, MISSING_FOLDER_REASON.format(folder=fleet_folder, key=key))
         yield _assess_summary(key, fleet_folder / key, summary, now)

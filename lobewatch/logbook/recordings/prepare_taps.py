@@ -13,10 +13,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
-from acquisition import DataError, Description, Recording, TapTest, read_tap
+from acquisition import DataError, Description, Recording, TapTest
 from acquisition.file_io import make_folder
 from acquisition.files.tap_file import encode_tap, round_as_stored
-from lobewatch.logbook.recordings.recorded_files import MachineContext, parse_context, read_tap_test
+from lobewatch.logbook.recordings.recorded_files import MachineContext, parse_context, read_tap_bytes, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
@@ -80,12 +80,7 @@ class FileRequest(NamedTuple):
 
 def is_valid_draft(request: FileRequest, answer: Any) -> bool:
     """Check a draft from a worker against its own tap file."""
-    if isinstance(answer, str):
-        return True
-    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
-        path = Path(folder) / "tap.h5"
-        path.write_bytes(answer.content)
-        tap = read_tap(path)
+    tap = read_tap_bytes(answer.content)
     return (
         isinstance(answer, TapDraft)
         and answer.digest == hashlib.sha256(request.content).hexdigest() == answer.entry.source_sha256
@@ -98,8 +93,6 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
 
 def is_valid_interpretation(_request: FileRequest, answer: Any) -> bool:
     """Check an interpreted file from a worker."""
-    if isinstance(answer, str):
-        return True
     is_typed = isinstance(answer.tap, TapTest) and isinstance(answer.recording, Recording)
     return isinstance(answer, InterpretedFile) and is_typed and is_fit_of(answer.fit, TapEntry.of(answer.tap, b""))
 
@@ -120,7 +113,11 @@ def work_on_files(
     if workers.use_other_processes:
         toml = folder.toml_text
         requests = (FileRequest.of(file, description, toml) for file in files)
-        for answer in share_work(partial(_work_on_copy, work), requests, workers, is_valid):
+
+        def is_answer(request: FileRequest, answer: Any) -> bool:
+            return isinstance(answer, str) or is_valid(request, answer)
+
+        for answer in share_work(partial(_work_on_copy, work), requests, workers, is_answer):
             yield answer if isinstance(answer, str) else finish(answer)
         return
     for file in files:

@@ -2,6 +2,7 @@
 
 import glob
 import re
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -35,6 +36,14 @@ _DATE_PART_PATTERNS = {
 """Regular expression of each directive of a date pattern."""
 _FIXED_WIDTH_PATTERNS = {part: pattern.replace("{1,2}", "{2}") for part, pattern in _DATE_PART_PATTERNS.items()}
 """Regular expressions with all digits."""
+
+
+def read_tap_bytes(content: bytes) -> TapTest:
+    """Read the content of a tap file. DataError if it is damaged."""
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
+        path = Path(folder) / "tap.h5"
+        path.write_bytes(content)
+        return acquisition.read_tap(path)
 
 
 def find_recordings(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:

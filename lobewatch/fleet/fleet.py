@@ -13,7 +13,7 @@ import lobewatch.machine as machine
 from acquisition import DataError, Remark
 from acquisition.errors import format_error
 from lobewatch.fleet import machine_summary
-from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary
+from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary, read_summary
 from lobewatch.machine.folder_files import compute_change_mark, format_path
 from lobewatch.monitoring.status_rules import StatusLevel
 
@@ -108,9 +108,7 @@ class Fleet:
         """
         now = now or datetime.now(UTC)
         with self._lock:
-            missing = {
-                path: key for key, path in self.machines.items() if machine_summary.read_summary(path, now) is None
-            }
+            missing = {path: key for key, path in self.machines.items() if read_summary(path, now) is None}
             for path, mark, summary in make([*missing], now) if missing else ():
                 self._summaries[missing[path]] = mark, now, summary
 
@@ -165,7 +163,7 @@ class Fleet:
             self._renewals_left -= 1
         mark = compute_change_mark(path)
         try:
-            summary = None if key in self._outdated else machine_summary.read_summary(path, now)
+            summary = None if key in self._outdated else read_summary(path, now)
             summary = summary or fleet.summarize_folder(path, now, self._render_text)
         except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
             return machine_summary.summarize_unreadable(last.name if last else key, format_error(error))

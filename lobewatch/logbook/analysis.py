@@ -278,7 +278,5 @@ class Analysis:
             Time of the assessment. None for the present time.
         """
         files, time = self.files, now or datetime.now(UTC)
-        acknowledgements, scatter = files.contents.acknowledgements, files.fleet_scatter
-        return assess_status(
-            self.machine, self.history, time, self.folder.path, files.remarks, acknowledgements, scatter
-        )
+        acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
+        return assess_status(self.machine, self.history, time, self.folder.path, files.remarks, acknowledged, scatter)

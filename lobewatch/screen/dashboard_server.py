@@ -9,7 +9,6 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Self, Unpack
 from urllib.parse import quote
 
@@ -147,9 +146,7 @@ class DashboardServer(WebServerThread):
         self._verifier.start()
         return super().__enter__()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Stop running tap tests, then close. Their hits stay in the spool."""
         self._end.set()
         if self._verifier.is_alive():
@@ -158,7 +155,7 @@ class DashboardServer(WebServerThread):
             test.stop()
         for test in self._tests.values():
             test.end()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*error)
 
     def _find_machine(self, request: web.Request) -> tuple[str, MachineFolder]:
         key = request.match_info["machine"]

@@ -7,7 +7,6 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from importlib import resources
-from types import TracebackType
 from typing import Protocol, Self, TypedDict, TypeVar, Unpack, cast
 
 import msgspec
@@ -160,9 +159,7 @@ class WebServerThread:
             raise DeviceError(text, "choose another port or address") from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Send the last state to every page, then close."""
         self._loop.result().call_soon_threadsafe(self._stop.set)
         self._thread.join()

@@ -172,9 +172,8 @@ def prepare_all_taps(
     folder: MachineFolder, files: Sequence[Path], description: Description, workers: Workers
 ) -> Iterator[TapDraft | str]:
     """Prepare each file, or yield the reason why it cannot be used. Errors as `share_work`."""
-    return work_on_files(
-        folder, files, description, workers, _make_draft, is_valid_draft, partial(_write_draft, folder)
-    )
+    write = partial(_write_draft, folder)
+    return work_on_files(folder, files, description, workers, _make_draft, is_valid_draft, write)
 
 
 def remove_prepared_files(folder: MachineFolder) -> None:

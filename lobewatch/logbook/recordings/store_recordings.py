@@ -147,9 +147,8 @@ def store_recordings(
     already_stored = {file: tap_id for file, tap_id in used.items() if new.get(digests[file]) != file}
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
-    return ReplayOutcome(
-        [used[file] for file in files if file in used], already_stored, [*fits], rejected, assumed_facts, fits
-    )
+    tap_ids = [used[file] for file in files if file in used]
+    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits)
 
 
 def _prepare_files(
@@ -174,9 +173,7 @@ def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = Fa
     lines = group_by_message((str(file), why) for file, why in rejected.items())
     if len(rejected) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
-    rest_text = (
-        "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
-    )
+    rest = "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
     if len(rejected) == 1:
-        return f"{lines[0]} (1 of {n} files; {rest_text})"
-    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest_text}", *lines])
+        return f"{lines[0]} (1 of {n} files; {rest})"
+    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest}", *lines])

@@ -169,16 +169,12 @@ def _summarize_series(series: SeriesStatus) -> SeriesSummary:
     std = drop.std if drop.is_known and math.isfinite(drop.std) else None
     if trend is None:
         return SeriesSummary(*names, value, std, None)
-    return SeriesSummary(
-        *names,
-        value,
-        std,
-        trend.first_value * math.exp(trend.points[-1].percent / 100),
-        alarm=trend.open_drop.change.kind if trend.open_drop is not None else "",
-        scatter=series_points.estimate_scatter(trend.readings.y),
-        common_scatter=series_points.estimate_scatter(trend.readings.mean_of_directions.y),
-        points=tuple(_thin_out(trend)),
-    )
+    frequency = trend.first_value * math.exp(trend.points[-1].percent / 100)
+    alarm = trend.open_drop.change.kind if trend.open_drop is not None else ""
+    scatter = series_points.estimate_scatter(trend.readings.y)
+    common_scatter = series_points.estimate_scatter(trend.readings.mean_of_directions.y)
+    points = tuple(_thin_out(trend))
+    return SeriesSummary(*names, value, std, frequency, alarm, scatter, common_scatter, points)
 
 
 def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:

@@ -100,16 +100,10 @@ def read_tap_table(
         rows = _decode_rows(contents)
     numbers: dict[tuple[str, str, str], int] = {}
     series_numbers = [numbers.setdefault(series, len(numbers) + 1) for series in map(_get_series, rows)]
-    return TapTestTable(
-        key,
-        summary.name,
-        [(tool, direction) for tool, direction, _ in numbers],
-        series_numbers,
-        [row.tap_id for row in rows],
-        [row.time.timestamp() for row in rows],
-        [_join_codes(row.remarks) for row in rows],
-        _make_number_array(rows),
-    )
+    series = [(tool, direction) for tool, direction, _ in numbers]
+    tap_ids, times = [row.tap_id for row in rows], [row.time.timestamp() for row in rows]
+    codes, values = [_join_codes(row.remarks) for row in rows], _make_number_array(rows)
+    return TapTestTable(key, summary.name, series, series_numbers, tap_ids, times, codes, values)
 
 
 def _join_codes(remarks: Sequence[_RemarkCode]) -> str:

@@ -59,11 +59,9 @@ def keep_groups(spindle: dsm.Spindle) -> dsm.Spindle:
 
 def merge_groups(spindle: dsm.Spindle) -> dsm.Spindle:
     """Put all calibrated bearings into one group and all joints into another."""
-    return replace(
-        spindle,
-        bearings=[replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings],
-        joints=[replace(joint, group="joint" if joint.group else "", rotational_group="") for joint in spindle.joints],
-    )
+    bearings = [replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings]
+    joints = [replace(joint, group="joint" if joint.group else "", rotational_group="") for joint in spindle.joints]
+    return replace(spindle, bearings=bearings, joints=joints)
 
 
 def _group_names(spindle: dsm.Spindle) -> set[str]:
@@ -225,15 +223,12 @@ def calibrate_joints(
     except (dsm.StiffnessFitError, dsm.UnreachableFrequencyError) as error:
         raise DataError(f"tools {' and '.join(map(repr, tools))} do not fit one spindle: {error}") from error
     fit, grouping = joint_fit.fit, joint_fit.grouping
-    return JointCalibration(
-        machine.spindle.label if machine.spindle else "",
-        tuple(taps),
-        fit,
-        dict(_predict_other_tools(machine, fit, grouping, tools)) if grouping is split_tilting_groups else {},
-        _joints_for_toml(fit, grouping, machine.model(machine.tap.tool)),
-        dict(_find_unmatched(joint_fit)),
-        (*_shared_factor_remarks(joint_fit), *_time_gap_remarks(taps, machine)),
-    )
+    label = machine.spindle.label if machine.spindle else ""
+    is_split = grouping is split_tilting_groups
+    predicted = dict(_predict_other_tools(machine, fit, grouping, tools)) if is_split else {}
+    joints = _joints_for_toml(fit, grouping, machine.model(machine.tap.tool))
+    remarks = *_shared_factor_remarks(joint_fit), *_time_gap_remarks(taps, machine)
+    return JointCalibration(label, tuple(taps), fit, predicted, joints, dict(_find_unmatched(joint_fit)), remarks)
 
 
 def _predict_other_tools(

@@ -34,8 +34,7 @@ def ack(
     from lobewatch.logbook.operator_entries import acknowledge_alarms
     from lobewatch.notify.publish_status import publish_on_change
 
-    logbook = Logbook.open(machine)
-    with publish_on_change(logbook):
+    with publish_on_change(Logbook.open(machine)) as logbook:
         alarms, now = acknowledge_alarms(logbook, alarm, until, note, operator), datetime.now(UTC)
         texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
         closing = "the light stays as it is: tap tests close an alarm, or a new baseline after a repair"

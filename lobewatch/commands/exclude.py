@@ -26,8 +26,7 @@ def exclude(
     from lobewatch.machine.folder_updates import exclude_entry as take_out
     from lobewatch.notify.publish_status import publish_on_change
 
-    logbook = Logbook.open(machine)
-    with publish_on_change(logbook):
+    with publish_on_change(Logbook.open(machine)) as logbook:
         entry = take_out(logbook.folder, tap, reason)
         payload = {"excluded": entry.id, "reason": reason}
         emit(payload, as_json, f"excluded {entry.id}", f"back with: lobewatch include {machine} {entry.id}")

@@ -53,11 +53,11 @@ def publish_status(logbook: Logbook) -> None:
 
 
 @contextmanager
-def publish_on_change(logbook: Logbook) -> Iterator[None]:
+def publish_on_change(logbook: Logbook) -> Iterator[Logbook]:
     """Publish the status after work that has changed the machine folder, even if the work fails later."""
     before = logbook.folder.change_mark
     try:
-        yield
+        yield logbook
     except (ValueError, OSError):
         if logbook.folder.change_mark != before:
             publish_status(logbook)

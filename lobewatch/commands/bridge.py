@@ -35,8 +35,7 @@ def bridge(
     """
     from acquisition import DataError, find_driver
     from acquisition.taps import TapsBridge
-    from lobewatch.machine.folder import MachineFolder
-    from lobewatch.machine.settings.setup_tables import DaqTable
+    from lobewatch.machine import DaqTable, MachineFolder
     from lobewatch.tap.device_connection import DeviceOpener
 
     print_note = partial(notes.print, markup=False)

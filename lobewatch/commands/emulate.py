@@ -66,8 +66,7 @@ options without the port."""
 
 
 def _add_commands() -> None:
-    from acquisition.devices import find_driver, list_driver_names
-    from acquisition.errors import DataError
+    from acquisition import DataError, find_driver, list_driver_names
 
     for name in list_driver_names():
         try:
@@ -102,7 +101,7 @@ def _format_help(name: str, title: str) -> str:
 
 def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
-    from acquisition.devices import find_driver
+    from acquisition import find_driver
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import CROSS_TAP
-from acquisition.file_io import atomic_write
+from acquisition import CROSS_TAP, atomic_write
 from lobewatch.fleet import machine_summary
 from lobewatch.fleet.machine_summary import MachineSummary, SeriesSummary
 from lobewatch.history.history import History
@@ -27,9 +26,8 @@ from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
-from lobewatch.monitoring import series_points
+from lobewatch.monitoring import SeriesStatus, series_points
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
-from lobewatch.monitoring.machine_status import SeriesStatus
 from lobewatch.monitoring.series_history import build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import next_tap_step

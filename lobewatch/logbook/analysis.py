@@ -14,9 +14,8 @@ from lobewatch.machine.journal.cut_entry import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts import Advice, StoredVerdict, Verdict, advise
 from lobewatch.verdicts.frequency_drop import build_stored_verdict, is_verdict_missing
-from lobewatch.verdicts.recommendation import Advice, advise
-from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 
 MAX_CACHED_VERDICT_SETS = 8
 """Number of tap tests whose verdicts stay in memory, most recently used last."""

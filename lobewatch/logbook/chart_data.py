@@ -17,10 +17,8 @@ from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.measurement import spindle_model
 from lobewatch.tool import lobe_chart
 from lobewatch.tool.assembly import Assembly, speed_grid
-from lobewatch.verdicts.recommendation import find_stable_pockets
-from lobewatch.verdicts.setting_robustness import Setting
+from lobewatch.verdicts import Setting, Verdict, find_stable_pockets
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
-from lobewatch.verdicts.verdict import Verdict
 
 NO_POCKET_CODE = "no-safe-pocket"
 """Code of the remark on missing pockets."""

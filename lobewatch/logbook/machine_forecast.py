@@ -8,8 +8,7 @@ from datetime import UTC, datetime
 from acquisition import DataError
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.monitoring import threshold_dates
-from lobewatch.monitoring.machine_status import MachineStatus, SeriesStatus
+from lobewatch.monitoring import MachineStatus, SeriesStatus, threshold_dates
 from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ProgramForecast, ThresholdDates
 from lobewatch.monitoring.trend import Trend
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict

@@ -14,9 +14,8 @@ from typing import Any, Self
 
 import msgspec
 
-from acquisition import DataError
+from acquisition import DataError, atomic_write
 from acquisition.errors import format_error
-from acquisition.file_io import atomic_write
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.fleet.machine_summary import MachineSummary, software_version, summarize_unreadable
 from lobewatch.fleet.summarize import learn_scatter, summarize_machine

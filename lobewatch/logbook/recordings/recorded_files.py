@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 import acquisition
-from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest
+from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest, inspect_file
 from acquisition.files.contents.contents import format_window
 from acquisition.files.contents.description import Origin
 from acquisition.files.readers.text_file import is_prose
@@ -117,7 +117,7 @@ def read_tap_test(
     can be read.
     """
     before = at.stat()
-    recording = acquisition.inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
+    recording = inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
     after = at.stat()
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns) or after.st_size != len(content):
         raise DataError(f"{file}: it changes while it is read; wait until it is written")

@@ -1,5 +1,7 @@
 """Open the logbook of one machine, query its analysis and add tap tests."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import wraps
@@ -25,11 +27,11 @@ P = ParamSpec("P")
 Answer = TypeVar("Answer")
 
 
-def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate["Logbook", P], Answer]:
+def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate[Logbook, P], Answer]:
     """Make a method of the logbook that queries its analysis."""
 
     @wraps(question)
-    def answer(logbook: "Logbook", /, *arguments: P.args, **options: P.kwargs) -> Answer:
+    def answer(logbook: Logbook, /, *arguments: P.args, **options: P.kwargs) -> Answer:
         return logbook.query(question, *arguments, **options)
 
     return answer
@@ -267,7 +269,7 @@ class Logbook:
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(self, files: Sequence[Path], description: Description, **options: Any) -> "recordings.ReplayOutcome":
+    def replay_all(self, files: Sequence[Path], description: Description, **options: Any) -> recordings.ReplayOutcome:
         """Store recorded files as tap tests, each once.
 
         Parameters

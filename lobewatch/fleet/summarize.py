@@ -196,11 +196,8 @@ def learn_scatter(logbook: Logbook) -> None:
     history = logbook.history
     rows = history.current
     counts = Counter((row.tool, row.direction) for row in rows if row.direction != CROSS_TAP)
-    if (
-        not counts
-        or logbook.files.fleet_scatter is not None
-        or all(count >= MIN_MONITORED_POINTS for count in counts.values())
-    ):
+    is_young = any(count < MIN_MONITORED_POINTS for count in counts.values())
+    if not is_young or logbook.files.fleet_scatter is not None:
         return
     priors = [*_read_neighbor_scatters(logbook.folder.path), *_collect_earlier_scatters(history)]
     if not priors:

@@ -102,9 +102,8 @@ def _make_chart(
     machine = logbook.machine
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
-        raise DataError(
-            f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {', '.join(cuts) or 'none'}"
-        )
+        names = ", ".join(cuts) or "none"
+        raise DataError(f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {names}")
     assembly = assembly.check()
     frfs = _read_frfs(logbook, assembly) if source is lobe_chart.DynamicsSource.FRF else None
     x, y = frfs or (assembly.x, assembly.y)
@@ -116,10 +115,9 @@ def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
     """Read or predict the FRFs in x and y. A missing direction gets the FRF of the other."""
     place = logbook.machine.tap.position_mm
     if place > 0 and (not assembly.predicted or assembly.tool == logbook.machine.tap.tool):
-        raise DataError(
-            f"DynamicsSource.FRF needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the "
-            "tip; use DynamicsSource.MODES, which the model carries to the tip"
-        )
+        text = f"needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the tip"
+        cure = "use DynamicsSource.MODES, which the model carries to the tip"
+        raise DataError(f"DynamicsSource.FRF {text}; {cure}")
     read = _predict_frf if assembly.predicted else _read_assembly_frf
     frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
     other = frfs[assembly.directions[0]]

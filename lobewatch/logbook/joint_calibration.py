@@ -213,10 +213,8 @@ def calibrate_joints(
     """
     machine = logbook.machine
     if not any(joint.group for joint in machine.model(tools[0]).joints):
-        raise DataError(
-            "no joint of [spindle] has a group: nothing but bearings could be found; give the joint between tool and "
-            'spindle one, such as group = "holder" in joints of machine.toml'
-        )
+        cure = 'give the joint between tool and spindle one, such as group = "holder" in joints of machine.toml'
+        raise DataError(f"no joint of [spindle] has a group: nothing but bearings could be found; {cure}")
     taps = tool_modes.find_tapped_tools(logbook, tools, direction, mode)
     try:
         joint_fit = fit_joints(taps, machine.tap.position_mm / 1e3)
@@ -263,12 +261,9 @@ def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...
 def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
     if joint_fit.grouping is not split_tilting_groups:
         shared = "all bearings share a factor, and " if joint_fit.grouping is merge_groups else ""
-        text = (
-            f"{joint_fit.fit.mode.size} modes are too few: {shared}all stiffnesses of the joint keep their given "
-            "ratio; other tools are not predicted"
-        )
-        cure = "measure more modes: a wider [mode] band_hz, a harder hammer tip"
-        yield Remark("factors-shared", "", text, cure)
+        kept = f"{shared}all stiffnesses of the joint keep their given ratio"
+        text = f"{joint_fit.fit.mode.size} modes are too few: {kept}; other tools are not predicted"
+        yield Remark("factors-shared", "", text, "measure more modes: a wider [mode] band_hz, a harder hammer tip")
 
 
 def _time_gap_remarks(taps: Sequence[tool_modes.TappedTool], machine: Machine) -> Iterator[Remark]:

@@ -33,52 +33,50 @@ NewestState = TypeVar("NewestState", TapState, CutState, covariant=True)
 def encode_tap_state(state: TapState) -> str:
     """Encode the state of a tap test without its curves as JSON, null for numbers that are not finite."""
     outcome = state.outcome
-    return _encode_json(
-        {
-            "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.shown_word,
-            "title": state.title,
-            "direction": state.direction,
-            "has_plots": state.plots is not None,
-            "device": ", ".join(filter(None, (state.device, state.resumed))),
-            "reason": state.reason,
-            "good": state.good,
-            "wanted": state.wanted,
-            "hits": [_hit_json(hit) for hit in state.hits],
-            "mean_change": _round_finite(state.mean_change),
-            "settled": state.settled,
-            "levels": [_round_finite(level) for level in state.levels] if state.levels else None,
-            "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
-            "outcome": outcome
-            and {
-                "light": outcome.status,
-                "is_early": outcome.is_early,
-                "texts": list(outcome.texts),
-                "next_step": outcome.next_step,
-                "programs": [program._asdict() for program in outcome.programs],
-            },
-            "choices": [choice._asdict() for choice in state.choices],
-        }
-    )
+    content = {
+        "kind": state.word.name.lower().replace("_", "-"),
+        "word": state.shown_word,
+        "title": state.title,
+        "direction": state.direction,
+        "has_plots": state.plots is not None,
+        "device": ", ".join(filter(None, (state.device, state.resumed))),
+        "reason": state.reason,
+        "good": state.good,
+        "wanted": state.wanted,
+        "hits": [_hit_json(hit) for hit in state.hits],
+        "mean_change": _round_finite(state.mean_change),
+        "settled": state.settled,
+        "levels": [_round_finite(level) for level in state.levels] if state.levels else None,
+        "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
+        "outcome": outcome
+        and {
+            "light": outcome.status,
+            "is_early": outcome.is_early,
+            "texts": list(outcome.texts),
+            "next_step": outcome.next_step,
+            "programs": [program._asdict() for program in outcome.programs],
+        },
+        "choices": [choice._asdict() for choice in state.choices],
+    }
+    return _encode_json(content)
 
 
 def encode_cut_state(state: CutState) -> str:
     """Encode the state of a cut recording without its curves as JSON, null for numbers that are not finite."""
     comparison = state.comparison
-    return _encode_json(
-        {
-            "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.word.value,
-            "title": state.title,
-            "device": state.device,
-            "saved": state.saved,
-            "reason": state.reason if comparison is None else reason_text(comparison),
-            "level": _round_finite(state.level),
-            "left": _round_finite(state.left),
-            "cut_seconds": _round_finite(state.cut_seconds),
-            "heard": None if comparison is None else _comparison_json(comparison),
-        }
-    )
+    content = {
+        "kind": state.word.name.lower().replace("_", "-"),
+        "word": state.word.value,
+        "title": state.title,
+        "device": state.device,
+        "saved": state.saved,
+        "reason": state.reason if comparison is None else reason_text(comparison),
+        "level": _round_finite(state.level),
+        "left": _round_finite(state.left),
+        "cut_seconds": _round_finite(state.cut_seconds),
+        "heard": None if comparison is None else _comparison_json(comparison),
+    }
+    return _encode_json(content)
 
 
 def encode_plots(plots: LiveCurves) -> bytes:

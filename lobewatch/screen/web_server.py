@@ -267,9 +267,5 @@ class CutScreenServer(WebServerThread):
         """
         super().__init__(**options)
         add_pages(self.application, {"/": "listen.html"})
-        add_feed(
-            self.application,
-            "/",
-            lambda _: pictures,
-            live_feed.StateEncoder(live_feed.encode_cut_state, live_feed.encode_curves),
-        )
+        encoder = live_feed.StateEncoder(live_feed.encode_cut_state, live_feed.encode_curves)
+        add_feed(self.application, "/", lambda _: pictures, encoder)

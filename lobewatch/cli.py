@@ -1,7 +1,5 @@
 """Run the command line: import each command when it is needed, and print errors as one sentence."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 import inspect

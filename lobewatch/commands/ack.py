@@ -1,11 +1,9 @@
 """Command `lobewatch ack`: acknowledge alarms."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
@@ -14,13 +12,13 @@ from lobewatch.show.terminal.output import Json, emit
 def ack(
     machine: Machine,
     alarm: Annotated[
-        str, typer.Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
+        str, Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
     ] = "",
     until: Annotated[
-        datetime | None, typer.Option(help="When it is to ring again, local time; never where not given.")
+        datetime | None, Option(help="When it is to ring again, local time; never where not given.")
     ] = None,
-    note: Annotated[str, typer.Option(help="What is being done, for those who come next.")] = "",
-    operator: Annotated[str, typer.Option(help="Who says so; the name of the login where not given.")] = "",
+    note: Annotated[str, Option(help="What is being done, for those who come next.")] = "",
+    operator: Annotated[str, Option(help="Who says so; the name of the login where not given.")] = "",
     as_json: Json = False,
 ) -> None:
     """Acknowledge alarms.
@@ -36,8 +34,7 @@ def ack(
     from lobewatch.logbook.operator_entries import acknowledge_alarms
     from lobewatch.notify.publish_status import publish_on_change
 
-    logbook = Logbook.open(machine)
-    with publish_on_change(logbook):
+    with publish_on_change(Logbook.open(machine)) as logbook:
         alarms, now = acknowledge_alarms(logbook, alarm, until, note, operator), datetime.now(UTC)
         texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
         closing = "the light stays as it is: tap tests close an alarm, or a new baseline after a repair"

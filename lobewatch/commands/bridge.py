@@ -1,31 +1,26 @@
 """Command `lobewatch bridge`: serve any device as a TAPS/1 device on TCP."""
 
-from __future__ import annotations
-
 import json
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.output import Json, notes, results
 
 
 def bridge(
-    driver: Annotated[str, typer.Argument(help="Name of the driver, as in [daq] of machine.toml.")],
+    driver: Annotated[str, Argument(help="Name of the driver, as in [daq] of machine.toml.")],
     machine: Annotated[
-        Path | None,
-        typer.Argument(
-            parser=to_folder_path, help="Machine folder whose [daq] sets the device up: port, sensors, rate."
-        ),
+        Path | None, FolderArgument(help="Machine folder whose [daq] sets the device up: port, sensors, rate.")
     ] = None,
-    port: Annotated[str, typer.Option(help="Port of the device; that of [daq] where not given.")] = "",
+    port: Annotated[str, Option(help="Port of the device; that of [daq] where not given.")] = "",
     listen: Annotated[
-        str, typer.Option(help="Address of this computer at which it can be reached; 0.0.0.0: at all.")
+        str, Option(help="Address of this computer at which it can be reached; 0.0.0.0: at all.")
     ] = "127.0.0.1",
-    tcp_port: Annotated[int, typer.Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
+    tcp_port: Annotated[int, Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
     as_json: Json = False,
 ) -> None:
     """Serve a device as a TAPS/1 device on TCP.
@@ -40,8 +35,7 @@ def bridge(
     """
     from acquisition import DataError, find_driver
     from acquisition.taps import TapsBridge
-    from lobewatch.machine.folder import MachineFolder
-    from lobewatch.machine.settings.setup_tables import DaqTable
+    from lobewatch.machine import DaqTable, MachineFolder
     from lobewatch.tap.device_connection import DeviceOpener
 
     print_note = partial(notes.print, markup=False)

@@ -1,12 +1,10 @@
 """Command `lobewatch calibrate`: fit bearing and joint stiffness to measured natural frequencies."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import SpindleMachine
 from lobewatch.show.terminal.output import Json, emit
@@ -14,24 +12,22 @@ from lobewatch.show.terminal.output import Json, emit
 
 def calibrate(
     machine: SpindleMachine,
-    frequency: Annotated[
-        list[float] | None, typer.Option(help="Measured natural frequency (Hz); may be repeated.")
-    ] = None,
-    frequency_std: Annotated[list[float] | None, typer.Option(help="Its standard error (Hz); one for each.")] = None,
+    frequency: Annotated[list[float] | None, Option(help="Measured natural frequency (Hz); may be repeated.")] = None,
+    frequency_std: Annotated[list[float] | None, Option(help="Its standard error (Hz); one for each.")] = None,
     mode: Annotated[
         list[int] | None,
-        typer.Option(min=1, max=50, help="Number of the mode, for each; else [mode] model_mode, or 1, 2 ..."),
+        Option(min=1, max=50, help="Number of the mode, for each; else [mode] model_mode, or 1, 2 ..."),
     ] = None,
     group: Annotated[
-        list[str] | None, typer.Option(help="Bearings or joints of this group; may be repeated; all if not given.")
+        list[str] | None, Option(help="Bearings or joints of this group; may be repeated; all if not given.")
     ] = None,
     damping_ratio: Annotated[
-        float | None, typer.Option(help="Measured damping ratio (-) of the first of these modes: finds dampers too.")
+        float | None, Option(help="Measured damping ratio (-) of the first of these modes: finds dampers too.")
     ] = None,
     tool: Annotated[
-        list[str] | None, typer.Option(help="From its newest tap test instead; two at least find joints and bearings.")
+        list[str] | None, Option(help="From its newest tap test instead; two at least find joints and bearings.")
     ] = None,
-    direction: Annotated[str | None, typer.Option(help="Of these tap tests, x or y; else that of the newest.")] = None,
+    direction: Annotated[str | None, Option(help="Of these tap tests, x or y; else that of the newest.")] = None,
     as_json: Json = False,
 ) -> None:
     """Calibrate bearings and joints to measured natural frequencies.
@@ -80,7 +76,7 @@ def _calibrate_from_tools(
 
     calibration = calibrate_joints(Logbook.open(machine), tools, direction, mode)
     emit(tools_json(calibration), as_json, *tools_texts(calibration))
-    raise typer.Exit(int(calibration.fit.has_misfit))
+    raise Exit(int(calibration.fit.has_misfit))
 
 
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:

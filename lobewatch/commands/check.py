@@ -1,21 +1,11 @@
 """Command `lobewatch check`: verdicts on cutting programs."""
 
-from __future__ import annotations
-
 from time import monotonic
 from typing import Annotated
 
-import typer
+from typer import Exit, Option
 
-from lobewatch.commands.shared_options import (
-    Diameter,
-    Flutes,
-    Material,
-    MillingDirection,
-    TappedMachine,
-    cut_fields,
-    number,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit, notes
 
 PROGRESS_DELAY = 5.0
@@ -23,23 +13,23 @@ PROGRESS_DELAY = 5.0
 
 
 def check(
-    machine: TappedMachine,
+    machine: shared.TappedMachine,
     program: Annotated[
-        list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
+        list[str] | None, Option(help="Only this program; may be repeated. All where none is named.")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(parser=number, help="Of a cut that is no program: spindle speed, rpm.")
+        float | None, Option(parser=shared.number, help="Of a cut that is no program: spindle speed, rpm.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(parser=number, help="Its axial depth, mm.")] = None,
-    tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
-    material: Material = None,
-    teeth: Flutes = None,
-    diameter: Diameter = None,
-    radial: Annotated[float | None, typer.Option(parser=number, help="Its radial depth, mm.")] = None,
-    direction: MillingDirection = None,
+    depth: Annotated[float | None, Option(parser=shared.number, help="Its axial depth, mm.")] = None,
+    tool: Annotated[str | None, Option(help="Its tool.")] = None,
+    material: shared.Material = None,
+    teeth: shared.Flutes = None,
+    diameter: shared.Diameter = None,
+    radial: Annotated[float | None, Option(parser=shared.number, help="Its radial depth, mm.")] = None,
+    direction: shared.MillingDirection = None,
     accept: Annotated[
         list[str] | None,
-        typer.Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
+        Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -62,36 +52,27 @@ def check(
     from lobewatch.logbook.requested_cuts import evaluate_requested
     from lobewatch.machine import MachineFolder
     from lobewatch.machine.folder_updates import accept_settings
-    from lobewatch.show.programs.advice import (
-        ProgramAdvice,
-        advise_program,
-        check_json,
-        check_summary_text,
-        check_texts,
-    )
+    from lobewatch.show.programs import advice as show
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines
     from lobewatch.show.programs.verdicts import is_safe
 
-    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
+    cut = shared.cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     if accept:
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
     verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
-    begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
+    begin, slow, programs = monotonic(), False, list[show.ProgramAdvice]()
     for verdict in verdicts:
         if not slow and monotonic() - begin > PROGRESS_DELAY:
             notes.print(f"{len(programs)} of {len(verdicts)} programs are checked; the others take a while too")
             slow = True
-        programs.append(advise_program(logbook, verdict))
+        programs.append(show.advise_program(logbook, verdict))
     remarks = logbook.remarks
-    emit(
-        check_json(programs, remarks)
-        | {"recommendations": [recommendation_json(answer) for answer in recommendations]},
-        as_json,
-        *(check_texts(programs, remarks, logbook.machine) if programs else ()),
-        *(line for answer in recommendations for line in recommendation_lines(answer)),
-        *([check_summary_text(programs, len(recommendations))] if programs else ()),
-    )
+    payload = {"recommendations": [recommendation_json(answer) for answer in recommendations]}
+    texts = show.check_texts(programs, remarks, logbook.machine) if programs else []
+    lines = [line for answer in recommendations for line in recommendation_lines(answer)]
+    summary = [show.check_summary_text(programs, len(recommendations))] if programs else []
+    emit(show.check_json(programs, remarks) | payload, as_json, *texts, *lines, *summary)
     if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
-        raise typer.Exit(1)
+        raise Exit(1)

@@ -1,12 +1,10 @@
 """Command `lobewatch convert`: convert a recorded file to another format."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from lobewatch.commands.shared_options import FileOptions, add_file_options
 from lobewatch.show.terminal.output import Json, emit
@@ -14,13 +12,13 @@ from lobewatch.show.terminal.output import Json, emit
 
 @add_file_options()
 def convert(
-    file: Annotated[Path, typer.Argument(help="Recorded hits or an FRF, as for lobewatch modes.")],
-    out: Annotated[Path, typer.Argument(help="What to write: .uff (.unv), .csv, .mat, or .json (SEP005, hits only).")],
-    hits: Annotated[bool, typer.Option("--hits", help="The signals over time instead of the FRF.")] = False,
+    file: Annotated[Path, Argument(help="Recorded hits or an FRF, as for lobewatch modes.")],
+    out: Annotated[Path, Argument(help="What to write: .uff (.unv), .csv, .mat, or .json (SEP005, hits only).")],
+    hits: Annotated[bool, Option("--hits", help="The signals over time instead of the FRF.")] = False,
     *,
     file_options: FileOptions,
-    date: Annotated[datetime | None, typer.Option(help="When it was recorded, where the file does not say.")] = None,
-    direction: Annotated[str, typer.Option(help="Direction at the tool tip, where the file does not say.")] = "",
+    date: Annotated[datetime | None, Option(help="When it was recorded, where the file does not say.")] = None,
+    direction: Annotated[str, Option(help="Direction at the tool tip, where the file does not say.")] = "",
     as_json: Json = False,
 ) -> None:
     """Convert a recorded file to another format.

@@ -1,30 +1,26 @@
 """Command `lobewatch demo`: tap tests of an aging simulated spindle."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def demo(
-    out: Annotated[Path | None, typer.Option(help="A new folder; lobewatch-demo where not given.")] = None,
-    taps: Annotated[
-        int, typer.Option(min=2, max=120, help="How many months; each has one tap test in x and one in y.")
-    ] = 24,
+    out: Annotated[Path | None, Option(help="A new folder; lobewatch-demo where not given.")] = None,
+    taps: Annotated[int, Option(min=2, max=120, help="How many months; each has one tap test in x and one in y.")] = 24,
     seed: Seed = 1,
     scatter: ReclampingScatter = 0.1,
-    story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings.")] = "steady",
-    bad_clampings: Annotated[float, typer.Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
+    story: Annotated[WearScenarioName, Option(help="What befalls the bearings.")] = "steady",
+    bad_clampings: Annotated[float, Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
     temperature: Annotated[
-        float | None, typer.Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
+        float | None, Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
     ] = None,
-    tcp: Annotated[bool, typer.Option("--tcp", help="Through a TCP port of this computer.")] = False,
+    tcp: Annotated[bool, Option("--tcp", help="Through a TCP port of this computer.")] = False,
     as_json: Json = False,
 ) -> None:
     """Tap a simulated aging spindle, and write a report.

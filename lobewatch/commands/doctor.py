@@ -1,19 +1,16 @@
 """Command `lobewatch doctor`: check the computer for a tap test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Exit
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.output import Json, emit
 
 
 def doctor(
-    machine: Annotated[Path | None, typer.Argument(parser=to_folder_path, help="Machine folder.")] = None,
-    as_json: Json = False,
+    machine: Annotated[Path | None, FolderArgument(help="Machine folder.")] = None, as_json: Json = False
 ) -> None:
     """Examine this computer for tap tests.
 
@@ -30,5 +27,4 @@ def doctor(
 
     findings = check_computer(MachineFolder(machine) if machine else None)
     emit(findings_json(findings), as_json, *findings_texts(findings))
-    if any(finding.state == "hinders" for finding in findings):
-        raise typer.Exit(1)
+    raise Exit(int(any(finding.state == "hinders" for finding in findings)))

@@ -1,7 +1,5 @@
 """Command `lobewatch emulate`: emulate a device, with a subcommand for each driver."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import math
@@ -12,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
+from typer import Option
 
 import acquisition
-from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName
 from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
@@ -28,43 +26,35 @@ SCENARIO_MONTHS = 24
 class EmulateOptions:
     """Options of an emulator, in the order of the help page."""
 
-    machine: Annotated[
-        Path,
-        typer.Argument(parser=to_folder_path, help="Machine folder with a spindle in its machine.toml: what is hit."),
-    ]
+    machine: Annotated[Path, FolderArgument(help="Machine folder with a spindle in its machine.toml: what is hit.")]
     """Machine folder."""
-    tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
+    tcp: Annotated[bool, Option("--tcp", help="On a TCP port of this computer instead.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
-    fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False
+    fast: Annotated[bool, Option("--fast", help="As fast as the host reads, not in real time.")] = False
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    story: Annotated[WearScenarioName, typer.Option(help="What befalls the bearings over 24 months.")] = "none"
+    story: Annotated[WearScenarioName, Option(help="What befalls the bearings over 24 months.")] = "none"
     """Wear scenario of the bearings."""
-    month: Annotated[int, typer.Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
+    month: Annotated[int, Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
     """Month of the wear scenario."""
     scatter: ReclampingScatter = 0.0
     """Reclamping repeatability of f1: standard deviation (%)."""
-    bad_clampings: Annotated[float, typer.Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
+    bad_clampings: Annotated[float, Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
     """Chance of a bad clamping (%)."""
-    temperature: Annotated[float | None, typer.Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
+    temperature: Annotated[float | None, Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
     """Swing of the temperature over the year (K)."""
-    direction: Annotated[
-        Literal["x", "y", "xy"], typer.Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")
-    ] = "x"
+    direction: Annotated[Literal["x", "y", "xy"], Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")] = "x"
     """Direction of hammer and sensor."""
     askew: Annotated[
-        float | None,
-        typer.Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
+        float | None, Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it.")
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
-    cut: Annotated[str | None, typer.Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = (
-        None
-    )
+    cut: Annotated[str | None, Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = None
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[float | None, typer.Option(help="Of the cut, as it is told (rpm).")] = None
+    speed: Annotated[float | None, Option(help="Of the cut, as it is told (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, typer.Option(help="Of the cut (mm).")] = None
+    depth: Annotated[float | None, Option(help="Of the cut (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""
@@ -76,8 +66,7 @@ options without the port."""
 
 
 def _add_commands() -> None:
-    from acquisition.devices import find_driver, list_driver_names
-    from acquisition.errors import DataError
+    from acquisition import DataError, find_driver, list_driver_names
 
     for name in list_driver_names():
         try:
@@ -112,6 +101,7 @@ def _format_help(name: str, title: str) -> str:
 
 def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
+    from acquisition import find_driver
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
 
@@ -121,37 +111,34 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     story, seed, spindle = WearScenario(options.story), options.seed, None
     if story is not WearScenario.NONE or any(mounting):
         spindle = build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, seed)
-    shared = {"folder": folder, "seed": seed, "realtime": not options.fast, "tcp": options.tcp, "spindle": spindle}
+    shared = {"driver": find_driver(name), "folder": folder, "spindle": spindle, "seed": seed}
+    shared |= {"realtime": not options.fast, "tcp": options.tcp}
     cut = options.cut
-    emulation = _emulate_tap(name, options, shared) if cut is None else _emulate_cut(name, options, cut, shared)
-    _serve_until_interrupted(emulation, options)
+    _serve(_emulate_tap(options, shared) if cut is None else _emulate_cut(options, cut, shared), options)
 
 
-def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
     """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
-    from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    driver = find_driver(name)
-    emulated = emulate_machine(driver=driver, direction=options.direction, axes_angle=options.askew, **shared)
+    emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
     words = f" --direction {options.direction}" * (options.direction != "x")
     return emulated.device, truth, text, "tap", words
 
 
-def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
+def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
-    from acquisition.devices import find_driver
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 
     setting = find_cut_setting(shared["folder"].machine, program, options.speed, options.depth)
-    emulated = emulate_cut(driver=find_driver(name), setting=setting, **shared)
+    emulated = emulate_cut(setting=setting, **shared)
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
     truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
     stable = "any depth" if limit is None else f"{limit:.3g} mm"
@@ -160,7 +147,7 @@ def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mappi
     return emulated.device, truth, text, "listen", words
 
 
-def _serve_until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
+def _serve(emulation: Emulation, options: EmulateOptions) -> None:
     """Print the port and the true values, and serve until Ctrl-C."""
     emulator, truth, truth_text, next_command, next_options = emulation
     with emulator as device:

@@ -1,11 +1,9 @@
 """Command `lobewatch event`: record maintenance of a machine."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit
@@ -13,12 +11,12 @@ from lobewatch.show.terminal.output import Json, emit
 
 def event(
     machine: Machine,
-    text: Annotated[str, typer.Argument(help="What was done; with --withdraw not needed.")] = "",
-    date: Annotated[datetime | None, typer.Option(help="When it was done, local time; now where not given.")] = None,
+    text: Annotated[str, Argument(help="What was done; with --withdraw not needed.")] = "",
+    date: Annotated[datetime | None, Option(help="When it was done, local time; now where not given.")] = None,
     new_baseline: Annotated[
-        bool, typer.Option("--new-baseline", help="Compare tap tests from then on with none before it.")
+        bool, Option("--new-baseline", help="Compare tap tests from then on with none before it.")
     ] = False,
-    withdraw: Annotated[str, typer.Option(help="Take back the event of this name; lobewatch history lists them.")] = "",
+    withdraw: Annotated[str, Option(help="Take back the event of this name; lobewatch history lists them.")] = "",
     as_json: Json = False,
 ) -> None:
     """Store or withdraw a maintenance event.

@@ -1,10 +1,8 @@
 """Command `lobewatch exclude`: exclude a tap test from its series."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
@@ -13,7 +11,7 @@ from lobewatch.show.terminal.output import Json, emit
 def exclude(
     machine: Machine,
     tap: ExcludableEntry,
-    reason: Annotated[str, typer.Option(help="Why it does not count.")],
+    reason: Annotated[str, Option(help="Why it does not count.")],
     as_json: Json = False,
 ) -> None:
     """Exclude a tap test or test cut from all results.
@@ -28,8 +26,7 @@ def exclude(
     from lobewatch.machine.folder_updates import exclude_entry as take_out
     from lobewatch.notify.publish_status import publish_on_change
 
-    logbook = Logbook.open(machine)
-    with publish_on_change(logbook):
+    with publish_on_change(Logbook.open(machine)) as logbook:
         entry = take_out(logbook.folder, tap, reason)
         payload = {"excluded": entry.id, "reason": reason}
         emit(payload, as_json, f"excluded {entry.id}", f"back with: lobewatch include {machine} {entry.id}")

@@ -1,11 +1,9 @@
 """Command `lobewatch export`: export the tap tests of all machines."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Exit, Option
 
 from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
@@ -15,17 +13,15 @@ from lobewatch.show.terminal.output import Json, emit, notes
 def export(
     folder: FleetFolder,
     file: Annotated[
-        Path | None, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
+        Path | None, Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
     ] = None,
     append: Annotated[
         Path | None,
-        typer.Option(help="In place of FILE: a folder of Parquet files by month, to which is added what is not there."),
+        Option(help="In place of FILE: a folder of Parquet files by month, to which is added what is not there."),
     ] = None,
     to: Annotated[
         str | None,
-        typer.Option(
-            help="In place of FILE: a database, postgresql://HOST/NAME, whose table is kept as the tap tests are."
-        ),
+        Option(help="In place of FILE: a database, postgresql://HOST/NAME, whose table is kept as the tap tests are."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -62,4 +58,4 @@ def export(
     payload = {"machines": n_machines, "tap_tests": outcome.tap_tests, "left_out": damaged}
     text = f"{outcome.tap_tests} tap tests of {n_machines} machines in {place}"
     emit({**outcome.fields, **payload}, as_json, text, *outcome.sentences)
-    raise typer.Exit(2 if damaged else 0)
+    raise Exit(2 if damaged else 0)

@@ -1,7 +1,5 @@
 """Format help pages as plain text, with examples that can be copied."""
 
-from __future__ import annotations
-
 import shutil
 import textwrap
 from collections.abc import Collection, Iterator, Mapping
@@ -51,7 +49,7 @@ def _format_page(
         if record is not None:
             rows[parameter.param_type_name].append(record)
     usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
-    lines = [*_wrap_words(usage, width, subsequent_indent="  "), *_format_paragraphs(command.help or "", width)]
+    lines = [*_wrap_words(usage, width, indent="  "), *_format_paragraphs(command.help or "", width)]
     for title, listed in (("Arguments", rows["argument"]), ("Options", rows["option"])):
         if listed:
             lines += ["", f"{title}:", *_format_list(listed, width, _find_longest_name(dict(listed), width))]
@@ -86,8 +84,7 @@ def _format_list(rows: Collection[tuple[str, str]], width: int, longest: int) ->
         yield from (" " * column + line for line in texts)
 
 
-def _wrap_words(text: str, width: int, subsequent_indent: str = "") -> list[str]:
-    """Wrap text at spaces only, so that option names stay whole."""
-    wrapper = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
-    wrapper.subsequent_indent = subsequent_indent
-    return wrapper.wrap(" ".join(text.split()))
+def _wrap_words(text: str, width: int, indent: str = "") -> list[str]:
+    """Wrap text at spaces only, so that option names stay whole. Lines after the first are indented."""
+    words = " ".join(text.split())
+    return textwrap.wrap(words, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)

@@ -1,11 +1,9 @@
 """Command `lobewatch history`: list the tap tests and events of a machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import AsCsv, Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks, results
@@ -15,7 +13,7 @@ def history(
     machine: Machine,
     as_csv: AsCsv = False,
     hdf5: Annotated[
-        Path | None, typer.Option(help="Write all values and the diagrams of every test to this file (HDF5).")
+        Path | None, Option(help="Write all values and the diagrams of every test to this file (HDF5).")
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -1,7 +1,5 @@
 """Command `lobewatch include`: include an excluded tap test again."""
 
-from __future__ import annotations
-
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
 
@@ -17,7 +15,6 @@ def include(machine: Machine, tap: ExcludableEntry, as_json: Json = False) -> No
     from lobewatch.machine.folder_updates import include_entry as take_back
     from lobewatch.notify.publish_status import publish_on_change
 
-    logbook = Logbook.open(machine)
-    with publish_on_change(logbook):
+    with publish_on_change(Logbook.open(machine)) as logbook:
         entry = take_back(logbook.folder, tap)
         emit({"included": entry.id}, as_json, f"included {entry.id}: it counts again")

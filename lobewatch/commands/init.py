@@ -1,52 +1,41 @@
 """Command `lobewatch init`: create a machine folder."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
     from lobewatch.machine.setup_questions.draft import MachineDraft
 
-OptionalAnswer = str | None
+Answer = str | None
 
 
 def init(
-    machine: Annotated[Path, typer.Argument(parser=to_folder_path, help="The folder to make.")],
-    example: Annotated[bool, typer.Option("--example", help="With the surrogate spindle and three programs.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
-    edit: Annotated[str, typer.Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",
-    name: Annotated[OptionalAnswer, typer.Option(help="Name of the machine.")] = None,
-    speeds: Annotated[OptionalAnswer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
-    drive: Annotated[OptionalAnswer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
+    machine: Annotated[Path, FolderArgument(help="The folder to make.")],
+    example: Annotated[bool, Option("--example", help="With the surrogate spindle and three programs.")] = False,
+    yes: Annotated[bool, Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
+    edit: Annotated[str, Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",
+    name: Annotated[Answer, Option(help="Name of the machine.")] = None,
+    speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
+    drive: Annotated[Answer, Option(help='Power in kW and torque in N m: "15 40".')] = None,
     daq: Annotated[
-        OptionalAnswer, typer.Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
+        Answer, Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
     ] = None,
-    hammer: Annotated[
-        OptionalAnswer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')
-    ] = None,
-    accelerometer: Annotated[OptionalAnswer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
-    fixing: Annotated[
-        OptionalAnswer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')
-    ] = None,
+    hammer: Annotated[Answer, Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')] = None,
+    accelerometer: Annotated[Answer, Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
+    fixing: Annotated[Answer, Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
     tool: Annotated[
-        OptionalAnswer,
-        typer.Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".'),
+        Answer, Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".')
     ] = None,
-    material: Annotated[
-        OptionalAnswer, typer.Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')
-    ] = None,
-    program: Annotated[
-        OptionalAnswer, typer.Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')
-    ] = None,
+    material: Annotated[Answer, Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')] = None,
+    program: Annotated[Answer, Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')] = None,
     as_json: Json = False,
 ) -> None:
     """Make a machine folder with a commented machine.toml.
@@ -85,7 +74,7 @@ def init(
     emit(payload, as_json, text, f"next: {next_step}")
 
 
-def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
     """Make the draft from the answers in options and at the terminal."""
     from lobewatch.machine.setup_questions.draft import MachineDraft
     from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question

@@ -1,7 +1,5 @@
 """Command `lobewatch listen`: detect chatter in a recorded or live cut."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 from collections.abc import Sequence
@@ -9,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
@@ -25,27 +23,27 @@ if TYPE_CHECKING:
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
     machine: Machine,
-    program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
-    cut: Annotated[str, typer.Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
+    program: Annotated[str, Option(help="Cutting program that is cut.")] = "",
+    cut: Annotated[str, Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
     speed: Annotated[
-        float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
+        float | None, Option(help="Spindle speed as set, rpm; that of the program where not given.")
     ] = None,
     depth: CutDepth = None,
     power: CutPower = None,
-    file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
+    file: Annotated[Path | None, Option(help="A recording of the cut in place of the device.")] = None,
     date: CutDate = None,
-    sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
+    sensor: Annotated[str, Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
         "accelerometer"
     ),
     tacho: Annotated[
-        str, typer.Option(help="Of a --file: column of the spindle's speed, in rpm or Hz, or of a tachometer's pulses.")
+        str, Option(help="Of a --file: column of the spindle's speed, in rpm or Hz, or of a tachometer's pulses.")
     ] = "",
-    pulses: Annotated[int | None, typer.Option(min=1, help="Of the tachometer in a turn; 1 where not given.")] = None,
-    port: Annotated[str, typer.Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
-    seconds: Annotated[float, typer.Option(min=2, help="How long a cut is waited for.")] = 120.0,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is heard; store nothing.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Draw the spectrum to this file (.svg, .png, .pdf).")] = None,
-    screen: Annotated[bool, typer.Option("--screen", help="Show it in a browser too, with the word in large.")] = False,
+    pulses: Annotated[int | None, Option(min=1, help="Of the tachometer in a turn; 1 where not given.")] = None,
+    port: Annotated[str, Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
+    seconds: Annotated[float, Option(min=2, help="How long a cut is waited for.")] = 120.0,
+    dry_run: Annotated[bool, Option("--dry-run", help="Say what is heard; store nothing.")] = False,
+    out: Annotated[Path | None, Option(help="Draw the spectrum to this file (.svg, .png, .pdf).")] = None,
+    screen: Annotated[bool, Option("--screen", help="Show it in a browser too, with the word in large.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
@@ -103,11 +101,11 @@ def listen(
 
 
 def _store(
-    logbook: Logbook,
-    comparisons: Sequence[CutComparison],
-    signal: CutSignal,
+    logbook: "Logbook",
+    comparisons: "Sequence[CutComparison]",
+    signal: "CutSignal",
     date: datetime | None,
-    publisher: StatePublisher[CutState],
+    publisher: "StatePublisher[CutState]",
     as_json: bool,
 ) -> None:
     """Store the recorded cuts and show them."""

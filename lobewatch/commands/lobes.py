@@ -1,11 +1,9 @@
 """Command `lobewatch lobes`: stability lobes and stable pockets of a tool."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import TappedMachine
 from lobewatch.show.terminal.output import Json, emit, notes
@@ -16,15 +14,13 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 def lobes(
     machine: TappedMachine,
-    cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
-    tool: Annotated[
-        str | None, typer.Option(help="If not given: that of the program, else that was tapped last.")
-    ] = None,
-    source: Annotated[DynamicsName, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",
-    method: Annotated[MethodName, typer.Option(help="How the limits of the chart are found.")] = "zero-order",
-    figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
-    radial: Annotated[Path | None, typer.Option(help="Draw the limit over speed and radial depth.")] = None,
-    waterfall: Annotated[Path | None, typer.Option(help="Draw the limit over speed and time.")] = None,
+    cut: Annotated[str, Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
+    tool: Annotated[str | None, Option(help="If not given: that of the program, else that was tapped last.")] = None,
+    source: Annotated[DynamicsName, Option(help="From the modes found, or straight from the FRF.")] = "modes",
+    method: Annotated[MethodName, Option(help="How the limits of the chart are found.")] = "zero-order",
+    figure: Annotated[Path | None, Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
+    radial: Annotated[Path | None, Option(help="Draw the limit over speed and radial depth.")] = None,
+    waterfall: Annotated[Path | None, Option(help="Draw the limit over speed and time.")] = None,
     as_json: Json = False,
 ) -> None:
     """Show stability lobes and stable pockets.

@@ -1,18 +1,14 @@
 """Command `lobewatch materials`: list materials with their cutting coefficients."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Argument
 
 from lobewatch.show.terminal.output import Json, emit
 
 
 def materials(
-    word: Annotated[
-        str, typer.Argument(help="Part of a name (C45, 1.7225, AISI 4140), or a group: P, M, K, N, S, H.")
-    ] = "",
+    word: Annotated[str, Argument(help="Part of a name (C45, 1.7225, AISI 4140), or a group: P, M, K, N, S, H.")] = "",
     as_json: Json = False,
 ) -> None:
     """List materials with their cutting coefficients.

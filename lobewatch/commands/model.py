@@ -1,11 +1,9 @@
 """Command `lobewatch model`: modes and stiffness of the spindle model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import SpindleMachine
 from lobewatch.show.terminal.output import Json, emit
@@ -13,9 +11,9 @@ from lobewatch.show.terminal.output import Json, emit
 
 def model(
     machine: SpindleMachine,
-    tool: Annotated[str | None, typer.Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
-    modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
-    figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
+    tool: Annotated[str | None, Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
+    modes: Annotated[int, Option(min=1, max=20, help="How many modes.")] = 4,
+    figure: Annotated[Path | None, Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
     as_json: Json = False,
 ) -> None:
     """Show the spindle model.

@@ -1,86 +1,70 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import typer
+from typer import Argument, Option
 
-from lobewatch.commands.shared_options import (
-    AddedModes,
-    DroppedModes,
-    FileOptions,
-    FixedModes,
-    add_file_options,
-    reject_file_options,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit
 
 if TYPE_CHECKING:
     from modal import ModeEdits
 
 
-@add_file_options(without=["averages"])
+@shared.add_file_options(without=["averages"])
 def modes(
     file: Annotated[
-        Path,
-        typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
+        Path, Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005.")
     ],
     tap: Annotated[
-        str,
-        typer.Argument(
-            help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has."
-        ),
+        str, Argument(help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has.")
     ] = "",
-    band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
-    ] = None,
+    band: Annotated[tuple[float, float] | None, Option(help="Only between these frequencies (Hz).")] = None,
+    figure: Annotated[Path | None, Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")] = None,
     window: Annotated[
         float | None,
-        typer.Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
+        Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
     ] = None,
-    window_start: Annotated[float, typer.Option(help="When that window begins (s from the record's start).")] = 0.0,
+    window_start: Annotated[float, Option(help="When that window begins (s from the record's start).")] = 0.0,
     hit_at: Annotated[
-        float | None,
-        typer.Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it."),
+        float | None, Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it.")
     ] = None,
     averages: Annotated[
-        int | None, typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
+        int | None, Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
     ] = None,
     hammer: Annotated[
-        Literal["none"] | None, typer.Option(help="No force was measured: f_n and zeta alone, from the response.")
+        Literal["none"] | None, Option(help="No force was measured: f_n and zeta alone, from the response.")
     ] = None,
     *,
-    file_options: FileOptions,
+    file_options: shared.FileOptions,
     accept: Annotated[
-        list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
+        list[str] | None, Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
     conjugate: Annotated[
-        bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+        bool, Option("--conjugate", help="The file holds the complex conjugate of response over force.")
     ] = False,
     sensor_mass: Annotated[
-        float | None, typer.Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
+        float | None, Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
     ] = None,
     beside: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="Another measurement of the same structure: a file, the number of another response of FILE, or where "
             "FILE is a machine folder another tap test; given twice or more. What most of them have, too, is less in "
             "doubt."
         ),
     ] = None,
-    add: AddedModes = None,
-    drop: DroppedModes = None,
-    fix: FixedModes = None,
+    add: shared.AddedModes = None,
+    drop: shared.DroppedModes = None,
+    fix: shared.FixedModes = None,
     by_fit: Annotated[
-        bool, typer.Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
+        bool, Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
     ] = False,
     everything: Annotated[
-        bool, typer.Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
+        bool, Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -118,7 +102,7 @@ def modes(
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
-        reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
+        shared.reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
         with nullcontext() if choice is None else publish_on_change(logbook):
@@ -144,7 +128,7 @@ def modes(
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
 
 
-def _resolve_edits(edits: ModeEdits, by_fit: bool) -> ModeEdits | None:
+def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":
     """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
     if edits and by_fit:
         raise ValueError("--by-fit takes back all that is said by hand; leave --add, --drop and --fix out")

@@ -1,10 +1,8 @@
 """Command `lobewatch observe`: record the result of a test cut by ear."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks
@@ -12,14 +10,12 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 def observe(
     machine: Machine,
-    program: Annotated[str, typer.Option(help='Cutting program that was cut, or "reference cut".')],
-    speed: Annotated[
-        float | None, typer.Option(help="Spindle speed, rpm; that of the program where not given.")
-    ] = None,
+    program: Annotated[str, Option(help='Cutting program that was cut, or "reference cut".')],
+    speed: Annotated[float | None, Option(help="Spindle speed, rpm; that of the program where not given.")] = None,
     depth: CutDepth = None,
-    stable: Annotated[bool, typer.Option("--stable", help="It ran quietly.")] = False,
-    chatter: Annotated[bool, typer.Option("--chatter", help="It chattered.")] = False,
-    frequency: Annotated[float | None, typer.Option(help="What it chattered at, Hz, where somebody knows.")] = None,
+    stable: Annotated[bool, Option("--stable", help="It ran quietly.")] = False,
+    chatter: Annotated[bool, Option("--chatter", help="It chattered.")] = False,
+    frequency: Annotated[float | None, Option(help="What it chattered at, Hz, where somebody knows.")] = None,
     power: CutPower = None,
     date: CutDate = None,
     as_json: Json = False,

@@ -1,18 +1,16 @@
 """Command `lobewatch paper`: compare with the paper of Gaber & Hashemi."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.show.terminal.output import Json, emit
 
 
 def paper(
     out: Annotated[
-        Path | None, typer.Option(help="A folder for a page (paper.md) and its figures, made where it is not there.")
+        Path | None, Option(help="A folder for a page (paper.md) and its figures, made where it is not there.")
     ] = None,
     as_json: Json = False,
 ) -> None:

@@ -1,10 +1,8 @@
 """Command `lobewatch pitch`: propose unequal pitches for a cutter."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import Flutes, Material, MillingDirection, TappedMachine, cut_fields
 from lobewatch.show.terminal.output import Json, emit, notes
@@ -12,13 +10,13 @@ from lobewatch.show.terminal.output import Json, emit, notes
 
 def pitch(
     machine: TappedMachine,
-    speed: Annotated[float, typer.Option(help="Spindle speed, rpm: pitches are for one speed.")],
-    tool: Annotated[str | None, typer.Option(help="Tool whose teeth are to be spaced.")] = None,
-    depth: Annotated[float | None, typer.Option(help="Axial depth to be judged too, mm.")] = None,
+    speed: Annotated[float, Option(help="Spindle speed, rpm: pitches are for one speed.")],
+    tool: Annotated[str | None, Option(help="Tool whose teeth are to be spaced.")] = None,
+    depth: Annotated[float | None, Option(help="Axial depth to be judged too, mm.")] = None,
     material: Material = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
-    radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
+    diameter: Annotated[float | None, Option(help="Diameter of the tool, mm.")] = None,
+    radial: Annotated[float | None, Option(help="Its radial depth, mm.")] = None,
     direction: MillingDirection = None,
     as_json: Json = False,
 ) -> None:

@@ -1,16 +1,14 @@
 """Command `lobewatch ports`: list serial ports and the devices on them."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.show.terminal.output import Json, emit
 
 
 def ports(
-    port: Annotated[str, typer.Option(help="Ask only here; also a pseudo-terminal or socket://HOST:PORT.")] = "",
+    port: Annotated[str, Option(help="Ask only here; also a pseudo-terminal or socket://HOST:PORT.")] = "",
     as_json: Json = False,
 ) -> None:
     """List serial ports and the devices that answer.

@@ -1,10 +1,8 @@
 """Command `lobewatch recommend`: recommend speed and depth for a tool and a material."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
 from lobewatch.show.terminal.output import Json, emit
@@ -12,20 +10,18 @@ from lobewatch.show.terminal.output import Json, emit
 
 def recommend(
     machine: TappedMachine,
-    tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
+    tool: Annotated[str | None, Option(help="The tool.")] = None,
     material: Material = None,
-    radial: Annotated[
-        float | None, typer.Option(parser=number, help="Radial depth, mm; a slot where none is given.")
-    ] = None,
+    radial: Annotated[float | None, Option(parser=number, help="Radial depth, mm; a slot where none is given.")] = None,
     direction: Annotated[
-        Literal["up", "down"] | None, typer.Option(help="Up or down milling; the worse where none is given.")
+        Literal["up", "down"] | None, Option(help="Up or down milling; the worse where none is given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
-    speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
+    depth: Annotated[float | None, Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
+    speed: Annotated[float | None, Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
-    feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
-    save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
+    feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth, mm.")] = None,
+    save: Annotated[str | None, Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
@@ -50,14 +46,10 @@ def recommend(
     if save is not None:
         check_program_name(logbook.machine, save)
     answer = recommend_requested(logbook, cut, save)
-    if save is not None and answer.setting is not None:
+    saved = None if answer.setting is None else save
+    if saved is not None:
         save_program(logbook.folder, answer.program)
-    saved = save if answer.setting is not None else None
     payload = recommendation_json(answer, logbook.remarks) | {"saved": saved}
-    lines = [
-        *recommendation_lines(answer, logbook.remarks),
-        *(saved_lines(logbook.folder.path, saved) if saved else ()),
-    ]
-    emit(payload, as_json, *lines)
-    if answer.setting is None:
-        raise typer.Exit(1)
+    next_lines = saved_lines(logbook.folder.path, saved) if saved else ()
+    emit(payload, as_json, *recommendation_lines(answer, logbook.remarks), *next_lines)
+    raise Exit(int(answer.setting is None))

@@ -1,67 +1,52 @@
 """Command `lobewatch replay`: store recorded files as tap tests."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
-from lobewatch.commands.shared_options import (
-    AddedModes,
-    DroppedModes,
-    FileOptions,
-    FixedModes,
-    Machine,
-    add_file_options,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, print_remarks
 
 
-@add_file_options()
+@shared.add_file_options()
 def replay(
-    machine: Machine,
-    files: Annotated[
-        list[Path], typer.Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')
-    ],
-    tool: Annotated[
-        str, typer.Option(help="What was in the spindle; from the file, or [tap] tool, where not given.")
-    ] = "",
+    machine: shared.Machine,
+    files: Annotated[list[Path], Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')],
+    tool: Annotated[str, Option(help="What was in the spindle; from the file, or [tap] tool, where not given.")] = "",
     direction: Annotated[
-        str, typer.Option(help="Direction at the tool tip, x or y; from the file, or x, where not given.")
+        str, Option(help="Direction at the tool tip, x or y; from the file, or x, where not given.")
     ] = "",
     date: Annotated[
-        datetime | None, typer.Option(help="When it was recorded, local time; from the file where not given.")
+        datetime | None, Option(help="When it was recorded, local time; from the file where not given.")
     ] = None,
     date_pattern: Annotated[
-        str, typer.Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
+        str, Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
     ] = "",
     *,
-    file_options: FileOptions,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would become of each file; store nothing.")
-    ] = False,
+    file_options: shared.FileOptions,
+    dry_run: Annotated[bool, Option("--dry-run", help="Say what would become of each file; store nothing.")] = False,
     keep_going: Annotated[
-        bool, typer.Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
+        bool, Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
     ] = False,
     jobs: Annotated[
-        int, typer.Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
+        int, Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
     ] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Address of a Dask scheduler whose workers read and fit, such as tls://10.0.0.5:8786.")
+        str, Option(help="Address of a Dask scheduler whose workers read and fit, such as tls://10.0.0.5:8786.")
     ] = "",
     accept: Annotated[
         list[str] | None,
-        typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
+        Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
-    add: AddedModes = None,
-    drop: DroppedModes = None,
-    fix: FixedModes = None,
-    temperature: Annotated[float | None, typer.Option(help="Of the spindle then, degC.")] = None,
-    hours: Annotated[float | None, typer.Option(help="Running hours of the spindle then, h.")] = None,
-    note: Annotated[str, typer.Option(help="What else is to be remembered of these tests.")] = "",
-    reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
+    add: shared.AddedModes = None,
+    drop: shared.DroppedModes = None,
+    fix: shared.FixedModes = None,
+    temperature: Annotated[float | None, Option(help="Of the spindle then, degC.")] = None,
+    hours: Annotated[float | None, Option(help="Running hours of the spindle then, h.")] = None,
+    note: Annotated[str, Option(help="What else is to be remembered of these tests.")] = "",
+    reclamped: Annotated[bool, Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
     as_json: Json = False,
 ) -> None:
     """Store recorded files as tap tests.

@@ -1,26 +1,21 @@
 """Command `lobewatch report`: write an HTML report."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
 def report(
-    machine: Annotated[
-        Path,
-        typer.Argument(parser=to_folder_path, help="Machine folder with a tap test, or a folder of machine folders."),
-    ],
-    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder where not given.")] = None,
-    tool: Annotated[str, typer.Option(help="The series of this tool; that of the newest test where not given.")] = "",
-    direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",
+    machine: Annotated[Path, FolderArgument(help="Machine folder with a tap test, or a folder of machine folders.")],
+    out: Annotated[Path | None, Option(help="The HTML file; report.html in the folder where not given.")] = None,
+    tool: Annotated[str, Option(help="The series of this tool; that of the newest test where not given.")] = "",
+    direction: Annotated[str, Option(help="x or y; that of the newest test where not given.")] = "",
     as_json: Json = False,
 ) -> None:
     """Write the report of a machine or of a folder of machines.

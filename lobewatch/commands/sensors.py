@@ -1,11 +1,9 @@
 """Command `lobewatch sensors`: check hammer, accelerometer and DAQ."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit, notes
@@ -13,11 +11,11 @@ from lobewatch.show.terminal.output import Json, emit, notes
 
 def sensors(
     machine: Machine,
-    port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
+    port: Annotated[str, Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
-        float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
+        float | None, Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
     ] = None,
-    skew: Annotated[bool, typer.Option("--skew", help="Measure the skew: both inputs joined, one signal.")] = False,
+    skew: Annotated[bool, Option("--skew", help="Measure the skew: both inputs joined, one signal.")] = False,
     as_json: Json = False,
 ) -> None:
     """Check hammer, accelerometer and DAQ.
@@ -52,4 +50,4 @@ def sensors(
             sensor_list = list_sensors(folder, device, print_note)
             emit(show.sensors_json(sensor_list), as_json, *show.sensors_texts(sensor_list))
             if sensor_list.errors:
-                raise typer.Exit(2)
+                raise Exit(2)

@@ -1,11 +1,9 @@
 """Command `lobewatch serve`: serve the dashboard of machines."""
 
-from __future__ import annotations
-
 import time
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show_address
@@ -14,7 +12,7 @@ from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show
 def serve(
     folder: FleetFolder,
     listen: Listen = "127.0.0.1",
-    http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
+    http_port: Annotated[int, Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     as_json: Json = False,

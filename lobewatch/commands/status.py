@@ -1,11 +1,9 @@
 """Command `lobewatch status`: status of all machines, worst first."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import AsCsv, FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
@@ -20,22 +18,21 @@ DASHBOARD_ONLY_KEYS = ("points", "limits", "limit", "word", "why")
 
 def status(
     folder: FleetFolder,
-    due: Annotated[bool, typer.Option("--due", help="Only machines whose tap test is due.")] = False,
+    due: Annotated[bool, Option("--due", help="Only machines whose tap test is due.")] = False,
     to_notify: Annotated[
-        bool,
-        typer.Option("--notify", help="Send all of it by MQTT to the brokers that [notify] of machine.toml names."),
+        bool, Option("--notify", help="Send all of it by MQTT to the brokers that [notify] of machine.toml names.")
     ] = False,
     forget: Annotated[
-        str, typer.Option(help="With --notify: take the messages on a machine that is gone out of its broker.")
+        str, Option(help="With --notify: take the messages on a machine that is gone out of its broker.")
     ] = "",
     prometheus: Annotated[
-        Path | None, typer.Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
+        Path | None, Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
     ] = None,
     jobs: Annotated[
-        int, typer.Option(min=1, max=64, help="Processes that make what is missing of standings; the same comes out.")
+        int, Option(min=1, max=64, help="Processes that make what is missing of standings; the same comes out.")
     ] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
+        str, Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
     ] = "",
     as_csv: AsCsv = False,
     as_json: Json = False,
@@ -58,8 +55,7 @@ def status(
         raise ValueError("--csv and --json: give one of them")
     if forget and not to_notify:
         raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
-    machines = find_machines(folder)
-    fleet = Fleet(machines, with_option_names)
+    fleet = Fleet(find_machines(folder), with_option_names)
     if jobs > 1 or scheduler:
         _make_missing_summaries(fleet, jobs, scheduler)
     assessed = fleet.assess_machines()
@@ -82,12 +78,12 @@ def status(
     if to_notify:
         from lobewatch.notify.publish_status import publish_folder
 
-        failures = len(publish_folder(folder, machines, assessed, forget))
+        failures = len(publish_folder(folder, assessed, forget))
     needs_care = any(row["light"] is StatusLevel.ALARM or not row["can_be_judged"] for row in rows)
-    raise typer.Exit(1 if needs_care else 2 * (failures > 0))
+    raise Exit(1 if needs_care else 2 * (failures > 0))
 
 
-def _make_missing_summaries(fleet: Fleet, jobs: int, scheduler: str) -> None:
+def _make_missing_summaries(fleet: "Fleet", jobs: int, scheduler: str) -> None:
     """Make missing summaries in other processes."""
     from functools import partial
 

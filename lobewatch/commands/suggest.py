@@ -1,10 +1,8 @@
 """Command `lobewatch suggest`: suggest the next test cut."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import TappedMachine
 from lobewatch.show.terminal.output import Json, emit
@@ -12,8 +10,8 @@ from lobewatch.show.terminal.output import Json, emit
 
 def suggest(
     machine: TappedMachine,
-    program: Annotated[str, typer.Option(help="Cutting program to find the limits of.")],
-    cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
+    program: Annotated[str, Option(help="Cutting program to find the limits of.")],
+    cuts: Annotated[int, Option(min=1, help="Test cuts that shall be made in all.")] = 5,
     as_json: Json = False,
 ) -> None:
     """Suggest the next test cut of a program.
@@ -29,15 +27,7 @@ def suggest(
     from lobewatch.cuts.learning.pocket_depth import choose_first_depth, find_pocket_depths
     from lobewatch.cuts.learning.program_learning import find_next_cut, find_program
     from lobewatch.logbook import Logbook
-    from lobewatch.show.cuts.recorded_cuts import (
-        learned_remarks,
-        learned_texts,
-        speed_pocket_table,
-        suggestion_json,
-        suggestion_lines,
-        tried_depths_json,
-        tried_depths_lines,
-    )
+    from lobewatch.show.cuts import recorded_cuts as show
     from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine)
@@ -46,12 +36,13 @@ def suggest(
     if assembly.without_stiffness and not assembly.directions:
         depths, first = find_pocket_depths(table, assembly, logbook.machine, logbook.cuts), choose_first_depth(table)
         remarks = [*logbook.remarks, *assembly.remarks]
-        payload = tried_depths_json(table, depths, first) | {"remarks": list(remarks)}
-        lines = tried_depths_lines(table, depths, first, logbook.folder.path)
-        emit(payload, as_json, speed_pocket_table([heard.pocket for heard in depths]), *lines, *remark_lines(remarks))
+        payload = show.tried_depths_json(table, depths, first) | {"remarks": remarks}
+        pockets = show.speed_pocket_table([heard.pocket for heard in depths])
+        lines = show.tried_depths_lines(table, depths, first, logbook.folder.path)
+        emit(payload, as_json, pockets, *lines, *remark_lines(remarks))
         return
     assembly = assembly.check()
     suggestion = find_next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
-    remarks = [*logbook.remarks, *assembly.remarks, *learned_remarks(suggestion.learning)]
-    texts = [*suggestion_lines(suggestion, logbook.folder.path), *learned_texts(suggestion.learning)]
-    emit(suggestion_json(suggestion) | {"remarks": remarks}, as_json, *texts, *remark_lines(remarks))
+    remarks = [*logbook.remarks, *assembly.remarks, *show.learned_remarks(suggestion.learning)]
+    texts = [*show.suggestion_lines(suggestion, logbook.folder.path), *show.learned_texts(suggestion.learning)]
+    emit(show.suggestion_json(suggestion) | {"remarks": remarks}, as_json, *texts, *remark_lines(remarks))

@@ -1,46 +1,41 @@
 """Command `lobewatch tap`: run a live tap test."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import typer
+from typer import Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, show_address
 
-if TYPE_CHECKING:
-    from acquisition import TapDirection
-
 
 def tap(
     machine: Machine,
-    port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
-    tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
+    port: Annotated[str, Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
+    tool: Annotated[str, Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y; a sensor with two axes does "
             "it with x); without it x, then y at a terminal."
         ),
     ] = "",
-    operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
-    new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
+    operator: Annotated[str, Option(help="Who holds the hammer.")] = "",
+    new: Annotated[bool, Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
     accept: Annotated[
         list[str] | None,
-        typer.Option(help="Take the recording though it raises this question, by its code; as often as needed."),
+        Option(help="Take the recording though it raises this question, by its code; as often as needed."),
     ] = None,
-    temperature: Annotated[float | None, typer.Option(help="Of the spindle, degC.")] = None,
-    hours: Annotated[float | None, typer.Option(help="Running hours of the spindle, h.")] = None,
-    note: Annotated[str, typer.Option(help="What else is to be remembered of this test.")] = "",
-    reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for this test.")] = False,
-    screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
+    temperature: Annotated[float | None, Option(help="Of the spindle, degC.")] = None,
+    hours: Annotated[float | None, Option(help="Running hours of the spindle, h.")] = None,
+    note: Annotated[str, Option(help="What else is to be remembered of this test.")] = "",
+    reclamped: Annotated[bool, Option("--reclamped", help="The tool was clamped anew for this test.")] = False,
+    screen: Annotated[bool, Option("--screen", help="Show the test in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
-    details: Annotated[bool, typer.Option("--details", help="All modes, the model and the doubt, too.")] = False,
+    details: Annotated[bool, Option("--details", help="All modes, the model and the doubt, too.")] = False,
     as_json: Json = False,
 ) -> None:
     """Run a live tap test.
@@ -59,7 +54,7 @@ def tap(
       lobewatch tap mill-3 --temperature 24 --reclamped --note "after a warm-up of 20 min"
       lobewatch tap trial --port file:taps/ID.h5
     """
-    from acquisition import Conditions, parse_direction
+    from acquisition import Conditions, TapDirection, parse_direction
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status

@@ -1,10 +1,8 @@
 """Command `lobewatch trend`: trend and forecast of a series."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-import typer
+from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, emit, print_remarks, results
@@ -12,9 +10,9 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 def trend(
     machine: Machine,
-    tool: Annotated[str | None, typer.Option(help="Of this tool; else that of the series that fell most.")] = None,
-    direction: Annotated[str | None, typer.Option(help="x or y; else the one that fell more.")] = None,
-    as_csv: Annotated[bool, typer.Option("--csv", help="The points with commas on stdout instead of text.")] = False,
+    tool: Annotated[str | None, Option(help="Of this tool; else that of the series that fell most.")] = None,
+    direction: Annotated[str | None, Option(help="x or y; else the one that fell more.")] = None,
+    as_csv: Annotated[bool, Option("--csv", help="The points with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
     """Show the frequency trend of a series.
@@ -44,4 +42,4 @@ def trend(
         texts = [] if as_json else trend_texts(machine_outlook, series, preload)
         emit(trend_json(machine_outlook, series, preload), as_json, *texts)
     print_remarks([*machine_outlook.status.remarks, *logbook.remarks])
-    raise typer.Exit(int(machine_outlook.status.status is StatusLevel.ALARM))
+    raise Exit(int(machine_outlook.status.status is StatusLevel.ALARM))

@@ -1,7 +1,5 @@
 """Command `lobewatch verify`: verify the files of a machine folder."""
 
-from __future__ import annotations
-
 import typer
 
 from lobewatch.commands.shared_options import Machine
@@ -30,5 +28,4 @@ def verify(machine: Machine, as_json: Json = False) -> None:
     texts += [f"entered in the journal: {name}" for name in verification.entered]
     last = f"{len(damage)} damaged" if damage else "nothing is damaged"
     emit(payload, as_json, *texts, f"{n_taps} tap test(s) as they were committed, {last}")
-    if damage:
-        raise typer.Exit(1)
+    raise typer.Exit(int(bool(damage)))

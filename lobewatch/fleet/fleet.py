@@ -1,5 +1,6 @@
 """Assess the machines of a folder and refresh those whose files have changed."""
 
+import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,13 +12,8 @@ import lobewatch.fleet as fleet
 import lobewatch.machine as machine
 from acquisition import DataError, Remark
 from acquisition.errors import format_error
-from lobewatch.fleet.machine_summary import (
-    SUMMARY_LIFETIME,
-    DatedStatus,
-    MachineSummary,
-    read_summary,
-    summarize_unreadable,
-)
+from lobewatch.fleet import machine_summary
+from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary, read_summary
 from lobewatch.machine.folder_files import compute_change_mark, format_path
 from lobewatch.monitoring.status_rules import StatusLevel
 
@@ -128,11 +124,7 @@ class Fleet:
         with self._lock:
             self._renewals_left = MAX_RENEWALS_PER_POLL
             machines = [self._assess_machine(key, path, now) for key, path in self.machines.items()]
-        levels = list(StatusLevel)
-        return sorted(
-            machines,
-            key=lambda m: (m.current.is_readable, levels.index(m.current.status), -_largest_drop(m.summary), m.key),
-        )
+        return sorted(machines, key=_sort_key)
 
     def verify_until(self, end: threading.Event) -> None:
         """Verify every byte of all machines, now and every few hours. Damage becomes part of the status.
@@ -166,7 +158,7 @@ class Fleet:
         """Return the cached summary if it is up to date, else renew it."""
         last_mark, last_time, last = self._summaries.get(key, ((), now, None))
         if last is not None and last_mark == compute_change_mark(path, last.newest_file):
-            if now - last_time < SUMMARY_LIFETIME or not self._renewals_left:
+            if now - last_time < machine_summary.SUMMARY_LIFETIME or not self._renewals_left:
                 return last
             self._renewals_left -= 1
         mark = compute_change_mark(path)
@@ -174,13 +166,15 @@ class Fleet:
             summary = None if key in self._outdated else read_summary(path, now)
             summary = summary or fleet.summarize_folder(path, now, self._render_text)
         except Exception as error:  # noqa: BLE001 - an unreadable machine must not hide the others
-            return summarize_unreadable(last.name if last else key, format_error(error))
+            return machine_summary.summarize_unreadable(last.name if last else key, format_error(error))
         self._outdated.discard(key)
         if mark == compute_change_mark(path):  # else another program has written meanwhile
             self._summaries[key] = compute_change_mark(path, summary.newest_file), now, summary
         return summary
 
 
-def _largest_drop(summary: MachineSummary) -> float:
-    drop = summary.series[0].drop if summary.series else 0.0
-    return float("inf") if drop is None else drop
+def _sort_key(machine: FleetMachine) -> tuple[bool, int, float, str]:
+    current, series = machine.current, machine.summary.series
+    drop = series[0].drop if series else 0.0
+    severity = [*StatusLevel].index(current.status)
+    return current.is_readable, severity, -math.inf if drop is None else -drop, machine.key

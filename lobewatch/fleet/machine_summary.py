@@ -11,22 +11,10 @@ from typing import NamedTuple
 import msgspec
 
 from acquisition import Remark
-from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
+from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder_files import compute_change_mark
-from lobewatch.monitoring.status_rules import (
-    UNREADABLE_NEXT_STEP,
-    Alarm,
-    StatusLevel,
-    add_acknowledgements,
-    add_damage_remarks,
-    count_days_left,
-    date_remarks,
-    find_next_step,
-    is_early_alarm,
-    sort_by_severity,
-    unreadable_remark,
-    worst_status,
-)
+from lobewatch.monitoring import status_rules
+from lobewatch.monitoring.status_rules import Alarm, add_acknowledgements
 from lobewatch.monitoring.threshold_dates import LimitForecasts, ProgramForecast
 
 SUMMARY_FILE_NAME = "standing.json"
@@ -66,7 +54,7 @@ class SeriesSummary(msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_s
 class DatedStatus(NamedTuple):
     """Status of a machine at a time."""
 
-    status: StatusLevel
+    status: status_rules.StatusLevel
     """Status of the most severe reason."""
     remarks: tuple[Remark, ...]
     """Reasons, most severe first."""
@@ -80,7 +68,7 @@ class DatedStatus(NamedTuple):
     @property
     def is_early(self) -> bool:
         """True if the alarm is a frequency drop below every limit."""
-        return is_early_alarm(self.remarks)
+        return status_rules.is_early_alarm(self.remarks)
 
     @property
     def is_readable(self) -> bool:
@@ -139,23 +127,19 @@ class MachineSummary(
         """Return the status at a time, with damage found since. `path` is that of the folder."""
         left, remarks = None, self.remarks
         if self.time is not None:
-            left = count_days_left(self.time, self.interval_days, now)
-            dated = date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
-            remarks = sort_by_severity([*remarks, *dated])
+            left = status_rules.count_days_left(self.time, self.interval_days, now)
+            dated = status_rules.date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
+            remarks = status_rules.sort_by_severity([*remarks, *dated])
         if damage:
-            remarks = add_damage_remarks(remarks, damage)
+            remarks = status_rules.add_damage_remarks(remarks, damage)
         acknowledged = add_acknowledgements(remarks, self.alarms, now)
-        next_step = find_next_step(remarks, self.default_next_step)
-        return DatedStatus(worst_status(remarks), acknowledged, next_step, left, now)
-
-    def mentions_path(self, path: str) -> bool:
-        """Return whether a reason names a path."""
-        return any(path in text for remark in self.remarks for text in (remark.text, remark.cure))
+        next_step = status_rules.find_next_step(remarks, self.default_next_step)
+        return DatedStatus(status_rules.worst_status(remarks), acknowledged, next_step, left, now)
 
 
 def summarize_unreadable(name: str, reason: str) -> MachineSummary:
     """Make the summary of a machine whose files cannot be read."""
-    return MachineSummary(name, (unreadable_remark(reason),), UNREADABLE_NEXT_STEP)
+    return MachineSummary(name, (status_rules.unreadable_remark(reason),), status_rules.UNREADABLE_NEXT_STEP)
 
 
 class _SummaryFile(msgspec.Struct, frozen=True, rename={"format_number": "make", "created": "made"}):
@@ -198,18 +182,14 @@ def decode_summary(folder: Path, content: bytes, now: datetime) -> MachineSummar
     summary, age = file.summary, now - file.created
     if file.mark != compute_change_mark(folder, summary.newest_file) or not timedelta(0) <= age < SUMMARY_LIFETIME:
         return None
-    return None if summary.path != str(folder) and summary.mentions_path(summary.path) else summary
+    texts = (text for remark in summary.remarks for text in (remark.text, remark.cure))
+    return None if summary.path != str(folder) and any(summary.path in text for text in texts) else summary
 
 
 def encode_summary(summary: MachineSummary, mark: tuple[int, ...], now: datetime) -> bytes:
     """Encode the content of standing.json. `mark` is the change mark of the summarized files."""
     body = _encode_file(_SummaryFile(SUMMARY_FORMAT_NUMBER, software_version(), mark, now, summary))
     return _make_crc_head(body) + body[1:]
-
-
-def write_summary(folder: Path, summary: MachineSummary, mark: tuple[int, ...], now: datetime) -> None:
-    """Write standing.json atomically. Call it under the lock. OSError if it cannot be written."""
-    atomic_write(folder / SUMMARY_FILE_NAME, encode_summary(summary, mark, now), lasting=False)
 
 
 def _read_content(folder: Path) -> bytes:

@@ -10,22 +10,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from acquisition import CROSS_TAP
-from lobewatch.fleet.machine_summary import (
-    SUMMARY_FILE_NAME,
-    MachineSummary,
-    SeriesSummary,
-    decode_summary,
-    encode_summary,
-    read_last_summary,
-    write_summary,
-)
+from acquisition import CROSS_TAP, atomic_write
+from lobewatch.fleet import machine_summary
+from lobewatch.fleet.machine_summary import MachineSummary, SeriesSummary
 from lobewatch.history.history import History, encode_row
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
@@ -34,16 +25,10 @@ from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.monitoring import SeriesStatus, series_points
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
-from lobewatch.monitoring.machine_status import SeriesStatus
 from lobewatch.monitoring.series_history import build_series_history
-from lobewatch.monitoring.series_points import (
-    NO_SCATTER_PRIOR,
-    ScatterPrior,
-    SeriesScatterPrior,
-    estimate_scatter,
-    pool_scatter,
-)
+from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import next_tap_step
 from lobewatch.monitoring.trend import Trend, point_days
 
@@ -91,7 +76,7 @@ def summarize_in_parallel(
     """
     tasks = [(os.getcwd(), str(folder), now, render_text) for folder in folders]  # noqa: PTH109
     for folder, content in zip(folders, share_work(_make_summary_content, tasks, workers), strict=True):
-        summary = decode_summary(folder, content, now)
+        summary = machine_summary.decode_summary(folder, content, now)
         if summary is not None:
             yield folder, compute_change_mark(folder, summary.newest_file), summary
 
@@ -109,7 +94,7 @@ def _make_summary_content(task: tuple[str, str, datetime, RenderText]) -> bytes:
             summary = summarize_folder(folder, now, render_text)
             if mark != compute_change_mark(folder):
                 return b""
-            return encode_summary(summary, compute_change_mark(folder, summary.newest_file), now)
+            return machine_summary.encode_summary(summary, compute_change_mark(folder, summary.newest_file), now)
     except Exception:  # noqa: BLE001 - the next assessment shows what is wrong
         return b""
 
@@ -145,7 +130,8 @@ def summarize_machine(logbook: Logbook, now: datetime | None = None, render_text
     mark = compute_change_mark(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
         with contextlib.suppress(BusyError, OSError), logbook.folder.locked(patience=0):
-            write_summary(logbook.folder.path, summary, mark, now)
+            path = logbook.folder.path / machine_summary.SUMMARY_FILE_NAME
+            atomic_write(path, machine_summary.encode_summary(summary, mark, now), lasting=False)
     return summary
 
 
@@ -175,25 +161,17 @@ def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: Ren
 
 
 def _summarize_series(series: SeriesStatus) -> SeriesSummary:
-    trend, drop = series.trend, series.drop
-    summary = SeriesSummary(
-        name=series.name,
-        tool=series.tool,
-        direction=series.direction,
-        drop=drop.value if drop.is_known else None,
-        drop_std=drop.std if drop.is_known and math.isfinite(drop.std) else None,
-        frequency=None,
-    )
+    trend, drop, names = series.trend, series.drop, (series.name, series.tool, series.direction)
+    value = drop.value if drop.is_known else None
+    std = drop.std if drop.is_known and math.isfinite(drop.std) else None
     if trend is None:
-        return summary
-    return msgspec.structs.replace(
-        summary,
-        frequency=trend.first_value * math.exp(trend.points[-1].percent / 100),
-        alarm=trend.open_drop.change.kind if trend.open_drop is not None else "",
-        scatter=estimate_scatter(trend.readings.y),
-        common_scatter=estimate_scatter(trend.readings.mean_of_directions.y),
-        points=tuple(_thin_out(trend)),
-    )
+        return SeriesSummary(*names, value, std, None)
+    frequency = trend.first_value * math.exp(trend.points[-1].percent / 100)
+    alarm = trend.open_drop.change.kind if trend.open_drop is not None else ""
+    scatter = series_points.estimate_scatter(trend.readings.y)
+    common_scatter = series_points.estimate_scatter(trend.readings.mean_of_directions.y)
+    points = tuple(_thin_out(trend))
+    return SeriesSummary(*names, value, std, frequency, alarm, scatter, common_scatter, points)
 
 
 def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:
@@ -217,16 +195,13 @@ def learn_scatter(logbook: Logbook) -> None:
     history = logbook.history
     rows = history.current
     counts = Counter((row.tool, row.direction) for row in rows if row.direction != CROSS_TAP)
-    if (
-        not counts
-        or logbook.files.fleet_scatter is not None
-        or all(count >= MIN_MONITORED_POINTS for count in counts.values())
-    ):
+    is_young = any(count < MIN_MONITORED_POINTS for count in counts.values())
+    if not is_young or logbook.files.fleet_scatter is not None:
         return
     priors = [*_read_neighbor_scatters(logbook.folder.path), *_collect_earlier_scatters(history)]
     if not priors:
         return
-    scatter, common = (pool_scatter(scatters) for scatters in zip(*priors, strict=True))
+    scatter, common = (series_points.pool_scatter(scatters) for scatters in zip(*priors, strict=True))
     if scatter.freedom:
         number = sum(prior.freedom > 0 for prior, _ in priors)
         with logbook.folder.locked():
@@ -235,10 +210,11 @@ def learn_scatter(logbook: Logbook) -> None:
 
 def _read_neighbor_scatters(folder: Path) -> Iterator[SeriesScatterPrior]:
     """Read the scatter of all machines in the same parent folder."""
-    for path in islice(sorted(folder.resolve().parent.glob(f"*/{SUMMARY_FILE_NAME}")), MAX_MACHINES_READ):
-        summary = read_last_summary(path.parent)
+    paths = sorted(folder.resolve().parent.glob(f"*/{machine_summary.SUMMARY_FILE_NAME}"))
+    for path in paths[:MAX_MACHINES_READ]:
+        summary = machine_summary.read_last_summary(path.parent)
         for series in () if summary is None else summary.series:
-            common = series.common_scatter if series.direction == "x" else NO_SCATTER_PRIOR
+            common = series.common_scatter if series.direction == "x" else series_points.NO_SCATTER_PRIOR
             yield SeriesScatterPrior(ScatterPrior(*series.scatter), ScatterPrior(*common))
 
 
@@ -252,4 +228,4 @@ def _collect_earlier_scatters(history: History) -> Iterator[SeriesScatterPrior]:
             trend = build_series_history(rows, other_direction).frequency.trend if rows else None
             if trend is not None:
                 both = trend.readings.mean_of_directions
-                yield SeriesScatterPrior(estimate_scatter(trend.readings.y), estimate_scatter(both.y))
+                yield SeriesScatterPrior(*map(series_points.estimate_scatter, (trend.readings.y, both.y)))

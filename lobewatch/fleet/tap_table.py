@@ -18,24 +18,16 @@ from acquisition.errors import format_error
 from lobewatch.fleet.machine_summary import MachineSummary, read_summary, software_version
 from lobewatch.machine.row_file import read_rows
 
+TAP_CONDITION_COLUMNS = ("temperature_c", "hours")
+"""Columns of conditions of the tap test."""
+_ESTIMATE_COLUMNS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
 TAP_NUMBER_COLUMNS = (
-    "frequency_hz",
-    "frequency_hz_std",
-    "damping_ratio",
-    "damping_ratio_std",
-    "stiffness_n_per_m",
-    "stiffness_n_per_m_std",
-    "bearing_stiffness_n_per_m",
-    "bearing_stiffness_n_per_m_std",
-    "static_tip_stiffness_n_per_m",
-    "modal_tip_stiffness_n_per_m",
-    "temperature_c",
-    "hours",
+    *(f"{name}{suffix}" for name in _ESTIMATE_COLUMNS for suffix in ("", "_std")),
+    *("static_tip_stiffness_n_per_m", "modal_tip_stiffness_n_per_m"),
+    *TAP_CONDITION_COLUMNS,
 )
 """Columns of numbers: followed mode at the tapped point and mean calibrated bearing stiffness, each with its standard
 error; tip stiffness of the calibrated model; conditions of the tap test."""
-TAP_CONDITION_COLUMNS = TAP_NUMBER_COLUMNS[-2:]
-"""Columns of conditions of the tap test."""
 
 
 class _RemarkCode(msgspec.Struct, gc=False):
@@ -108,16 +100,10 @@ def read_tap_table(
         rows = _decode_rows(contents)
     numbers: dict[tuple[str, str, str], int] = {}
     series_numbers = [numbers.setdefault(series, len(numbers) + 1) for series in map(_get_series, rows)]
-    return TapTestTable(
-        key,
-        summary.name,
-        [(tool, direction) for tool, direction, _ in numbers],
-        series_numbers,
-        [row.tap_id for row in rows],
-        [row.time.timestamp() for row in rows],
-        [_join_codes(row.remarks) for row in rows],
-        _make_number_array(rows),
-    )
+    series = [(tool, direction) for tool, direction, _ in numbers]
+    tap_ids, times = [row.tap_id for row in rows], [row.time.timestamp() for row in rows]
+    codes, values = [_join_codes(row.remarks) for row in rows], _make_number_array(rows)
+    return TapTestTable(key, summary.name, series, series_numbers, tap_ids, times, codes, values)
 
 
 def _join_codes(remarks: Sequence[_RemarkCode]) -> str:

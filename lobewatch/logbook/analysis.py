@@ -13,9 +13,8 @@ from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.recommendation import Advice, advise
+from lobewatch.verdicts import Advice, StoredVerdict, Verdict, advise
 from lobewatch.verdicts.setting_robustness import build_stored_verdict, is_verdict_missing
-from lobewatch.verdicts.verdict import StoredVerdict, Verdict
 
 MAX_CACHED_VERDICT_SETS = 8
 """Number of tap tests whose verdicts stay in memory, most recently used last."""
@@ -68,9 +67,11 @@ class Analysis:
     def history(self) -> History:
         """Up-to-date history, oldest tap test first; history.rows is updated where the lock is free."""
         if self._history is None:
-            self._history = self._update_history()
-            if self._history.rows:
-                self.stored_verdicts(self._history.rows[-1].tap_id)
+            history = self._cache.read(self.files)
+            rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
+            history = self._history = self._without_doubtful_verdicts(replace(history, rows=rows))
+            if history.rows:
+                self.stored_verdicts(history.rows[-1].tap_id)
         return self._history
 
     @property
@@ -78,16 +79,9 @@ class Analysis:
         """Cached history, or None."""
         return self._history
 
-    def _update_history(self) -> History:
-        """Read the rows that are still valid and add the missing ones."""
-        history = self._cache.read(self.files)
-        rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
-        history = replace(history, rows=rows)
-        return self._without_doubtful_verdicts(history) if history.rows else history
-
     def _without_doubtful_verdicts(self, history: History) -> History:
         """Return the history without the verdicts after the newest tap test, if a newer one is damaged."""
-        is_doubtful = self.files.newest_damaged_remarks()
+        is_doubtful = history.rows and self.files.newest_damaged_remarks()
         return history.with_verdicts(len(history.rows) - 1, None) if is_doubtful else history
 
     def measurement(self, tap_id: str) -> Measurement:
@@ -283,7 +277,5 @@ class Analysis:
             Time of the assessment. None for the present time.
         """
         files, time = self.files, now or datetime.now(UTC)
-        acknowledgements, scatter = files.contents.acknowledgements, files.fleet_scatter
-        return assess_status(
-            self.machine, self.history, time, self.folder.path, files.remarks, acknowledgements, scatter
-        )
+        acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
+        return assess_status(self.machine, self.history, time, self.folder.path, files.remarks, acknowledged, scatter)

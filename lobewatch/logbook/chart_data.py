@@ -14,26 +14,11 @@ from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.drive_power import CutRange
-from lobewatch.measurement.spindle_model import (
-    MODEL_FRF_POINTS,
-    ModelState,
-    build_model_state,
-    compute_model_frf,
-    first_critical_speed,
-    tap_position,
-)
+from lobewatch.measurement import spindle_model
+from lobewatch.tool import lobe_chart
 from lobewatch.tool.assembly import Assembly, speed_grid
-from lobewatch.tool.lobe_chart import (
-    MAX_CHART_DEPTH_RATIO,
-    DynamicsSource,
-    LobeChart,
-    LobeMethod,
-    compute_lobe_chart,
-)
-from lobewatch.verdicts.recommendation import find_stable_pockets
-from lobewatch.verdicts.setting_robustness import Setting
+from lobewatch.verdicts import Setting, Verdict, find_stable_pockets
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
-from lobewatch.verdicts.verdict import Verdict
 
 NO_POCKET_CODE = "no-safe-pocket"
 """Code of the remark on missing pockets."""
@@ -43,9 +28,9 @@ NO_POCKET_CODE = "no-safe-pocket"
 class LobeComparison:
     """Stability lobes of one cut, then and now."""
 
-    now: LobeChart
+    now: lobe_chart.LobeChart
     """Chart from the newest tap tests, or predicted."""
-    then: LobeChart | None
+    then: lobe_chart.LobeChart | None
     """Chart from the first tap tests of the same tool and directions. None if there are no earlier tap tests."""
     pockets: Sequence[Setting]
     """Stable pockets from the newest tap tests by semi-discretization, largest removal rate first."""
@@ -58,7 +43,7 @@ class LobeComparison:
 
 
 def compare_lobes(
-    logbook: Logbook, tool: str | None, cut: str, source: DynamicsSource, method: LobeMethod
+    logbook: Logbook, tool: str | None, cut: str, source: lobe_chart.DynamicsSource, method: lobe_chart.LobeMethod
 ) -> LobeComparison:
     """Compare the stability lobes of a cut now with those from the first tap tests.
 
@@ -112,29 +97,27 @@ def _find_assembly(logbook: Logbook, tool: str | None, cut: str) -> Assembly:
 
 
 def _make_chart(
-    logbook: Logbook, assembly: Assembly, cut: str, source: DynamicsSource, method: LobeMethod
-) -> LobeChart:
+    logbook: Logbook, assembly: Assembly, cut: str, source: lobe_chart.DynamicsSource, method: lobe_chart.LobeMethod
+) -> lobe_chart.LobeChart:
     machine = logbook.machine
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
-        raise DataError(
-            f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {', '.join(cuts) or 'none'}"
-        )
+        names = ", ".join(cuts) or "none"
+        raise DataError(f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {names}")
     assembly = assembly.check()
-    frfs = _read_frfs(logbook, assembly) if source is DynamicsSource.FRF else None
+    frfs = _read_frfs(logbook, assembly) if source is lobe_chart.DynamicsSource.FRF else None
     x, y = frfs or (assembly.x, assembly.y)
-    lobes = compute_lobe_chart(method, x, y, cuts[cut], speed_grid(machine))
-    return LobeChart(cut, machine.cut_tables[cut], assembly, source, x, y, cuts[cut], lobes)
+    lobes = lobe_chart.compute_lobe_chart(method, x, y, cuts[cut], speed_grid(machine))
+    return lobe_chart.LobeChart(cut, machine.cut_tables[cut], assembly, source, x, y, cuts[cut], lobes)
 
 
 def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
     """Read or predict the FRFs in x and y. A missing direction gets the FRF of the other."""
     place = logbook.machine.tap.position_mm
     if place > 0 and (not assembly.predicted or assembly.tool == logbook.machine.tap.tool):
-        raise DataError(
-            f"DynamicsSource.FRF needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the "
-            "tip; use DynamicsSource.MODES, which the model carries to the tip"
-        )
+        text = f"needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the tip"
+        cure = "use DynamicsSource.MODES, which the model carries to the tip"
+        raise DataError(f"DynamicsSource.FRF {text}; {cure}")
     read = _predict_frf if assembly.predicted else _read_assembly_frf
     frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
     other = frfs[assembly.directions[0]]
@@ -145,7 +128,8 @@ def _predict_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
     """Predict the FRF by receptance coupling, with the newest bearings calibrated in this direction."""
     rows = logbook.history.current
     newest = [row for row in rows if row.direction == direction and row.bearing_stiffness.is_known][-1]
-    return compute_model_frf(build_model_state(logbook.machine, logbook.measurement(newest.tap_id), assembly.tool))
+    measurement = logbook.measurement(newest.tap_id)
+    return spindle_model.compute_model_frf(spindle_model.build_model_state(logbook.machine, measurement, assembly.tool))
 
 
 def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
@@ -159,7 +143,7 @@ def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> 
     return replace(frf, frequency=ratio * frf.frequency, usable_band=band)
 
 
-def _no_pocket_remark(now: LobeChart, machine: Machine) -> Remark:
+def _no_pocket_remark(now: lobe_chart.LobeChart, machine: Machine) -> Remark:
     if len(now.assembly.directions) == 1:
         gap, cure = now.assembly.missing_direction
         return Remark(NO_POCKET_CODE, now.name, f"no speed and depth can be called safe: {gap}", cure)
@@ -167,11 +151,11 @@ def _no_pocket_remark(now: LobeChart, machine: Machine) -> Remark:
     return Remark(NO_POCKET_CODE, now.name, text, "choose another tool or a narrower cut")
 
 
-def _find_pocket_shifts(then: LobeChart | None, now: LobeChart) -> list[PocketShift]:
+def _find_pocket_shifts(then: lobe_chart.LobeChart | None, now: lobe_chart.LobeChart) -> list[PocketShift]:
     """Match the pockets of both charts. Pockets cut off at the top of a chart are left out."""
     if then is None:
         return []
-    deepest = MAX_CHART_DEPTH_RATIO * max(then.lobes.minimum.depth, now.lobes.minimum.depth)
+    deepest = lobe_chart.MAX_CHART_DEPTH_RATIO * max(then.lobes.minimum.depth, now.lobes.minimum.depth)
     if not np.isfinite(deepest):
         return []
     shifts = match_pockets(then.lobes, now.lobes, deepest)
@@ -204,7 +188,7 @@ class ModelFigureData:
     """Newest measured FRF of the same tool, or None."""
 
 
-def collect_model_figure(logbook: Logbook, state: ModelState, modes: int) -> ModelFigureData:
+def collect_model_figure(logbook: Logbook, state: spindle_model.ModelState, modes: int) -> ModelFigureData:
     """Collect the data of the figure of a spindle model.
 
     Parameters
@@ -221,18 +205,18 @@ def collect_model_figure(logbook: Logbook, state: ModelState, modes: int) -> Mod
     ModelFigureData
         Mode shapes, stiffness curve, whirl map and FRFs.
     """
-    spindle, machine = state.spindle, state.machine
-    speeds = np.linspace(0.0, 1.15 * (first_critical_speed(spindle) or machine.speed.high_rpm), 24)
+    spindle, machine, position = state.spindle, state.machine, spindle_model.tap_position(state)
+    speeds = np.linspace(0.0, 1.15 * (spindle_model.first_critical_speed(spindle) or machine.speed.high_rpm), 24)
     return ModelFigureData(
         title=state.title,
         spindle=spindle,
-        modes=mode_shapes(spindle, min(modes, 4), np.linspace(0.0, spindle.length, MODEL_FRF_POINTS)),
+        modes=mode_shapes(spindle, min(modes, 4), np.linspace(0.0, spindle.length, spindle_model.MODEL_FRF_POINTS)),
         curve=_compute_stiffness_curve(spindle, machine.mode.model_mode),
         points=_calibrated_points(logbook, state.tool),
         whirl=whirl_map(spindle, speeds, min(modes, 2)),
         highest_speed=machine.speed.high_rpm,
-        frf_place="at the tool tip" if tap_position(state) == 0 else f"{tap_position(state) * 1e3:g} mm from the tip",
-        model_frf=compute_model_frf(state),
+        frf_place="at the tool tip" if position == 0 else f"{position * 1e3:g} mm from the tip",
+        model_frf=spindle_model.compute_model_frf(state),
         measured_frf=_read_newest_frf(logbook, state.tool),
     )
 
@@ -245,7 +229,7 @@ def _compute_stiffness_curve(spindle: Spindle, mode: int) -> tuple[NDArray[np.fl
     for factor in (1 / 30, 30.0):
         scaled = [replace(bearing, stiffness=factor * bearing.stiffness) for bearing in spindle.bearings]
         ends.append(float(natural_frequencies(replace(spindle, bearings=scaled), mode)[-1]))
-    frequency = np.linspace(ends[0], ends[1], MODEL_FRF_POINTS)[1:-1]
+    frequency = np.linspace(ends[0], ends[1], spindle_model.MODEL_FRF_POINTS)[1:-1]
     return stiffness_curve(spindle, frequency, mode), frequency
 
 

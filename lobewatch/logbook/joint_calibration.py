@@ -1,36 +1,19 @@
 """Calibrate joints and bearings of the model from tap tests of several tools."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import timedelta
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
+import dsm
 from acquisition import DataError, Remark
-from dsm import (
-    Joint,
-    PredictedMode,
-    Spindle,
-    StiffnessFit,
-    StiffnessFitError,
-    UnreachableFrequencyError,
-    calibrate,
-    fit_stiffness,
-    modes_at,
-    predict_mode,
-)
+from lobewatch.logbook import tool_modes
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.logbook.tool_modes import (
-    TappedTool,
-    ToolModeMatch,
-    assign_mode_numbers,
-    find_tapped_tools,
-    select_neighbor_modes,
-)
 from lobewatch.machine import Machine
 
 NUM_COMPARED_MODEL_MODES = 8
@@ -41,17 +24,17 @@ MAX_FITTED_NUMBERINGS = 2
 """Number of mode numberings that are fitted at most."""
 MAX_REMATCH_ROUNDS = 2
 """Number of times that modes are matched again to the fitted model at most."""
-Grouping = Callable[[Spindle], Spindle]
+Grouping = Callable[[dsm.Spindle], dsm.Spindle]
 """Function that assigns the springs of a spindle to groups with a common factor."""
 
 
-def choose_grouping(spindle: Spindle, modes: int) -> Grouping:
+def choose_grouping(spindle: dsm.Spindle, modes: int) -> Grouping:
     """Choose the finest grouping that needs no more factors than there are modes."""
     finer = (split_tilting_groups, keep_groups)
     return next((grouping for grouping in finer if len(_group_names(grouping(spindle))) <= modes), merge_groups)
 
 
-def compute_start_factors(spindle: Spindle, bearings: float, radial: float, tilting: float) -> list[float]:
+def compute_start_factors(spindle: dsm.Spindle, bearings: float, radial: float, tilting: float) -> list[float]:
     """List one factor for each group, bearings first. A common group of a joint gets the geometric mean."""
     springs = [(bearing.group, bearings) for bearing in spindle.bearings]
     for joint in spindle.joints:
@@ -60,28 +43,28 @@ def compute_start_factors(spindle: Spindle, bearings: float, radial: float, tilt
     return list({name: factor for name, factor in springs if name}.values())
 
 
-def split_tilting_groups(spindle: Spindle) -> Spindle:
+def split_tilting_groups(spindle: dsm.Spindle) -> dsm.Spindle:
     """Give the tilting stiffness of each joint a group of its own."""
-    return _replace_grouped_joints(
-        spindle, lambda joint: {"rotational_group": joint.rotational_group or f"{joint.group} tilting"}
-    )
+    joints = [
+        replace(joint, rotational_group=joint.rotational_group or f"{joint.group} tilting") if joint.group else joint
+        for joint in spindle.joints
+    ]
+    return replace(spindle, joints=joints)
 
 
-def keep_groups(spindle: Spindle) -> Spindle:
+def keep_groups(spindle: dsm.Spindle) -> dsm.Spindle:
     """Keep the groups of machine.toml."""
     return spindle
 
 
-def merge_groups(spindle: Spindle) -> Spindle:
+def merge_groups(spindle: dsm.Spindle) -> dsm.Spindle:
     """Put all calibrated bearings into one group and all joints into another."""
-    return replace(
-        spindle,
-        bearings=[replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings],
-        joints=[replace(joint, group="joint" if joint.group else "", rotational_group="") for joint in spindle.joints],
-    )
+    bearings = [replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings]
+    joints = [replace(joint, group="joint" if joint.group else "", rotational_group="") for joint in spindle.joints]
+    return replace(spindle, bearings=bearings, joints=joints)
 
 
-def _group_names(spindle: Spindle) -> set[str]:
+def _group_names(spindle: dsm.Spindle) -> set[str]:
     joints = {name for joint in spindle.joints for name in (joint.group, joint.rotational_group)}
     return ({bearing.group for bearing in spindle.bearings} | joints) - {""}
 
@@ -97,25 +80,24 @@ class InitialGuess(NamedTuple):
     """Factor on the radial stiffness of the joints (-)."""
     tilting: float
     """Factor on the tilting stiffness of the joints (-)."""
-    matches: tuple[ToolModeMatch, ...]
+    matches: tuple[tool_modes.ToolModeMatch, ...]
     """Matched modes of each tap test."""
 
 
-@dataclass(frozen=True, eq=False)
-class JointFit:
+class JointFit(NamedTuple):
     """Spindle model fitted to the matched modes of several tap tests."""
 
-    taps: Sequence[TappedTool]
+    taps: Sequence[tool_modes.TappedTool]
     """Tools with their tap tests."""
-    matches: tuple[ToolModeMatch, ...]
+    matches: tuple[tool_modes.ToolModeMatch, ...]
     """Matched modes of each tap test."""
     grouping: Grouping
     """Grouping of the springs that share a factor."""
-    fit: StiffnessFit
+    fit: dsm.StiffnessFit
     """Fitted stiffness."""
 
 
-def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
+def fit_joints(taps: Sequence[tool_modes.TappedTool], position: float) -> JointFit:
     """Fit bearings and joints to the matched modes of several tap tests.
 
     For joints from a tenth to ten times as stiff as given, the followed mode of the first tool sets the bearings, and
@@ -124,11 +106,11 @@ def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
     """
     starts = _select_distinct(sorted(_generate_guesses(taps, position), key=lambda start: start.cost))
     if not starts:
-        followed = tuple(ToolModeMatch(0.0, ((tap.mode_number, tap.followed),)) for tap in taps)
+        followed = tuple(tool_modes.ToolModeMatch(0.0, ((tap.mode_number, tap.followed),)) for tap in taps)
         return _fit_model(taps, InitialGuess(0.0, 1.0, 1.0, 1.0, followed))
     best = None
     for start in starts[:MAX_FITTED_NUMBERINGS]:
-        with suppress(StiffnessFitError, UnreachableFrequencyError):
+        with suppress(dsm.StiffnessFitError, dsm.UnreachableFrequencyError):
             fitted = _iterate_fit(taps, start, position)
             best = fitted if best is None or (best.fit.has_misfit and not fitted.fit.has_misfit) else best
         if best is not None and not best.fit.has_misfit:
@@ -136,13 +118,16 @@ def fit_joints(taps: Sequence[TappedTool], position: float) -> JointFit:
     return best or _fit_model(taps, starts[0])
 
 
-def _generate_guesses(taps: Sequence[TappedTool], position: float) -> Iterator[InitialGuess]:
+def _generate_guesses(taps: Sequence[tool_modes.TappedTool], position: float) -> Iterator[InitialGuess]:
     first = taps[0]
     for radial, tilting in product(JOINT_STIFFNESS_FACTORS, repeat=2):
         with suppress(ValueError, ArithmeticError):
-            scaled = [_scale_joints(tap.spindle, radial, tilting) for tap in taps]
-            factor = calibrate(scaled[0], first.followed.frequency, mode=first.mode_number).factor
-            matches = _match_all(taps, [_scale_bearings(spindle, factor) for spindle in scaled], position)
+            factors = {"stiffness": radial, "rotational_stiffness": tilting}
+            scaled = [replace(tap.spindle, joints=_scale_springs(tap.spindle.joints, factors)) for tap in taps]
+            factor = dsm.calibrate(scaled[0], first.followed.frequency, mode=first.mode_number).factor
+            bearings = [_scale_springs(spindle.bearings, {"stiffness": factor}) for spindle in scaled]
+            spindles = [replace(spindle, bearings=new) for spindle, new in zip(scaled, bearings, strict=True)]
+            matches = _match_all(taps, spindles, position)
             yield InitialGuess(sum(match.cost for match in matches), factor, radial, tilting, matches)
 
 
@@ -151,27 +136,13 @@ def _select_distinct(starts: Sequence[InitialGuess]) -> list[InitialGuess]:
     return list({str(_mode_numbers(start.matches)): start for start in reversed(starts)}.values())[::-1]
 
 
-def _scale_joints(spindle: Spindle, radial: float, tilting: float) -> Spindle:
-    factors = {"stiffness": radial, "rotational_stiffness": tilting}
-    return _replace_grouped_joints(
-        spindle, lambda joint: {name: factor * getattr(joint, name) for name, factor in factors.items()}
-    )
+def _scale_springs(springs: Sequence[Any], factors: Mapping[str, float]) -> list[Any]:
+    """Scale stiffnesses of the bearings or joints that belong to a group."""
+    scaled = [{name: factor * getattr(spring, name) for name, factor in factors.items()} for spring in springs]
+    return [replace(spring, **new) if spring.group else spring for spring, new in zip(springs, scaled, strict=True)]
 
 
-def _replace_grouped_joints(spindle: Spindle, changes: Callable[[Joint], dict[str, Any]]) -> Spindle:
-    joints = [replace(joint, **changes(joint)) if joint.group else joint for joint in spindle.joints]
-    return replace(spindle, joints=joints)
-
-
-def _scale_bearings(spindle: Spindle, factor: float) -> Spindle:
-    bearings = [
-        replace(bearing, stiffness=factor * bearing.stiffness) if bearing.group else bearing
-        for bearing in spindle.bearings
-    ]
-    return replace(spindle, bearings=bearings)
-
-
-def _iterate_fit(taps: Sequence[TappedTool], start: InitialGuess, position: float) -> JointFit:
+def _iterate_fit(taps: Sequence[tool_modes.TappedTool], start: InitialGuess, position: float) -> JointFit:
     """Fit and match again until the matched modes stay the same."""
     fitted = _fit_model(taps, start)
     for _ in range(MAX_REMATCH_ROUNDS):
@@ -182,23 +153,25 @@ def _iterate_fit(taps: Sequence[TappedTool], start: InitialGuess, position: floa
     return fitted
 
 
-def _match_all(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position: float) -> tuple[ToolModeMatch, ...]:
+def _match_all(
+    taps: Sequence[tool_modes.TappedTool], spindles: Sequence[dsm.Spindle], position: float
+) -> tuple[tool_modes.ToolModeMatch, ...]:
     matches = []
     for tap, spindle in zip(taps, spindles, strict=True):
-        frequency, stiffness = modes_at(spindle, max(NUM_COMPARED_MODEL_MODES, tap.mode_number), position)
-        matches.append(assign_mode_numbers(tap, frequency.tolist(), stiffness.tolist()))
+        frequency, stiffness = dsm.modes_at(spindle, max(NUM_COMPARED_MODEL_MODES, tap.mode_number), position)
+        matches.append(tool_modes.assign_mode_numbers(tap, frequency.tolist(), stiffness.tolist()))
     return tuple(matches)
 
 
-def _mode_numbers(matches: Sequence[ToolModeMatch]) -> list[list[tuple[int, float]]]:
+def _mode_numbers(matches: Sequence[tool_modes.ToolModeMatch]) -> list[list[tuple[int, float]]]:
     return [[(number, mode.frequency) for number, mode in match.modes] for match in matches]
 
 
-def _fit_model(taps: Sequence[TappedTool], start: InitialGuess) -> JointFit:
+def _fit_model(taps: Sequence[tool_modes.TappedTool], start: InitialGuess) -> JointFit:
     numbered = [(tap, number, mode) for tap, match in enumerate(start.matches) for number, mode in match.modes]
     grouping = choose_grouping(taps[0].spindle, len(numbered))
     spindles = [grouping(tap.spindle) for tap in taps]
-    fit = fit_stiffness(
+    fit = dsm.fit_stiffness(
         spindles,
         [mode.frequency for _, _, mode in numbered],
         [taps[tap].frequency_std(mode) for tap, _, mode in numbered],
@@ -210,19 +183,18 @@ def _fit_model(taps: Sequence[TappedTool], start: InitialGuess) -> JointFit:
     return JointFit(taps, start.matches, grouping, fit)
 
 
-@dataclass(frozen=True)
-class JointCalibration:
+class JointCalibration(NamedTuple):
     """Joint and bearing stiffness fitted to several tools."""
 
     label: str
     """Label of the model in machine.toml."""
-    taps: tuple[TappedTool, ...]
+    taps: tuple[tool_modes.TappedTool, ...]
     """Fitted tools, one for each spindle of the fit."""
-    fit: StiffnessFit
+    fit: dsm.StiffnessFit
     """Fitted stiffness of bearings and joints."""
-    predicted: dict[str, PredictedMode]
+    predicted: dict[str, dsm.PredictedMode]
     """Softest tip mode of each tool that was not fitted, by name. Empty if stiffnesses share a factor."""
-    joints: tuple[Joint, ...]
+    joints: tuple[dsm.Joint, ...]
     """Joints to write into machine.toml. Empty if that is no improvement."""
     unmatched: dict[str, tuple[float, ...]]
     """Frequencies (Hz) of measured modes without a model mode nearby, by tool."""
@@ -241,40 +213,35 @@ def calibrate_joints(
     """
     machine = logbook.machine
     if not any(joint.group for joint in machine.model(tools[0]).joints):
-        raise DataError(
-            "no joint of [spindle] has a group: nothing but bearings could be found; give the joint between tool and "
-            'spindle one, such as group = "holder" in joints of machine.toml'
-        )
-    taps = find_tapped_tools(logbook, tools, direction, mode)
+        cure = 'give the joint between tool and spindle one, such as group = "holder" in joints of machine.toml'
+        raise DataError(f"no joint of [spindle] has a group: nothing but bearings could be found; {cure}")
+    taps = tool_modes.find_tapped_tools(logbook, tools, direction, mode)
     try:
         joint_fit = fit_joints(taps, machine.tap.position_mm / 1e3)
-    except (StiffnessFitError, UnreachableFrequencyError) as error:
+    except (dsm.StiffnessFitError, dsm.UnreachableFrequencyError) as error:
         raise DataError(f"tools {' and '.join(map(repr, tools))} do not fit one spindle: {error}") from error
     fit, grouping = joint_fit.fit, joint_fit.grouping
-    return JointCalibration(
-        machine.spindle.label if machine.spindle else "",
-        tuple(taps),
-        fit,
-        dict(_predict_other_tools(machine, fit, grouping, tools)) if grouping is split_tilting_groups else {},
-        _joints_for_toml(fit, grouping, machine.model(machine.tap.tool)),
-        dict(_find_unmatched(joint_fit)),
-        (*_shared_factor_remarks(joint_fit), *_time_gap_remarks(taps, machine)),
-    )
+    label = machine.spindle.label if machine.spindle else ""
+    is_split = grouping is split_tilting_groups
+    predicted = dict(_predict_other_tools(machine, fit, grouping, tools)) if is_split else {}
+    joints = _joints_for_toml(fit, grouping, machine.model(machine.tap.tool))
+    remarks = *_shared_factor_remarks(joint_fit), *_time_gap_remarks(taps, machine)
+    return JointCalibration(label, tuple(taps), fit, predicted, joints, dict(_find_unmatched(joint_fit)), remarks)
 
 
 def _predict_other_tools(
-    machine: Machine, fit: StiffnessFit, grouping: Grouping, tools: Sequence[str]
-) -> Iterator[tuple[str, PredictedMode]]:
+    machine: Machine, fit: dsm.StiffnessFit, grouping: Grouping, tools: Sequence[str]
+) -> Iterator[tuple[str, dsm.PredictedMode]]:
     for name in [machine.tap.tool, *(tool.name for tool in machine.modelled_tools)]:
         if name in tools:
             continue
         spindle = grouping(machine.model(name))
         with suppress(ArithmeticError):
-            softest = int(np.argmin(modes_at(fit.apply_to(spindle), NUM_COMPARED_MODEL_MODES)[1]))
-            yield name, predict_mode(fit, spindle, softest + 1)
+            softest = int(np.argmin(dsm.modes_at(fit.apply_to(spindle), NUM_COMPARED_MODEL_MODES)[1]))
+            yield name, dsm.predict_mode(fit, spindle, softest + 1)
 
 
-def _joints_for_toml(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> tuple[Joint, ...]:
+def _joints_for_toml(fit: dsm.StiffnessFit, grouping: Grouping, drawn: dsm.Spindle) -> tuple[dsm.Joint, ...]:
     """Return all joints as fitted. Empty if the tools do not fit one spindle or no joint has an effect."""
     joints = fit.apply_to(grouping(drawn)).joints
     names = {name for joint in joints for name in (joint.group, joint.rotational_group) if name}
@@ -286,7 +253,7 @@ def _joints_for_toml(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> t
 def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...]]]:
     for tap, match in zip(joint_fit.taps, joint_fit.matches, strict=True):
         matched = {id(mode) for _, mode in match.modes}
-        unmatched = tuple(mode.frequency for mode in select_neighbor_modes(tap) if id(mode) not in matched)
+        unmatched = tuple(mode.frequency for mode in tool_modes.select_neighbor_modes(tap) if id(mode) not in matched)
         if unmatched:
             yield tap.tool, unmatched
 
@@ -294,15 +261,12 @@ def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...
 def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
     if joint_fit.grouping is not split_tilting_groups:
         shared = "all bearings share a factor, and " if joint_fit.grouping is merge_groups else ""
-        text = (
-            f"{joint_fit.fit.mode.size} modes are too few: {shared}all stiffnesses of the joint keep their given "
-            "ratio; other tools are not predicted"
-        )
-        cure = "measure more modes: a wider [mode] band_hz, a harder hammer tip"
-        yield Remark("factors-shared", "", text, cure)
+        kept = f"{shared}all stiffnesses of the joint keep their given ratio"
+        text = f"{joint_fit.fit.mode.size} modes are too few: {kept}; other tools are not predicted"
+        yield Remark("factors-shared", "", text, "measure more modes: a wider [mode] band_hz, a harder hammer tip")
 
 
-def _time_gap_remarks(taps: Sequence[TappedTool], machine: Machine) -> Iterator[Remark]:
+def _time_gap_remarks(taps: Sequence[tool_modes.TappedTool], machine: Machine) -> Iterator[Remark]:
     times = [tap.time for tap in taps]
     days = (max(times) - min(times)) / timedelta(days=1)
     if days > machine.machine.tap_interval_days:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import wraps
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
@@ -172,8 +171,7 @@ class Logbook:
     @property
     def history(self) -> History:
         """Up-to-date history, oldest tap test first; history.rows is updated where the lock is free."""
-        history: History = self.query(attrgetter("history"))
-        return history
+        return self.query(lambda analysis: analysis.history)
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
@@ -201,8 +199,7 @@ class Logbook:
     @property
     def calibrated_measurement(self) -> Measurement | None:
         """Newest measurement with calibrated bearings, or None."""
-        measurement: Measurement | None = self.query(attrgetter("calibrated_measurement"))
-        return measurement
+        return self.query(lambda analysis: analysis.calibrated_measurement)
 
     assembly = _answered_by(Analysis.assembly)
     first_assembly = _answered_by(Analysis.first_assembly)

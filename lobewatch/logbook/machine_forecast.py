@@ -8,15 +8,8 @@ from datetime import UTC, datetime
 from acquisition import DataError
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.monitoring.machine_status import MachineStatus, SeriesStatus
-from lobewatch.monitoring.threshold_dates import (
-    ALREADY_REACHED,
-    NO_FORECAST,
-    LimitForecasts,
-    ProgramForecast,
-    ThresholdDates,
-    find_earliest,
-)
+from lobewatch.monitoring import MachineStatus, SeriesStatus, threshold_dates
+from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ProgramForecast, ThresholdDates
 from lobewatch.monitoring.trend import Trend
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict
 
@@ -33,7 +26,7 @@ class MachineForecast:
     """Forecast of each program, by name."""
     unknown_programs: frozenset[str]
     """Names of the programs whose verdict is unknown."""
-    limits: LimitForecasts
+    limits: threshold_dates.LimitForecasts
     """Forecast date of each frequency-drop limit of machine.toml (%), for the worst series."""
 
     def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStatus:
@@ -78,7 +71,7 @@ def _newest_verdicts(analysis: Analysis, status: MachineStatus) -> Mapping[str, 
 def _forecast_limit(status: MachineStatus, percent: float) -> ThresholdDates:
     """Forecast when the first series reaches a frequency-drop limit."""
     dates = [_forecast_series_limit(series, percent) for series in status.series]
-    return find_earliest([date for date in dates if date.is_known])
+    return threshold_dates.find_earliest([date for date in dates if date.is_known])
 
 
 def _forecast_series_limit(series: SeriesStatus, percent: float) -> ThresholdDates:
@@ -96,9 +89,11 @@ def _forecast_program(verdict: StoredVerdict, tool: str, status: MachineStatus) 
     not_stable = ALREADY_REACHED if verdict.stability is Stability.NOT_STABLE else NO_FORECAST
     doubtful = NO_FORECAST if verdict.stability is Stability.STABLE else ALREADY_REACHED
     if critical is not None and verdict.stability is Stability.STABLE:
-        doubtful = find_earliest([_forecast_drop(trend, critical.doubtful) for trend in trends])
+        doubtful = threshold_dates.find_earliest([_forecast_drop(trend, critical.doubtful) for trend in trends])
     if critical is not None and verdict.stability is not Stability.NOT_STABLE:
-        not_stable = find_earliest([_forecast_drop(trend, critical.not_stable, critical.error) for trend in trends])
+        not_stable = threshold_dates.find_earliest(
+            [_forecast_drop(trend, critical.not_stable, critical.error) for trend in trends]
+        )
     return ProgramForecast(doubtful, not_stable)
 
 

@@ -1,18 +1,14 @@
 """Rebuild history.rows from the tap tests, with the verdict on every program after each test."""
 
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
 
-from acquisition import DataError, read_tap
+from acquisition import DataError
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.machine import Machine, ProgramTable, TapEntry
+from lobewatch.logbook.recordings.recorded_files import parse_context, read_tap_bytes
+from lobewatch.machine import ProgramTable, TapEntry
 from lobewatch.machine.folder import find_file_fault
-from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 from lobewatch.tool.assembly import Assembly
@@ -22,8 +18,7 @@ RebuildProgress = Callable[[int, int], None]
 """Callback for progress: number of finished tap tests, and of all."""
 
 
-@dataclass(frozen=True)
-class TapFileBytes:
+class TapFileBytes(NamedTuple):
     """Content of one tap file, for a worker."""
 
     entry: TapEntry
@@ -34,8 +29,7 @@ class TapFileBytes:
     """Content of machine.toml."""
 
 
-@dataclass(frozen=True, eq=False)
-class VerdictRequest:
+class VerdictRequest(NamedTuple):
     """Request for the verdicts on all programs after one tap test, for a worker."""
 
     tools: Mapping[str, Assembly | DataError]
@@ -54,21 +48,14 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgres
         fits = share_work(fit_tap_bytes, contents, workers, _is_tap_fit)
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
-    for number, (tap_id, verdicts) in enumerate(_evaluate_all(logbook, tap_ids, toml, workers), 1):
+    verdicts_of_all: Iterable[dict[str, Verdict]] = [{}] * len(tap_ids)
+    if workers.use_other_processes:
+        requests = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
+        verdicts_of_all = share_work(evaluate_programs, requests, workers, _are_verdicts)
+    for number, (tap_id, verdicts) in enumerate(zip(tap_ids, verdicts_of_all, strict=True), 1):
         logbook.query(Analysis.stored_verdicts, tap_id, verdicts=verdicts)
         progress(number, len(tap_ids))
     return len(tap_ids)
-
-
-def _evaluate_all(
-    logbook: Logbook, tap_ids: list[str], toml: str, workers: Workers
-) -> Iterator[tuple[str, dict[str, Verdict]]]:
-    """Yield the verdicts of workers after each tap test; none without workers."""
-    if not workers.use_other_processes:
-        yield from ((tap_id, {}) for tap_id in tap_ids)
-        return
-    requests = (_make_verdict_request(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, share_work(evaluate_programs, requests, workers, _are_verdicts), strict=True)
 
 
 def _read_tap_bytes(logbook: Logbook, entry: TapEntry, toml: str) -> TapFileBytes:
@@ -83,18 +70,15 @@ def _make_verdict_request(logbook: Logbook, tap_id: str, toml: str) -> VerdictRe
 
 def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
     """Fit the modes of a tap file. None if it cannot be read."""
-    with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
-        path = Path(work) / "tap.h5"
-        path.write_bytes(tap.content)
-        try:
-            return fit_tap(read_tap(path), _parse_cached(tap.machine_toml), tap.entry.by_hand)
-        except DataError:
-            return None
+    try:
+        return fit_tap(read_tap_bytes(tap.content), parse_context(tap.machine_toml).machine, tap.entry.by_hand)
+    except DataError:
+        return None
 
 
 def evaluate_programs(request: VerdictRequest) -> dict[str, Verdict]:
     """Evaluate all programs, by name."""
-    machine = _parse_cached(request.machine_toml)
+    machine = parse_context(request.machine_toml).machine
     return {table.name: evaluate_program(table, request.tools[table.tool], machine) for table in machine.program}
 
 
@@ -103,7 +87,7 @@ def _is_tap_fit(tap: TapFileBytes, answer: Any) -> bool:
 
 
 def _are_verdicts(request: VerdictRequest, answer: Any) -> bool:
-    programs = {table.name: table for table in _parse_cached(request.machine_toml).program}
+    programs = {table.name: table for table in parse_context(request.machine_toml).machine.program}
     return answer.keys() == programs.keys() and all(_is_verdict(programs[name], answer[name]) for name in programs)
 
 
@@ -112,8 +96,3 @@ def _is_verdict(program: ProgramTable, answer: Any) -> bool:
     is_known = answer.stability is not Stability.UNKNOWN
     is_typed = isinstance(answer, Verdict) and isinstance(answer.stability, Stability)
     return is_typed and answer.program == program and is_known == (answer.limit > 0)
-
-
-@lru_cache(maxsize=4)
-def _parse_cached(toml: str) -> Machine:
-    return parse_machine_file(toml)

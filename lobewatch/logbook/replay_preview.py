@@ -5,23 +5,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition import DataError, Description, Recording, TapTest
+from acquisition import Description, Recording, TapTest
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.prepare_taps import (
-    FileRequest,
     InterpretedFile,
     explain_file_error,
-    interpret_file,
-    interpret_request,
+    interpret_content,
     is_valid_interpretation,
+    work_on_files,
 )
-from lobewatch.logbook.recordings.store_recordings import (
-    LOCAL_WORKERS,
-    ReplayProgressCallback,
-    StoredContents,
-    compute_digests,
-)
-from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.logbook.recordings.store_recordings import LOCAL_WORKERS, ProgressCallback, ReplayPlan
+from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit
 from modal import Mode
 
@@ -40,6 +34,8 @@ class ReplayPreview:
     """Recording with its facts."""
     tap: TapTest | None = None
     """Tap test that a replay would store."""
+    fit: TapFit | None = None
+    """Fitted modes."""
     measurement: Measurement | None = None
     """Measurement of this tap test. Its remarks include the questions that it raises."""
 
@@ -48,82 +44,57 @@ def preview_replay(
     logbook: Logbook,
     files: Sequence[Path],
     description: Description,
-    progress: ReplayProgressCallback = lambda _what, _done, _of: None,
+    progress: ProgressCallback = lambda _what, _done, _of: None,
     workers: Workers = LOCAL_WORKERS,
 ) -> list[ReplayPreview]:
     """Preview the replay of recorded files, in order of date; rejected and stored files come first.
 
     The result does not depend on the workers.
     """
-    read_files = sorted(_read_recordings(logbook, files, description, progress, workers), key=_recorded_time)
+    previews = sorted(_read_recordings(logbook, files, description, progress, workers), key=_recorded_time)
     newest_modes: dict[tuple[str, str], Mode] = {}
-    previews = list[ReplayPreview]()
-    for number, (preview, fit) in enumerate(read_files, 1):
-        previews.append(_measure_preview(logbook, preview, fit, newest_modes))
-        progress("measure", number, len(files))
+    for i, preview in enumerate(previews):
+        previews[i] = _measure_preview(logbook, preview, newest_modes)
+        progress("measure", i + 1, len(files))
     return previews
 
 
-def _recorded_time(read_file: tuple[ReplayPreview, TapFit | None]) -> float:
-    tap = read_file[0].tap
-    return tap.circumstances.created.timestamp() if tap else -math.inf
+def _recorded_time(preview: ReplayPreview) -> float:
+    return preview.tap.circumstances.created.timestamp() if preview.tap else -math.inf
 
 
 def _read_recordings(
-    logbook: Logbook,
-    files: Sequence[Path],
-    description: Description,
-    progress: ReplayProgressCallback,
-    workers: Workers,
-) -> Iterator[tuple[ReplayPreview, TapFit | None]]:
+    logbook: Logbook, files: Sequence[Path], description: Description, progress: ProgressCallback, workers: Workers
+) -> Iterator[ReplayPreview]:
     """Read each content once and yield a preview of each file, in the order of the files."""
-    contents, todo = StoredContents.of(logbook.folder.taps()), dict[str, Path]()
-    digests, unread = compute_digests(files)
-    for file, digest in digests.items():
-        if contents.find_tap(digest, description) is None:
-            todo.setdefault(digest, file)
-    results = dict[str, InterpretedFile | str]()
-    for digest, result in zip(todo, _interpret_all(logbook, [*todo.values()], description, workers), strict=True):
-        results[digest] = result
-        progress("read", len(results), len(todo))
+    digests, unread, stored, new = ReplayPlan.of(logbook.folder, files, description)
+    results, paths = dict[str, InterpretedFile | str](), [*new.values()]
+    answers = work_on_files(logbook.folder, paths, description, workers, interpret_content, is_valid_interpretation)
+    for digest, answer in zip(new, answers, strict=True):
+        results[digest] = answer
+        progress("read", len(results), len(new))
     for file in files:
         digest = digests.get(file, "")
-        answer = explain_file_error(file, unread[file]) if file in unread else results.get(digest)
-        if answer is None:
-            yield ReplayPreview(file, stored_tap_id=contents.find_tap(digest, description) or ""), None
-        elif isinstance(answer, str):
-            yield ReplayPreview(file, rejection=answer), None
-        elif todo[digest] != file:
-            yield ReplayPreview(file, stored_tap_id=answer.tap.id), None
+        result = explain_file_error(file, unread[file]) if file in unread else results.get(digest)
+        if result is None:
+            yield ReplayPreview(file, stored_tap_id=stored[digest])
+        elif isinstance(result, str):
+            yield ReplayPreview(file, rejection=result)
+        elif new[digest] != file:
+            yield ReplayPreview(file, stored_tap_id=result.tap.id)
         else:
-            yield ReplayPreview(file, recording=answer.recording, tap=answer.tap), answer.fit
-
-
-def _interpret_all(
-    logbook: Logbook, files: Sequence[Path], description: Description, workers: Workers
-) -> Iterator[InterpretedFile | str]:
-    """Yield the interpretation of each file, or the reason why it cannot be used. Errors as `share_work`."""
-    if workers.use_other_processes:
-        toml = logbook.folder.toml_text
-        requests = (FileRequest.of(file, description, toml) for file in files)
-        yield from share_work(interpret_request, requests, workers, is_valid_interpretation)
-        return
-    for file in files:
-        try:
-            yield interpret_file(logbook.folder, file, description)
-        except (DataError, OSError, ValueError) as error:
-            yield explain_file_error(file, error)
+            yield ReplayPreview(file, recording=result.recording, tap=result.tap, fit=result.fit)
 
 
 def _measure_preview(
-    logbook: Logbook, preview: ReplayPreview, fit: TapFit | None, newest_modes: dict[tuple[str, str], Mode]
+    logbook: Logbook, preview: ReplayPreview, newest_modes: dict[tuple[str, str], Mode]
 ) -> ReplayPreview:
     """Measure a tap test to preview. `newest_modes` holds the newest followed mode of each tool and direction."""
-    if preview.tap is None or fit is None:
+    if preview.tap is None or preview.fit is None:
         return preview
     series = (preview.tap.circumstances.tool, preview.tap.circumstances.direction)
     before = newest_modes.get(series) or _find_earlier_mode(logbook, preview.tap)
-    measurement = interpret_fit(fit, logbook.machine, before)
+    measurement = interpret_fit(preview.fit, logbook.machine, before)
     if measurement.followed is not None:
         newest_modes[series] = measurement.followed
     return replace(preview, measurement=measurement)

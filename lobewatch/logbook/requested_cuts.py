@@ -12,13 +12,8 @@ from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
+from lobewatch.machine.settings import requested_cut
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
-from lobewatch.machine.settings.requested_cut import (
-    build_cut_without_setting,
-    build_requested_program,
-    find_by_name,
-    find_common_speed,
-)
 from lobewatch.verdicts.pitch_proposal import PitchProposal, propose_pitch
 from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import Recommendation, recommend
@@ -32,10 +27,10 @@ def recommend_requested(logbook: Logbook, cut: Mapping[str, Any], name: str | No
     recommended program gets the name. ValueError for an invalid cut, DataError without a tap test.
     """
     machine = logbook.machine
-    table, either = build_cut_without_setting(machine, cut)
+    table, either = requested_cut.build_cut_without_setting(machine, cut)
     table = msgspec.structs.replace(table, name=name or table.name)
     logbook.newest_tap()
-    speed = cut.get("speed_rpm") or find_common_speed(machine, table.tool)
+    speed = cut.get("speed_rpm") or requested_cut.find_common_speed(machine, table.tool)
     return _recommend_cut(logbook, table, either, cut.get("depth_mm"), speed)
 
 
@@ -79,7 +74,7 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
         if names:
             text = "evaluate_requested.names has its own speed, depth and tool; give either it or the options of a cut"
             raise ValueError(text)
-        requested = build_requested_program(machine, cut)
+        requested = requested_cut.build_requested_program(machine, cut)
         logbook.newest_tap()
         return RequestedVerdicts([logbook.verdict_for(requested)], [])
     if not machine.all_programs:
@@ -87,7 +82,7 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
         text = f"no [[program]] to check; add one for each cut that the shop runs, or give {fields}"
         raise DataError(f"{logbook.folder.toml}: {text}")
     by_name = {table.name: table for table in machine.all_programs}
-    chosen = [find_by_name(by_name, name).name for name in names] or list(by_name)
+    chosen = [requested_cut.find_by_name(by_name, name).name for name in names] or list(by_name)
     logbook.newest_tap()
     incomplete = [table for table in machine.all_programs if table.is_incomplete and table.name in chosen]
     has_complete = any(table.name in chosen for table in machine.program)
@@ -101,7 +96,7 @@ def propose_requested_pitch(logbook: Logbook, cut: Mapping[str, Any]) -> PitchPr
     ValueError for an invalid cut, DataError if its tool was not tapped.
     """
     machine, is_deep = logbook.machine, cut.get("depth_mm") is None
-    table = build_requested_program(machine, {**cut, "depth_mm": DEPTH_STEP_MM} if is_deep else cut)
+    table = requested_cut.build_requested_program(machine, {**cut, "depth_mm": DEPTH_STEP_MM} if is_deep else cut)
     if is_deep:
         name = f"{table.speed_rpm:g} rpm"
         table = msgspec.structs.replace(table, name=name, depth_mm=table.deepest_mm / MAX_PROGRAM_DEPTH_RATIO)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import NamedTuple
 
@@ -26,8 +25,7 @@ MAX_NEIGHBOR_MODES = 4
 """Number of modes next to the followed mode that are matched at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class TappedTool:
+class TappedTool(NamedTuple):
     """Tool with its newest tap test."""
 
     tool: str
@@ -84,10 +82,8 @@ def _check_tools(tools: Sequence[str], mode: Sequence[int]) -> None:
         raise ValueError(f"calibrate_joints.tools {tools[0]}: {text}")
     for tool in tools:
         if tools.count(tool) > 1:
-            raise ValueError(
-                f"calibrate_joints.tools {tool}: named {tools.count(tool)} times; name another tool, or give the same "
-                "one at another stick-out a [[tool]] and a name of its own"
-            )
+            text = "name another tool, or give the same one at another stick-out a [[tool]] and a name of its own"
+            raise ValueError(f"calibrate_joints.tools {tool}: named {tools.count(tool)} times; {text}")
     if mode and len(mode) != len(tools):
         numbers = f"{len(mode)} calibrate_joints.mode for {len(tools)} calibrate_joints.tools"
         raise ValueError(f"{numbers}; give one for each, or none")

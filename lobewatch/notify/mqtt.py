@@ -144,7 +144,9 @@ def deliver_messages(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]])
     failures = send_messages({broker: dict(messages.values()) for broker, messages in pending.items()})
     for broker in failures:
         for folder, (topic, content) in batches[broker].items():
-            _write_outbox(folder, OutboxMessage(topic, msgspec.Raw(content), broker[:3]))
+            message = msgspec.json.encode(OutboxMessage(topic, msgspec.Raw(content), broker[:3]))
+            with contextlib.suppress(DataError, OSError), MachineFolder(folder).locked(patience=0):
+                atomic_write(folder / OUTBOX_FILE, message)
     for folder in (folder for broker in pending.keys() - failures.keys() for folder in pending[broker]):
         with contextlib.suppress(OSError):
             (folder / OUTBOX_FILE).unlink(missing_ok=True)
@@ -160,11 +162,6 @@ def _read_outboxes(broker: Broker, folders: Iterable[Path], fresh: Container[Pat
         if outbox is not None and tuple(outbox.broker) == tuple(broker[:3]):
             messages[path.parent] = outbox.topic, bytes(outbox.message)
     return messages
-
-
-def _write_outbox(folder: Path, outbox: OutboxMessage) -> None:
-    with contextlib.suppress(DataError, OSError), MachineFolder(folder).locked(patience=0):
-        atomic_write(folder / OUTBOX_FILE, msgspec.json.encode(outbox))
 
 
 def read_json(path: Path, kind: type[Content]) -> Content | None:

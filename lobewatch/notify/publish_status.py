@@ -4,11 +4,9 @@ The last published message is stored with each machine and in the folder of the 
 machine can still be reported, and an unchanged status is published once a day only.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -16,14 +14,13 @@ from typing import Any, Self
 
 import msgspec
 
-from acquisition import DataError
+from acquisition import DataError, atomic_write
 from acquisition.errors import format_error
-from acquisition.file_io import atomic_write
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.fleet.machine_summary import MachineSummary, software_version, summarize_unreadable
 from lobewatch.fleet.summarize import learn_scatter, summarize_machine
 from lobewatch.logbook import Logbook
-from lobewatch.machine import Machine, MachineFolder
+from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.machine_file import read_machine_file
 from lobewatch.machine.settings.notify_table import Broker, parse_broker
 from lobewatch.monitoring.threshold_dates import build_forecast_rows, build_limit_row, find_next_limit
@@ -45,23 +42,21 @@ MISSING_FOLDER_REASON = (
 
 def publish_status(logbook: Logbook) -> None:
     """Learn scatter from other machines, summarize the machine and publish its status. Raises nothing."""
-    now, path, machines = datetime.now(UTC), logbook.folder.path, dict[Path, Machine]()
+    now, path = datetime.now(UTC), logbook.folder.path
     try:
         learn_scatter(logbook if logbook.is_current else Logbook.open(path))
-        current = logbook if logbook.is_current else Logbook.open(path)
-        summary = summarize_machine(current, now, with_option_names)
-        machines[path] = current.machine
+        summary = summarize_machine(logbook if logbook.is_current else Logbook.open(path), now, with_option_names)
     except Exception as error:  # noqa: BLE001 - an unreadable machine is published as one
         summary = summarize_unreadable(path.resolve().name, format_error(error))
-    publish_machines([_assess_summary(path.resolve().name, path, summary, now)], machines, now=now)
+    publish_machines([_assess_summary(path.resolve().name, path, summary, now)], now=now)
 
 
 @contextmanager
-def publish_on_change(logbook: Logbook) -> Iterator[None]:
+def publish_on_change(logbook: Logbook) -> Iterator[Logbook]:
     """Publish the status after work that has changed the machine folder, even if the work fails later."""
     before = logbook.folder.change_mark
     try:
-        yield
+        yield logbook
     except (ValueError, OSError):
         if logbook.folder.change_mark != before:
             publish_status(logbook)
@@ -70,34 +65,28 @@ def publish_on_change(logbook: Logbook) -> Iterator[None]:
         publish_status(logbook)
 
 
-def publish_folder(
-    folder: Path, machines: Mapping[str, Path], assessed: Iterable[FleetMachine], forget: str = ""
-) -> dict[Broker, str]:
+def publish_folder(folder: Path, assessed: Sequence[FleetMachine], forget: str = "") -> dict[Broker, str]:
     """Publish the machine or all machines in a folder, after forgetting a missing one. See `publish_machines`."""
     if forget:
-        _forget_machine(folder, forget, machines)
+        _forget_machine(folder, forget, {machine.key for machine in assessed})
     return publish_machines(assessed, fleet_folder=None if (folder / "machine.toml").exists() else folder)
 
 
 def publish_machines(
-    assessed: Iterable[FleetMachine],
-    machines: Mapping[Path, Machine] | None = None,
-    fleet_folder: Path | None = None,
-    now: datetime | None = None,
+    assessed: Sequence[FleetMachine], fleet_folder: Path | None = None, now: datetime | None = None
 ) -> dict[Broker, str]:
     """Publish each status that has changed or was published a day ago, if machine.toml names a broker.
 
     A machine with an unreadable machine.toml, or missing in the folder of the fleet, goes to the broker of its last
-    message. `machines` holds machine.toml files that were read already. Returns the reason for each broker that did
-    not take all; a note shows it too.
+    message. Returns the reason for each broker that did not take all; a note shows it too.
     """
     now, before = now or datetime.now(UTC), _read_fleet_published(fleet_folder) if fleet_folder else {}
     due: dict[Broker, dict[Path, tuple[str, bytes]]] = {}
     new: dict[Path, tuple[str, PublishedMessage]] = {}
-    assessed = [*assessed]
-    for machine in [*assessed, *_find_missing_machines(fleet_folder, before, assessed, now)]:
+    missing = _find_missing_machines(fleet_folder, before, assessed, now) if fleet_folder else ()
+    for machine in [*assessed, *missing]:
         last = read_json(machine.path / LAST_PUBLISHED_FILE, PublishedMessage) or before.get(machine.key)
-        broker = _choose_broker(machine.path, machines or {}, last)
+        broker = _choose_broker(machine.path, last)
         if broker is None:
             continue
         published = PublishedMessage.of(machine, broker, now)
@@ -115,7 +104,7 @@ def publish_machines(
     return failures
 
 
-def _forget_machine(fleet_folder: Path, key: str, present: Iterable[str]) -> None:
+def _forget_machine(fleet_folder: Path, key: str, present: Collection[str]) -> None:
     """Remove the message on a missing machine from its broker.
 
     ValueError if its folder is present, if it was never published, or if the broker does not accept the removal.
@@ -124,7 +113,7 @@ def _forget_machine(fleet_folder: Path, key: str, present: Iterable[str]) -> Non
     if key in present:
         raise ValueError(f"--forget {key}: is there; move its folder out of {fleet_folder} first")
     if key not in published:
-        gone = ", ".join(sorted(published.keys() - set(present))) or "none"
+        gone = ", ".join(sorted(published.keys() - present)) or "none"
         raise ValueError(f"--forget {key}: nobody was told of it; gone and not forgotten: {gone}")
     broker = published[key].target
     failure = send_messages({broker: {published[key].topic: b""}}).get(broker)
@@ -134,14 +123,9 @@ def _forget_machine(fleet_folder: Path, key: str, present: Iterable[str]) -> Non
 
 
 def _find_missing_machines(
-    fleet_folder: Path | None,
-    published: Mapping[str, PublishedMessage],
-    assessed: Iterable[FleetMachine],
-    now: datetime,
+    fleet_folder: Path, published: Mapping[str, "PublishedMessage"], assessed: Iterable[FleetMachine], now: datetime
 ) -> Iterator[FleetMachine]:
     """Yield machines that were published and are missing in the folder of the fleet."""
-    if fleet_folder is None:
-        return
     for key in sorted(published.keys() - {machine.key for machine in assessed}):
         summary = summarize_unreadable(key, MISSING_FOLDER_REASON.format(folder=fleet_folder, key=key))
         yield _assess_summary(key, fleet_folder / key, summary, now)
@@ -151,13 +135,12 @@ def _assess_summary(key: str, path: Path, summary: MachineSummary, now: datetime
     return FleetMachine(key, path, summary, summary.status_at(now, path))
 
 
-def _choose_broker(path: Path, machines: Mapping[Path, Machine], last: PublishedMessage | None) -> Broker | None:
+def _choose_broker(path: Path, last: "PublishedMessage | None") -> Broker | None:
     """Return the broker of machine.toml, or that of the last message if machine.toml cannot be read."""
     try:
-        machine: Machine = machines.get(path) or read_machine_file(path / "machine.toml")
+        return read_machine_file(path / "machine.toml").notify.broker
     except (ValueError, OSError):
         return last.target if last else None
-    return machine.notify.broker
 
 
 def _print_failures(brokers: Iterable[Broker], failures: Mapping[Broker, str]) -> None:
@@ -221,7 +204,7 @@ class PublishedMessage(msgspec.Struct, frozen=True):
         topic = f"{broker.prefix}/{machine.key.translate(TOPIC_REPLACEMENTS)}/standing"
         return cls(broker.without_password, topic, content, now)
 
-    def covers(self, other: PublishedMessage) -> bool:
+    def covers(self, other: Self) -> bool:
         """Return whether another message need not be sent."""
         is_same = (self.broker, self.topic, self.content) == (other.broker, other.topic, other.content)
         return is_same and timedelta(0) <= other.time - self.time < REPUBLISH_INTERVAL

@@ -191,25 +191,18 @@ def _max_descriptors() -> int:
     return limit if limit != resource.RLIM_INFINITY else UNLIMITED_DESCRIPTORS
 
 
-def check_token(token: str | None) -> str:
-    """Check a token, or make one for None. ValueError for a token that does not fit into an address."""
-    if token is None:
-        return secrets.token_urlsafe(24)
-    if not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
-        raise ValueError("the token must be 12 to 200 characters of A-Z, a-z, 0-9, _ and -; leave it out for a new one")
-    return token
-
-
 AccessTokens = tuple[str, str]
 """Token for full access and token for read-only access. A browser must send one of them."""
 
 
 def check_tokens(full: str | None, watch: str | None) -> AccessTokens:
-    """Check both tokens, or make them for None. ValueError for an invalid token and for equal tokens."""
-    tokens = check_token(full), check_token(watch)
+    """Check both tokens, or make them for None. ValueError for equal or invalid tokens."""
+    tokens = [secrets.token_urlsafe(24) if token is None else token for token in (full, watch)]
+    if not all(re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token) for token in tokens):
+        raise ValueError("the token must be 12 to 200 characters of A-Z, a-z, 0-9, _ and -; leave it out for a new one")
     if tokens[0] == tokens[1]:
         raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
-    return tokens
+    return tokens[0], tokens[1]
 
 
 def make_guarded_application(tokens: AccessTokens, listen: str, limiter: ConnectionLimiter) -> web.Application:

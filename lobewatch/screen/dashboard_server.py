@@ -9,8 +9,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import Self, Unpack
 from urllib.parse import quote
 
 import msgspec
@@ -23,7 +22,7 @@ from lobewatch.notify.prometheus import PROMETHEUS_CONTENT_TYPE, format_promethe
 from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.access_control import HAS_FULL_ACCESS, PUBLIC_ROUTE_PREFIX, WATCH_ROUTE_PREFIX
 from lobewatch.screen.dashboard_table import DashboardTable
-from lobewatch.screen.web_server import WebServerThread, add_pages, add_session, read_body
+from lobewatch.screen.web_server import ServerOptions, WebServerThread, add_pages, add_session, read_body
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.hit_loop import TapStopped
@@ -64,10 +63,8 @@ class LiveTest(TapVisit):
         def plan(tool: str, direction: TapDirection) -> TapSession:
             return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume)
 
-        def publish(_: TapSession) -> None:
-            publish_status(Logbook.open(folder.path))
-
-        super().__init__(plan, folder.machine.tap.tool, direction, after=publish)
+        tool = folder.machine.tap.tool
+        super().__init__(plan, tool, direction, after=lambda _: publish_status(Logbook.open(folder.path)))
         self._final_state: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()
@@ -111,29 +108,16 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class DashboardServer(WebServerThread):
     """Server of the dashboard of a machine or a folder of machines, in a thread while its context lasts."""
 
-    def __init__(
-        self,
-        path: Path | str,
-        *,
-        listen: str = "127.0.0.1",
-        port: int = 0,
-        token: str | None = None,
-        watch_token: str | None = None,
-    ) -> None:
+    def __init__(self, path: Path | str, **options: Unpack[ServerOptions]) -> None:
         """Prepare the server, and assess the machines.
 
         Parameters
         ----------
         path
             Machine folder, or a folder of machine folders.
-        listen
-            Address of this computer to listen at.
-        port
-            Port of the pages. 0 for any free one.
-        token
-            Token for full access. None for a random one.
-        watch_token
-            Token for read-only access. None for a random one.
+        options
+            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
+            free one. `token` for full access and `watch_token` for read-only access, by default random.
 
         Raises
         ------
@@ -142,7 +126,7 @@ class DashboardServer(WebServerThread):
         DataError
             If there is no machine.
         """
-        super().__init__(listen, port, token, watch_token)
+        super().__init__(**options)
         self._table = DashboardTable(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
@@ -162,9 +146,7 @@ class DashboardServer(WebServerThread):
         self._verifier.start()
         return super().__enter__()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Stop running tap tests, then close. Their hits stay in the spool."""
         self._end.set()
         if self._verifier.is_alive():
@@ -173,7 +155,7 @@ class DashboardServer(WebServerThread):
             test.stop()
         for test in self._tests.values():
             test.end()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*error)
 
     def _find_machine(self, request: web.Request) -> tuple[str, MachineFolder]:
         key = request.match_info["machine"]

@@ -73,14 +73,10 @@ class DashboardTable:
             version = {"version": f"{self._start}-{self._change}"}
             if start != self._start or not (number.isascii() and number.isdecimal()):
                 return version | {"machines": [row.content for row in self._rows.values()]}
-            return version | self._changes_since(int(number))
-
-    def _changes_since(self, since: int) -> dict[str, Any]:
-        rows = enumerate(self._rows.values())
-        return {
-            "changed": [(place, row.content) for place, row in rows if row.change > since],
-            "gone": [key for key, change in self._gone.items() if change > since],
-        }
+            since, rows = int(number), enumerate(self._rows.values())
+            changed = [(place, row.content) for place, row in rows if row.change > since]
+            gone = [key for key, change in self._gone.items() if change > since]
+            return version | {"changed": changed, "gone": gone}
 
     def _poll(self) -> None:
         """Assess the machines and number the changes."""

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import json
 import math
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -33,52 +33,50 @@ NewestState = TypeVar("NewestState", TapState, CutState, covariant=True)
 def encode_tap_state(state: TapState) -> str:
     """Encode the state of a tap test without its curves as JSON, null for numbers that are not finite."""
     outcome = state.outcome
-    return _encode_json(
-        {
-            "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.shown_word,
-            "title": state.title,
-            "direction": state.direction,
-            "has_plots": state.plots is not None,
-            "device": ", ".join(filter(None, (state.device, state.resumed))),
-            "reason": state.reason,
-            "good": state.good,
-            "wanted": state.wanted,
-            "hits": [_hit_json(hit) for hit in state.hits],
-            "mean_change": _round_finite(state.mean_change),
-            "settled": state.settled,
-            "levels": [_round_finite(level) for level in state.levels] if state.levels else None,
-            "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
-            "outcome": outcome
-            and {
-                "light": outcome.status,
-                "is_early": outcome.is_early,
-                "texts": list(outcome.texts),
-                "next_step": outcome.next_step,
-                "programs": [program._asdict() for program in outcome.programs],
-            },
-            "choices": [choice._asdict() for choice in state.choices],
-        }
-    )
+    content = {
+        "kind": state.word.name.lower().replace("_", "-"),
+        "word": state.shown_word,
+        "title": state.title,
+        "direction": state.direction,
+        "has_plots": state.plots is not None,
+        "device": ", ".join(filter(None, (state.device, state.resumed))),
+        "reason": state.reason,
+        "good": state.good,
+        "wanted": state.wanted,
+        "hits": [_hit_json(hit) for hit in state.hits],
+        "mean_change": _round_finite(state.mean_change),
+        "settled": state.settled,
+        "levels": [_round_finite(level) for level in state.levels] if state.levels else None,
+        "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
+        "outcome": outcome
+        and {
+            "light": outcome.status,
+            "is_early": outcome.is_early,
+            "texts": list(outcome.texts),
+            "next_step": outcome.next_step,
+            "programs": [program._asdict() for program in outcome.programs],
+        },
+        "choices": [choice._asdict() for choice in state.choices],
+    }
+    return _encode_json(content)
 
 
 def encode_cut_state(state: CutState) -> str:
     """Encode the state of a cut recording without its curves as JSON, null for numbers that are not finite."""
     comparison = state.comparison
-    return _encode_json(
-        {
-            "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.word.value,
-            "title": state.title,
-            "device": state.device,
-            "saved": state.saved,
-            "reason": state.reason if comparison is None else reason_text(comparison),
-            "level": _round_finite(state.level),
-            "left": _round_finite(state.left),
-            "cut_seconds": _round_finite(state.cut_seconds),
-            "heard": None if comparison is None else _comparison_json(comparison),
-        }
-    )
+    content = {
+        "kind": state.word.name.lower().replace("_", "-"),
+        "word": state.word.value,
+        "title": state.title,
+        "device": state.device,
+        "saved": state.saved,
+        "reason": state.reason if comparison is None else reason_text(comparison),
+        "level": _round_finite(state.level),
+        "left": _round_finite(state.left),
+        "cut_seconds": _round_finite(state.cut_seconds),
+        "heard": None if comparison is None else _comparison_json(comparison),
+    }
+    return _encode_json(content)
 
 
 def encode_plots(plots: LiveCurves) -> bytes:
@@ -100,8 +98,8 @@ def encode_curves(curves: Mapping[str, NDArray[np.float64]], band: tuple[float, 
 
 
 def _hit_json(hit: ListedHit) -> dict[str, Any]:
-    verdict = {"good": not hit.flags, "verdict": hit.flags.words}
-    return {"number": hit.number, **verdict, "peak": hit.peak, "undone": hit.undone}
+    good, verdict = not hit.flags, hit.flags.words
+    return {"number": hit.number, "good": good, "verdict": verdict, "peak": hit.peak, "undone": hit.undone}
 
 
 def _comparison_json(comparison: CutComparison) -> dict[str, Any]:
@@ -184,10 +182,9 @@ async def stream_states(
     await socket.prepare(request)
     subscription = _FeedSubscription(find)
     # A page sends nothing, so any message from it ends the feed.
-    ends = [
-        asyncio.create_task(_set_when_done(end, subscription.changed))
-        for end in (socket.receive(), request.app[SHUTDOWN_EVENT].wait())
-    ]
+    ends = [asyncio.ensure_future(end) for end in (socket.receive(), request.app[SHUTDOWN_EVENT].wait())]
+    for end in ends:
+        end.add_done_callback(lambda _: subscription.changed.set())
     try:
         await _send_changes(socket, subscription, encoder, lambda: any(end.done() for end in ends))
         await socket.close(code=WSCloseCode.GOING_AWAY)
@@ -227,10 +224,3 @@ async def _send_changes(
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(last + (HEARTBEAT_INTERVAL if state is sent else MIN_STATE_INTERVAL)):
                 await subscription.changed.wait()
-
-
-async def _set_when_done(end: Awaitable[object], event: asyncio.Event) -> None:
-    try:
-        await end
-    finally:
-        event.set()

@@ -6,33 +6,15 @@ import logging
 import socket
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from importlib import resources
-from types import TracebackType
-from typing import Protocol, Self, TypeVar, cast
+from typing import Protocol, Self, TypedDict, TypeVar, Unpack, cast
 
 import msgspec
 from aiohttp import web
 
 from acquisition import DeviceError, check_name
-from lobewatch.screen.access_control import (
-    HAS_FULL_ACCESS,
-    PUBLIC_ROUTE_PREFIX,
-    ConnectionLimiter,
-    check_tokens,
-    make_guarded_application,
-    open_listener,
-)
-from lobewatch.screen.live_feed import (
-    SHUTDOWN_EVENT,
-    State,
-    StateEncoder,
-    StateSource,
-    encode_curves,
-    encode_cut_state,
-    encode_plots,
-    encode_tap_state,
-    stream_states,
-)
+from lobewatch.screen import access_control, live_feed
 from lobewatch.show.terminal.terminal_screen import RunningTest
 from lobewatch.tap.cut_recording import CutState
 from lobewatch.tap.state import StatePublisher, TapState
@@ -51,7 +33,7 @@ WILDCARD_ADDRESSES = {
 Body = TypeVar("Body")
 
 
-class WatchedTest(RunningTest, StateSource[TapState], Protocol):
+class WatchedTest(RunningTest, live_feed.StateSource[TapState], Protocol):
     """Live tap test that pages follow."""
 
 
@@ -80,30 +62,30 @@ def add_pages(application: web.Application, pages: dict[str, str]) -> None:
             raise web.HTTPNotFound(text="there is no such file")
         return respond(name)
 
-    application.router.add_get("/static/{name}", static, name=f"{PUBLIC_ROUTE_PREFIX}static")
+    application.router.add_get("/static/{name}", static, name=f"{access_control.PUBLIC_ROUTE_PREFIX}static")
     for i, (path, name) in enumerate(pages.items()):
 
         async def page(_: web.Request, name: str = name) -> web.Response:
             return respond(name)
 
-        application.router.add_get(path, page, name=f"{PUBLIC_ROUTE_PREFIX}page{i}")
+        application.router.add_get(path, page, name=f"{access_control.PUBLIC_ROUTE_PREFIX}page{i}")
 
 
 def add_feed(
     application: web.Application,
     prefix: str,
-    find: Callable[[web.Request], StateSource[State]],
-    encoder: StateEncoder[State],
+    find: Callable[[web.Request], live_feed.StateSource[live_feed.State]],
+    encoder: live_feed.StateEncoder[live_feed.State],
 ) -> None:
     """Serve the feed of a source. `find` raises HTTPNotFound if there is none."""
 
     async def follow(request: web.Request) -> web.StreamResponse:
         find(request)
-        return await stream_states(request, lambda: find(request), encoder)
+        return await live_feed.stream_states(request, lambda: find(request), encoder)
 
     async def access(request: web.Request) -> web.Response:
         find(request)
-        return web.json_response({"may_alter": request[HAS_FULL_ACCESS]})
+        return web.json_response({"may_alter": request[access_control.HAS_FULL_ACCESS]})
 
     application.router.add_get(f"{prefix}feed", follow)
     application.router.add_get(f"{prefix}access", access)
@@ -122,7 +104,7 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         find(request).choose(choice.key, choice.tool)
         return web.json_response({})
 
-    add_feed(application, prefix, find, StateEncoder(encode_tap_state, encode_plots))
+    add_feed(application, prefix, find, live_feed.StateEncoder(live_feed.encode_tap_state, live_feed.encode_plots))
     for name, action in {"undo": undo_or_stop, "stop": undo_or_stop, "choose": choose}.items():
         application.router.add_post(f"{prefix}{name}", action)
 
@@ -135,42 +117,52 @@ async def read_body(request: web.Request, kind: type[Body], hint: str) -> Body:
         raise web.HTTPBadRequest(text=hint) from None
 
 
+class ServerOptions(TypedDict, total=False):
+    """Options of a server."""
+
+    listen: str
+    """Address of this computer to listen at. Default: 127.0.0.1."""
+    port: int
+    """Port of the pages. Default: 0, any free one."""
+    token: str | None
+    """Token for full access. Default: random."""
+    watch_token: str | None
+    """Token for read-only access. Default: random."""
+
+
 class WebServerThread:
     """Thread that serves `application` while its context lasts. Add the routes before."""
 
-    def __init__(self, listen: str, port: int, token: str | None, watch_token: str | None = None) -> None:
+    def __init__(
+        self, listen: str = "127.0.0.1", port: int = 0, token: str | None = None, watch_token: str | None = None
+    ) -> None:
         """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
-        tokens = check_tokens(token, watch_token)
+        tokens = access_control.check_tokens(token, watch_token)
         self.token, self.watch_token = tokens
         self._listen = listen.lower()
-        self.limiter = ConnectionLimiter()
+        self.limiter = access_control.ConnectionLimiter()
         """Limiter that accepts and counts connections."""
-        self.application = make_guarded_application(tokens, self._listen, self.limiter)
+        self.application = access_control.make_guarded_application(tokens, self._listen, self.limiter)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
-        self._ready = threading.Event()
-        self._error: Exception | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self._loop = Future[asyncio.AbstractEventLoop]()
         self._stop = asyncio.Event()
 
     def __enter__(self) -> Self:
         """Start to serve. DeviceError if the address is not available."""
         self._thread.start()
-        self._ready.wait()
-        if self._error is not None:
-            why = getattr(self._error, "strerror", None) or self._error
-            text = f"cannot listen on {self._listen} port {self._port} ({why})"
-            raise DeviceError(text, "choose another port or address") from self._error
+        try:
+            self._loop.result()
+        except (OSError, ValueError) as error:
+            text = f"cannot listen on {self._listen} port {self._port} ({getattr(error, 'strerror', None) or error})"
+            raise DeviceError(text, "choose another port or address") from error
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Send the last state to every page, then close."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(self._stop.set)
+        self._loop.result().call_soon_threadsafe(self._stop.set)
         self._thread.join()
 
     @property
@@ -190,19 +182,18 @@ class WebServerThread:
         return f"{self.origin}/#token={self.watch_token}"
 
     async def _serve(self) -> None:
-        self.application[SHUTDOWN_EVENT] = asyncio.Event()
+        self.application[live_feed.SHUTDOWN_EVENT] = asyncio.Event()
 
         async def signal_shutdown(application: web.Application) -> None:
-            application[SHUTDOWN_EVENT].set()
+            application[live_feed.SHUTDOWN_EVENT].set()
 
         self.application.on_shutdown.append(signal_shutdown)
         runner = web.AppRunner(self.application, access_log=None, logger=HTTP_LOG, shutdown_timeout=2.0)
         try:
             await runner.setup()
-            listener = open_listener(self._listen, self._port)
+            listener = access_control.open_listener(self._listen, self._port)
         except (OSError, ValueError) as error:  # ValueError: a name that no network can have
-            self._error = error
-            self._ready.set()
+            self._loop.set_exception(error)
         else:
             with listener:
                 await self._accept(listener, cast(web.Server, runner.server))
@@ -210,12 +201,11 @@ class WebServerThread:
 
     async def _accept(self, listener: socket.socket, server: web.Server) -> None:
         self._port = listener.getsockname()[1]
-        self._loop = asyncio.get_running_loop()
-        serving = self._loop.create_task(self.limiter.serve(listener, server))
-        self._ready.set()
+        serving = asyncio.create_task(self.limiter.serve(listener, server))
+        self._loop.set_result(asyncio.get_running_loop())
         await self._stop.wait()
         with contextlib.suppress(NotImplementedError):  # Windows closes what it accepts when cancelled
-            self._loop.remove_reader(listener)
+            asyncio.get_running_loop().remove_reader(listener)
         await asyncio.sleep(0)  # serve takes a connection that was accepted in this turn, or nobody would close it
         serving.cancel()
         await asyncio.wait([serving])
@@ -239,36 +229,23 @@ class ScreenServer(WebServerThread):
     `url` gives full access: watch, undo and stop. `watch_url` is read-only. Without a token nothing is visible.
     """
 
-    def __init__(
-        self,
-        session: WatchedTest,
-        *,
-        listen: str = "127.0.0.1",
-        port: int = 0,
-        token: str | None = None,
-        watch_token: str | None = None,
-    ) -> None:
+    def __init__(self, session: WatchedTest, **options: Unpack[ServerOptions]) -> None:
         """Prepare the server.
 
         Parameters
         ----------
         session
             Live tap test.
-        listen
-            Address of this computer to listen at.
-        port
-            Port of the pages. 0 for any free one.
-        token
-            Token for full access. None for a random one.
-        watch_token
-            Token for read-only access. None for a random one.
+        options
+            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
+            free one. `token` for full access and `watch_token` for read-only access, by default random.
 
         Raises
         ------
         ValueError
             If a token does not fit into an address.
         """
-        super().__init__(listen, port, token, watch_token)
+        super().__init__(**options)
         add_pages(self.application, {"/": "screen.html"})
         add_session(self.application, "/", lambda _: session)
 
@@ -276,32 +253,23 @@ class ScreenServer(WebServerThread):
 class CutScreenServer(WebServerThread):
     """Read-only server of the screen of a cut recording, in a thread of its own while its context lasts."""
 
-    def __init__(
-        self,
-        pictures: StatePublisher[CutState],
-        *,
-        listen: str = "127.0.0.1",
-        token: str | None = None,
-        watch_token: str | None = None,
-    ) -> None:
-        """Prepare the server at any free port.
+    def __init__(self, pictures: StatePublisher[CutState], **options: Unpack[ServerOptions]) -> None:
+        """Prepare the server.
 
         Parameters
         ----------
         pictures
             Publisher of the states of the recording.
-        listen
-            Address of this computer to listen at.
-        token
-            Token for full access. None for a random one.
-        watch_token
-            Token for read-only access. None for a random one.
+        options
+            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
+            free one. `token` for full access and `watch_token` for read-only access, by default random.
 
         Raises
         ------
         ValueError
             If a token does not fit into an address.
         """
-        super().__init__(listen, 0, token, watch_token)
+        super().__init__(**options)
         add_pages(self.application, {"/": "listen.html"})
-        add_feed(self.application, "/", lambda _: pictures, StateEncoder(encode_cut_state, encode_curves))
+        encoder = live_feed.StateEncoder(live_feed.encode_cut_state, live_feed.encode_curves)
+        add_feed(self.application, "/", lambda _: pictures, encoder)

@@ -7,22 +7,23 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
-from functools import lru_cache
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
-from acquisition import DataError, Description, Recording, TapTest, read_tap
+from acquisition import DataError, Description, Recording, TapTest
 from acquisition.file_io import make_folder
 from acquisition.files.tap_file import encode_tap, round_as_stored
-from lobewatch.logbook.recordings.recorded_files import MachineContext, read_tap_test
+from lobewatch.logbook.recordings.recorded_files import MachineContext, parse_context, read_tap_bytes, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
-from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 
 Result = TypeVar("Result")
+FileWork = Callable[[MachineContext, Path, Description, bytes, Path], Result]
+"""Work on a file: machine, path, facts that the file does not state, content, and path where this can be read."""
 
 
 class InterpretedFile(NamedTuple):
@@ -36,8 +37,7 @@ class InterpretedFile(NamedTuple):
     """Fitted modes."""
 
 
-@dataclass(frozen=True)
-class TapDraft:
+class TapDraft(NamedTuple):
     """Tap file made from a recorded file."""
 
     digest: str
@@ -54,8 +54,7 @@ class TapDraft:
     """Defaults assumed for facts that the file does not state."""
 
 
-@dataclass(frozen=True)
-class FileRequest:
+class FileRequest(NamedTuple):
     """Recorded file with everything that a worker needs."""
 
     file: Path
@@ -79,29 +78,9 @@ class FileRequest:
             return cls(file.absolute(), b"", description, machine_toml, explain_file_error(file, error))
 
 
-def draft_tap_from_request(request: FileRequest) -> TapDraft | str:
-    """Make a tap file from the content of a recorded file, or return the reason why it cannot be used."""
-    return _run_on_bytes(request, _make_draft)
-
-
-def interpret_file(folder: MachineFolder, file: Path, description: Description) -> InterpretedFile:
-    """Interpret a recorded file. DataError, OSError or ValueError if it cannot be used."""
-    return _interpret(MachineContext.of(folder), file, description, file.read_bytes(), file)
-
-
-def interpret_request(request: FileRequest) -> InterpretedFile | str:
-    """Interpret the content of a recorded file, or return the reason why it cannot be used."""
-    return _run_on_bytes(request, _interpret)
-
-
 def is_valid_draft(request: FileRequest, answer: Any) -> bool:
-    """Check an answer of `draft_tap_from_request` against its own tap file."""
-    if isinstance(answer, str):
-        return True
-    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
-        path = Path(folder) / "tap.h5"
-        path.write_bytes(answer.content)
-        tap = read_tap(path)
+    """Check a draft from a worker against its own tap file."""
+    tap = read_tap_bytes(answer.content)
     return (
         isinstance(answer, TapDraft)
         and answer.digest == hashlib.sha256(request.content).hexdigest() == answer.entry.source_sha256
@@ -113,16 +92,42 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
 
 
 def is_valid_interpretation(_request: FileRequest, answer: Any) -> bool:
-    """Check an answer of `interpret_request`."""
-    if isinstance(answer, str):
-        return True
+    """Check an interpreted file from a worker."""
     is_typed = isinstance(answer.tap, TapTest) and isinstance(answer.recording, Recording)
     return isinstance(answer, InterpretedFile) and is_typed and is_fit_of(answer.fit, TapEntry.of(answer.tap, b""))
 
 
-def _run_on_bytes(
-    request: FileRequest, work: Callable[[MachineContext, Path, Description, bytes, Path], Result]
-) -> Result | str:
+def work_on_files(
+    folder: MachineFolder,
+    files: Sequence[Path],
+    description: Description,
+    workers: Workers,
+    work: FileWork[Result],
+    is_valid: Callable[[FileRequest, Any], bool],
+    finish: Callable[[Result], Result] = lambda result: result,
+) -> Iterator[Result | str]:
+    """Yield the finished result for each file, or the reason why it cannot be used. Errors as `share_work`.
+
+    `is_valid` checks an answer of a worker. `finish` completes a result in this process.
+    """
+    if workers.use_other_processes:
+        toml = folder.toml_text
+        requests = (FileRequest.of(file, description, toml) for file in files)
+
+        def is_answer(request: FileRequest, answer: Any) -> bool:
+            return isinstance(answer, str) or is_valid(request, answer)
+
+        for answer in share_work(partial(_work_on_copy, work), requests, workers, is_answer):
+            yield answer if isinstance(answer, str) else finish(answer)
+        return
+    for file in files:
+        try:
+            yield finish(work(MachineContext.of(folder), file, description, file.read_bytes(), file))
+        except (DataError, OSError, ValueError) as error:
+            yield explain_file_error(file, error)
+
+
+def _work_on_copy(work: FileWork[Result], request: FileRequest) -> Result | str:
     """Work on a temporary copy of the file, or return the reason why it cannot be used."""
     if request.fault:
         return request.fault
@@ -130,11 +135,10 @@ def _run_on_bytes(
         copy = Path(folder) / request.file.name
         copy.write_bytes(request.content)
         try:
-            return work(_parse_context(request.machine_toml), request.file, request.description, request.content, copy)
+            return work(parse_context(request.machine_toml), request.file, request.description, request.content, copy)
         except (DataError, OSError, ValueError) as error:
-            return (
-                explain_file_error(copy, error).replace(str(copy), str(request.file)).removeprefix(f"{request.file}: ")
-            )
+            reason = explain_file_error(copy, error).replace(str(copy), str(request.file))
+            return reason.removeprefix(f"{request.file}: ")
 
 
 def explain_file_error(file: Path, error: Exception) -> str:
@@ -145,23 +149,18 @@ def explain_file_error(file: Path, error: Exception) -> str:
 
 
 def _make_draft(context: MachineContext, file: Path, description: Description, content: bytes, at: Path) -> TapDraft:
-    tap, recording, fit = _interpret(context, file, description, content, at)
+    tap, recording, fit = interpret_content(context, file, description, content, at)
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
     return TapDraft(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, defaults)
 
 
-def _interpret(
+def interpret_content(
     context: MachineContext, file: Path, description: Description, content: bytes, at: Path
 ) -> InterpretedFile:
     """Interpret the content of a file; `at` is the path where this content can be read."""
     tap, recording = read_tap_test(context, file, description, content, at)
     return InterpretedFile(tap, replace(recording, path=file), fit_tap(round_as_stored(tap), context.machine))
-
-
-@lru_cache(maxsize=4)
-def _parse_context(machine_toml: str) -> MachineContext:
-    return MachineContext(parse_machine_file(machine_toml), machine_toml)
 
 
 def prepare_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:
@@ -173,17 +172,8 @@ def prepare_all_taps(
     folder: MachineFolder, files: Sequence[Path], description: Description, workers: Workers
 ) -> Iterator[TapDraft | str]:
     """Prepare each file, or yield the reason why it cannot be used. Errors as `share_work`."""
-    if not workers.use_other_processes:
-        for file in files:
-            try:
-                yield prepare_tap(folder, file, description)
-            except (DataError, OSError, ValueError) as error:
-                yield explain_file_error(file, error)
-        return
-    toml = folder.toml_text
-    requests = (FileRequest.of(file, description, toml) for file in files)
-    for draft in share_work(draft_tap_from_request, requests, workers, is_valid_draft):
-        yield draft if isinstance(draft, str) else _write_draft(folder, draft)
+    write = partial(_write_draft, folder)
+    return work_on_files(folder, files, description, workers, _make_draft, is_valid_draft, write)
 
 
 def remove_prepared_files(folder: MachineFolder) -> None:
@@ -204,4 +194,4 @@ def _write_draft(folder: MachineFolder, draft: TapDraft) -> TapDraft:
         file.write(draft.content)
         file.flush()
         os.fsync(file.fileno())
-    return replace(draft, content=b"")
+    return draft._replace(content=b"")

@@ -2,30 +2,21 @@
 
 import glob
 import re
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from acquisition import (
-    Circumstances,
-    DataError,
-    Description,
-    Fact,
-    Recording,
-    SourceFile,
-    TapTest,
-    average_good_hits,
-    inspect_file,
-    list_formats,
-    new_tap_id,
-    parse_direction,
-)
+import acquisition
+from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest, inspect_file
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
 from lobewatch.machine import Machine, MachineFolder
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
 
 DATE_REQUEST = (
@@ -44,6 +35,14 @@ _DATE_PART_PATTERNS = {
 """Regular expression of each directive of a date pattern."""
 _FIXED_WIDTH_PATTERNS = {part: pattern.replace("{1,2}", "{2}") for part, pattern in _DATE_PART_PATTERNS.items()}
 """Regular expressions with all digits."""
+
+
+def read_tap_bytes(content: bytes) -> TapTest:
+    """Read the content of a tap file. DataError if it is damaged."""
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
+        path = Path(folder) / "tap.h5"
+        path.write_bytes(content)
+        return acquisition.read_tap(path)
 
 
 def find_recordings(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
@@ -71,7 +70,7 @@ def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     """Find the recordings in a folder, and the other files that are not hidden."""
     paths = [path for path in folder.rglob("*") if path.is_file()]
     files = sorted(p for p in paths if not any(part.startswith(".") for part in p.relative_to(folder).parts))
-    extensions = {extension for file_format in list_formats() for extension in file_format.extensions}
+    extensions = {extension for file_format in acquisition.list_formats() for extension in file_format.extensions}
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:
         kinds = ", ".join(sorted(extensions))
@@ -100,6 +99,12 @@ class MachineContext(NamedTuple):
     def of(cls, folder: MachineFolder) -> Self:
         """Read the present settings of a machine."""
         return cls(folder.machine, folder.toml_text)
+
+
+@lru_cache(maxsize=4)
+def parse_context(machine_toml: str) -> MachineContext:
+    """Parse the content of machine.toml."""
+    return MachineContext(parse_machine_file(machine_toml), machine_toml)
 
 
 def read_tap_test(
@@ -147,7 +152,7 @@ def _build_circumstances(
     context: MachineContext, recording: Recording, description: Description, created: datetime
 ) -> Circumstances:
     try:
-        direction = parse_direction(description.direction or recording.direction or "x")
+        direction = acquisition.parse_direction(description.direction or recording.direction or "x")
     except ValueError as error:
         if description.direction:
             raise
@@ -180,12 +185,12 @@ def _find_origin(name: str, description: Description, recording: Recording) -> O
 
 def _build_tap_test(recording: Recording, about: Circumstances, source: SourceFile) -> TapTest:
     if recording.frf is not None:
-        return TapTest(new_tap_id(about), about, recording.frf, source=source)
+        return TapTest(acquisition.new_tap_id(about), about, recording.frf, source=source)
     try:
-        frf, flags = average_good_hits(recording.hits)
+        frf, flags = acquisition.average_good_hits(recording.hits)
     except DataError as error:
         raise DataError(f"{recording.path}: {error}") from error
-    return TapTest(new_tap_id(about), about, frf, recording.hits, flags, source)
+    return TapTest(acquisition.new_tap_id(about), about, frf, recording.hits, flags, source)
 
 
 def parse_date_in_name(file: Path, pattern: str) -> datetime:

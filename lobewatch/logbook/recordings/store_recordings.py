@@ -1,22 +1,15 @@
 """Store recorded files as tap tests of a machine, each once."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple, Self
 
 from acquisition import DataError, Description
-from lobewatch.logbook.recordings.prepare_taps import (
-    TapDraft,
-    explain_file_error,
-    prepare_all_taps,
-    prepare_tap,
-    prepared_path,
-    remove_prepared_files,
-)
-from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.logbook.recordings import prepare_taps
+from lobewatch.logbook.recordings.prepare_taps import TapDraft
+from lobewatch.machine import MachineFolder
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
 
@@ -37,7 +30,7 @@ def _join_file_names(files: list[str]) -> str:
     return ", ".join(files[:MAX_NAMED_FILES]) + (f" and {more} more" if more > 0 else "")
 
 
-ReplayProgressCallback = Callable[[str, int, int], None]
+ProgressCallback = Callable[[str, int, int], None]
 """Callback for progress: step ("read", "store", "measure"), number of finished files, and of all."""
 
 LOCAL_WORKERS = Workers()
@@ -62,28 +55,34 @@ class ReplayOutcome:
     """Fitted modes of the new tap tests, by identity."""
 
 
-@dataclass
-class StoredContents:
-    """Contents that are stored already, with their tap tests."""
+class ReplayPlan(NamedTuple):
+    """Contents of the files of a replay."""
 
-    by_digest: dict[str, list[tuple[str, str]]]
-    """Identities and directions of tap tests, by SHA-256 of the content."""
+    digests: dict[Path, str]
+    """SHA-256 of each file."""
+    unread: dict[Path, OSError]
+    """Error of each unreadable file."""
+    stored: dict[str, str]
+    """Tap test of each content in the machine folder, by SHA-256."""
+    new: dict[str, Path]
+    """First file of each other content, by SHA-256."""
 
     @classmethod
-    def of(cls, taps: Sequence[TapEntry]) -> StoredContents:
-        """List the tap files and the recorded files of committed tap tests."""
-        contents = cls({})
-        for tap in taps:
-            for digest in filter(None, (tap.source_sha256, tap.sha256)):
-                contents.by_digest.setdefault(digest, []).append((tap.id, tap.direction))
-        return contents
-
-    def find_tap(self, digest: str, description: Description) -> str | None:
-        """Find the tap test of a content. One of several responses must have the same direction."""
-        for tap_id, direction in self.by_digest.get(digest, ()):
-            if description.response is None or direction == (description.direction or direction):
-                return tap_id
-        return None
+    def of(cls, folder: MachineFolder, files: Sequence[Path], description: Description) -> Self:
+        """Read the files. The tap test of one of several responses must have the same direction."""
+        plan = cls({}, {}, {}, {})
+        for file in files:
+            try:
+                plan.digests[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+            except OSError as error:
+                plan.unread[file] = error
+        for tap in reversed(folder.taps()):  # the first one counts
+            if description.response is None or tap.direction == (description.direction or tap.direction):
+                plan.stored.update(dict.fromkeys(filter(None, (tap.source_sha256, tap.sha256)), tap.id))
+        for file, digest in plan.digests.items():
+            if digest not in plan.stored:
+                plan.new.setdefault(digest, file)
+        return plan
 
 
 def store_recordings(
@@ -93,7 +92,7 @@ def store_recordings(
     *,
     workers: Workers = LOCAL_WORKERS,
     keep_going: bool = False,
-    progress: ReplayProgressCallback = lambda _what, _done, _of: None,
+    progress: ProgressCallback = lambda _what, _done, _of: None,
 ) -> ReplayOutcome:
     """Store recorded files as tap tests, each once and oldest first. Call it under the lock.
 
@@ -124,62 +123,40 @@ def store_recordings(
     DataError
         If a file cannot be used. Nothing is stored then.
     """
-    remove_prepared_files(folder)
-    digests, unread = compute_digests(files)
+    prepare_taps.remove_prepared_files(folder)
+    digests, unread, stored, new = ReplayPlan.of(folder, files, description)
     if unread and len(files) == 1:
         raise unread[files[0]]
-    rejected = {file: explain_file_error(file, error) for file, error in unread.items()}
-    contents, todo = StoredContents.of(folder.taps()), dict[str, Path]()
-    ids = {digest: contents.find_tap(digest, description) or "" for digest in digests.values()}
-    for file, digest in digests.items():
-        if not ids[digest]:
-            todo.setdefault(digest, file)
+    rejected = {file: prepare_taps.explain_file_error(file, error) for file, error in unread.items()}
     try:
-        ready, faults = _prepare_files(folder, todo, description, workers, alone=len(files) == 1, progress=progress)
+        if len(files) > 1 or workers.scheduler:
+            ready, faults = _prepare_files(folder, new, description, workers, progress)
+        else:
+            ready, faults = [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
         if rejected and not (keep_going and len(rejected) < len(files)):
             raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
         ready.sort(key=lambda tap: tap.created)
         if ready:
-            folder.commit_files({prepared_path(folder, tap): tap.entry for tap in ready})
+            folder.commit_files({prepare_taps.prepared_path(folder, tap): tap.entry for tap in ready})
             progress("store", len(ready), len(ready))
     finally:
-        remove_prepared_files(folder)
-    ids |= {tap.digest: tap.entry.id for tap in ready}
+        prepare_taps.remove_prepared_files(folder)
+    ids = stored | {tap.digest: tap.entry.id for tap in ready}
     used = {file: ids[digests[file]] for file in files if file not in rejected}
-    already_stored = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
+    already_stored = {file: tap_id for file, tap_id in used.items() if new.get(digests[file]) != file}
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
-    return ReplayOutcome(
-        [used[file] for file in files if file in used], already_stored, [*fits], rejected, assumed_facts, fits
-    )
-
-
-def compute_digests(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:
-    """Compute the SHA-256 of each file. Return the errors of unreadable files too."""
-    digests, unread = dict[Path, str](), dict[Path, OSError]()
-    for file in files:
-        try:
-            digests[file] = hashlib.sha256(file.read_bytes()).hexdigest()
-        except OSError as error:
-            unread[file] = error
-    return digests, unread
+    tap_ids = [used[file] for file in files if file in used]
+    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits)
 
 
 def _prepare_files(
-    folder: MachineFolder,
-    todo: Mapping[str, Path],
-    description: Description,
-    workers: Workers,
-    *,
-    alone: bool,
-    progress: ReplayProgressCallback,
+    folder: MachineFolder, new: dict[str, Path], description: Description, workers: Workers, progress: ProgressCallback
 ) -> tuple[list[TapDraft], dict[str, str]]:
-    """Prepare files by digest. Return the reason for each unusable file, or raise its error if it is the only file."""
-    if alone and not workers.scheduler:
-        return [prepare_tap(folder, file, description) for file in todo.values()], {}
+    """Prepare files by digest. Return the reason for each unusable file too."""
     ready, faults = list[TapDraft](), dict[str, str]()
-    results = zip(todo, prepare_all_taps(folder, [*todo.values()], description, workers), strict=True)
+    results = zip(new, prepare_taps.prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
     for number, (digest, result) in enumerate(results, 1):
         if isinstance(result, str):
             faults[digest] = result
@@ -187,7 +164,7 @@ def _prepare_files(
             faults[digest] = "it changes while it is read; wait until it is written"
         else:
             ready.append(result)
-        progress("read", number, len(todo))
+        progress("read", number, len(new))
     return ready, faults
 
 
@@ -196,9 +173,7 @@ def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = Fa
     lines = group_by_message((str(file), why) for file, why in rejected.items())
     if len(rejected) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
-    rest_text = (
-        "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
-    )
+    rest = "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
     if len(rejected) == 1:
-        return f"{lines[0]} (1 of {n} files; {rest_text})"
-    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest_text}", *lines])
+        return f"{lines[0]} (1 of {n} files; {rest})"
+    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest}", *lines])

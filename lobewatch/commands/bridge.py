@@ -39,7 +39,7 @@ def bridge(
       lobewatch tap mill-3 --port socket://10.0.0.5:5025  # on the other computer, with driver = "taps"
     """
     from acquisition import DataError, find_driver
-    from acquisition.taps import TapsBridge
+    from acquisition.taps.bridge import TapsBridge
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.machine.settings.setup_tables import DaqTable
     from lobewatch.tap.device_connection import DeviceOpener

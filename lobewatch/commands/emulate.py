@@ -76,7 +76,7 @@ options without the port."""
 
 
 def _add_commands() -> None:
-    from acquisition.devices import find_driver, list_driver_names
+    from acquisition import find_driver, list_driver_names
     from acquisition.errors import DataError
 
     for name in list_driver_names():
@@ -131,7 +131,7 @@ def _emulate_tap(name: str, options: EmulateOptions, shared: Mapping[str, Any]) 
     """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
-    from acquisition.devices import find_driver
+    from acquisition import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
     driver = find_driver(name)
@@ -146,7 +146,7 @@ def _emulate_cut(name: str, options: EmulateOptions, program: str, shared: Mappi
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
-    from acquisition.devices import find_driver
+    from acquisition import find_driver
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 

@@ -14,8 +14,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Literal
 
-from acquisition import DeviceError, explain_no_ports, find_driver, scan_ports
-from acquisition.devices import ScannedPort
+from acquisition import DeviceError, ScannedPort, explain_no_ports, find_driver, scan_ports
 from acquisition.ports import SerialLink
 from lobewatch.machine.folder import MachineFolder
 

@@ -9,7 +9,7 @@ import acquisition
 from acquisition import Block, Device, DeviceError, Hit, find_driver, find_usb_identity
 from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
-from acquisition.devices import convert_driver_errors
+from acquisition.devices.registry import convert_driver_errors
 from acquisition.hit import TapInputs
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder

@@ -16,6 +16,9 @@ import pytest
 from acquisition import (
     Block,
     Channel,
+    DataqEmulator,
+    DataqFaults,
+    DataqSource,
     Device,
     DeviceError,
     Event,
@@ -29,8 +32,7 @@ from acquisition import (
     TapsFaults,
     TapsSource,
 )
-from acquisition.dataq import DataqEmulator, DataqFaults, DataqSource
-from acquisition.taps import TapsBridge
+from acquisition.taps.bridge import TapsBridge
 
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]

@@ -14,8 +14,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquisition import Block, Channel, DeviceError, DeviceSettings, SensorInput, find_driver, probe_port
-from acquisition.devices import check_settings
+from acquisition import (
+    Block,
+    Channel,
+    DeviceError,
+    DeviceSettings,
+    SensorInput,
+    check_settings,
+    find_driver,
+    probe_port,
+)
 from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.emulation import SignalFunction
 from acquisition.text_boards import FrameFormat, OutputFormat, TextBoardEmulator, TextBoardSource, TextBoardTraits

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import DataError, TapsSource
-from acquisition.devices import find_driver
+from acquisition import DataError, TapsSource, find_driver
 from acquisition.emulation import Passage
 from lobes import Cut
 from lobewatch.cli import main

@@ -8,7 +8,7 @@ import acquisition
 from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
 from lobewatch.machine.daq_rates import apply_measured_rate, check_device_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LiveSignal, collect_codes, find_sensor_data
+from lobewatch.tap.device_connection import DeviceConnection, collect_codes, find_sensor_data
 from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor_remarks
 from lobewatch.tap.trial_hits import TrialHits
 
@@ -128,7 +128,7 @@ def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[st
     tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
     good: list[Hit] = []
     device.start()
-    baseline = find_quiet_part(LiveSignal(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
+    baseline = find_quiet_part(DeviceConnection(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
     for hit in acquisition.capture_hits(device, TrialHits(folder.machine.tap, baseline).trigger):
         verdict = acquisition.evaluate_hit(hit)
         if not verdict.flags:

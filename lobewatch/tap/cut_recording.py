@@ -24,7 +24,7 @@ from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, open_device
 from lobewatch.tap.live_curves import find_extremes
-from lobewatch.tap.state import StatePublisher
+from lobewatch.tap.state import LiveState, StatePublisher
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""
@@ -53,11 +53,9 @@ class CutStep(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class CutState:
+class CutState(LiveState):
     """State of a cut recording."""
 
-    revision: int
-    """Number that increases with every change."""
     word: CutStep
     """Step."""
     title: str

@@ -21,11 +21,9 @@ from lobewatch.machine.folder_updates import add_event
 from lobewatch.measurement import Measurement
 from lobewatch.monitoring.threshold_dates import ThresholdDates
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.tap.device_connection import DeviceConnector
 from lobewatch.tap.emulated_spindle import build_structure, open_synchronized_device
-from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
 from lobewatch.tap.hit_loop import OperatorRequests, TapPhases
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.state import StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
 
@@ -169,17 +167,16 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
     machine, toml = folder.machine, folder.toml_text
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
-    publisher = TapPublisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    publisher = StatePublisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
     with (
         open_synchronized_device(plan.structure, random, tcp=tcp) as open_device,
         threadpool_limits(limits=1),
         folder.locked(),
     ):
-        hits = EvaluatedHits(begin_tap(folder, about, resume=False), machine)
-        connector = DeviceConnector(folder, open_device, publisher, time.sleep)
-        TapPhases(folder, hits, publisher, OperatorRequests(), guided=False).run(connector)
-        folder.commit(hits.tap.finish())
-    return hits.tap.id
+        tap = begin_tap(folder, about, resume=False)
+        TapPhases(tap, open_device, publisher, OperatorRequests(), guided=False).run()
+        folder.commit(tap.finish())
+    return tap.id
 
 
 def _get_measured_state(measurement: Measurement) -> SpindleState:

@@ -3,7 +3,7 @@
 import enum
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from acquisition import HitFlags
 from lobewatch.arrays import Floats
@@ -127,11 +127,17 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class TapState:
-    """State of a tap test."""
+class LiveState:
+    """State of a live test or cut."""
 
     revision: int
     """Number that increases with every change."""
+
+
+@dataclass(frozen=True, eq=False)
+class TapState(LiveState):
+    """State of a tap test."""
+
     word: TapStep
     """Step."""
     title: str
@@ -179,16 +185,6 @@ class TapState:
         if self.word is not TapStep.REFUSED or not self.verdict:
             return self.word.value
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()
-
-
-class LiveState(Protocol):
-    """State of a live test: a frozen dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def revision(self) -> int:
-        """Number that increases with every change."""
 
 
 State = TypeVar("State", bound=LiveState)

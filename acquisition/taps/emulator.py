@@ -160,7 +160,10 @@ class TapsEmulator(TapsServer, EmulatorThread):
     def serve_once(self) -> bool:
         self._serve_host(0.0 if self._streaming and self._has_room() else 0.05)
         while self._pending_events:
-            self._send_now(self._pending_events.popleft())
+            event = self._pending_events.popleft()
+            if event.kind != EventKind.BUTTON:
+                self._active_faults[event.kind, event.channel] = event
+            self._send(MessageType.EVENT, protocol.encode_event(replace(event, scan=self._scan)))
         if self._streaming:
             self._stream()
         if self._faults.unplug_after is None or self._scan < self._faults.unplug_after:
@@ -186,11 +189,6 @@ class TapsEmulator(TapsServer, EmulatorThread):
             self._infos += 1
             if self._infos <= self._faults.cut_infos:
                 del self.wire.pending[place + len(encoded) // 2 :]
-
-    def _send_now(self, event: Event) -> None:
-        if event.kind != EventKind.BUTTON:
-            self._active_faults[event.kind, event.channel] = event
-        self._send(MessageType.EVENT, protocol.encode_event(replace(event, scan=self._scan)))
 
     def _info(self) -> dict[str, Any]:
         return protocol.build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)

@@ -11,7 +11,7 @@ import numpy as np
 from acquisition.arrays import Codes, Floats
 from acquisition.channel import Block, Channel, SensorInput
 from acquisition.errors import DeviceError
-from acquisition.ports.serial_ports import SerialLink, find_usb_identity
+from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink, find_usb_identity
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.text_boards.decoders import LineDecoder, OutputFormat, ScanCounter, SimpleFrameDecoder
 
@@ -48,10 +48,6 @@ def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
     if lines[likeliest] < MIN_NUMBER_LINES:
         return None
     return DeviceIdentity(f"a board that prints {likeliest} number{'s' * (likeliest > 1)} a line")
-
-
-BOARD_SILENCE_TIMEOUT = 3.0
-"""Time without samples after which a board has failed (s). A board that resets when opened needs two."""
 
 
 class TextBoardSource(ClosedOnExit):
@@ -123,15 +119,15 @@ class TextBoardSource(ClosedOnExit):
         scan, last_arrival, overruns = 0, time.monotonic(), self._link.overruns
         while self._running:
             pieces = list(self._decoder.feed(self._link.read(0.2)))
-            for run in chain.from_iterable(map(self._counter.split_runs, pieces)):
+            for values, lost_lines in chain.from_iterable(map(self._counter.split_runs, pieces)):
                 late, overruns = self._link.overruns - overruns, self._link.overruns
-                lost = max(run.lost_before, late)
+                lost = max(lost_lines, late)
                 scan += lost
-                yield Block(scan, self._codes(run.values), lost_before=lost)
-                scan, last_arrival = scan + run.values.shape[1], time.monotonic()
-            if time.monotonic() - last_arrival > BOARD_SILENCE_TIMEOUT:
+                yield Block(scan, self._codes(values), lost_before=lost)
+                scan, last_arrival = scan + values.shape[1], time.monotonic()
+            if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
                 wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
-                text = f"the board on {self._link.port} has printed no samples for {BOARD_SILENCE_TIMEOUT:g} s"
+                text = f"the board on {self._link.port} has printed no samples for {SILENCE_TIMEOUT:g} s"
                 remedy = f"check its program and baud_rate: it must print counter,{wanted} or {wanted}"
                 raise DeviceError(text, remedy)
 

@@ -66,8 +66,6 @@ def parse_name_calibration(name: str) -> NameCalibration | None:
 
 AUDIO_DEFAULT_RATE = 48000.0
 """Default sample rate (Hz)."""
-AUDIO_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 FULL_SCALE_CODE = 2.0**31
 """32-bit code of full scale. Devices of 24 bits fill the upper bits."""
 PORTAUDIO_INVALID_RATE = -9997
@@ -140,7 +138,7 @@ class AudioReader(LibraryReader):
         self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
         self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
         self._blocks = queue.SimpleQueue[VoltageBlock]()
-        size, count = round(rate * AUDIO_BLOCK_TIME), max(numbers) + 1
+        size, count = round(rate * library_device.BLOCK_TIME), max(numbers) + 1
         self._stream = library.InputStream(rate, size, index, count, "int32", callback=self._keep)
         actual = self._stream.samplerate
         if abs(actual / rate - 1) > 1e-3:

@@ -19,8 +19,6 @@ from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryRead
 
 T7_DEFAULT_RATE = 40000.0
 """Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
-T7_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 SKIPPED_SAMPLE_VALUE = -9999.0
 """Value that LJM inserts for a sample that the device had no room for."""
 T7_INPUT_COUNT = 14
@@ -106,7 +104,7 @@ class LjmReader(LibraryReader):
 
     def start(self) -> None:
         self._lost, self._blocks = 0, deque[VoltageBlock]()
-        size = round(self.rate * T7_BLOCK_TIME)
+        size = round(self.rate * library_device.BLOCK_TIME)
         self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
 
     def read(self, _timeout: float) -> VoltageBlock | None:

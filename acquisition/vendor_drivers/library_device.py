@@ -19,6 +19,8 @@ EXTRAS = {"daqhats": "mcc172", "labjack": "ljm", "nidaqmx": "nidaqmx", "sounddev
 """Extra of lobewatch that installs each vendor library."""
 OPEN_REMEDY = "`acquisition.scan_ports` lists what there is"
 """Remedy for a device that cannot be opened."""
+BLOCK_TIME = 0.02
+"""Duration of the blocks that a library delivers (s)."""
 LIBRARY_SILENCE_TIMEOUT = 3.0
 """Time without scans after which a started device has failed (s)."""
 LIBRARY_READ_TIMEOUT = 0.2

@@ -23,8 +23,6 @@ MCC172_MAX_RATE = 51200.0
 """Highest sample rate (Hz). The others are this rate divided by 2 to 256."""
 MCC172_FULL_SCALE = 5.0
 """Only range (V)."""
-MCC172_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 MCC172_SYNC_TIMEOUT = 2.0
 """Time limit for synchronizing the converters (s). The documentation says 128 clock cycles."""
 
@@ -93,7 +91,7 @@ class Mcc172Reader(LibraryReader):
         """Take the opened board. numbers: its inputs in order. rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.HatError,)
         self._library, self._board, self._numbers = library, board, list(numbers)
-        self._size = round(rate * MCC172_BLOCK_TIME)
+        self._size = round(rate * library_device.BLOCK_TIME)
 
     def start(self) -> None:
         self._board.a_in_scan_start(0b11, 0, self._library.OptionFlags.CONTINUOUS)

@@ -12,8 +12,6 @@ from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers import library_device
 from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
-NIDAQMX_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 NIDAQMX_BUFFER_TIME = 10.0
 """Length of the NI-DAQmx buffer (s). A late reader gets an error there, never a gap."""
 SAMPLES_NOT_AVAILABLE_ERROR = -200284
@@ -73,7 +71,11 @@ def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | 
         task = library.Task()
         cleanup.callback(task.close)
         channels = tuple(_add_input(task, device, sensor) for sensor in inputs)
-        rate = _set_rate(task, sample_rate or device.ai_max_multi_chan_rate)
+        wanted = sample_rate or device.ai_max_multi_chan_rate
+        continuous = library_device.load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
+        buffer = round(wanted * NIDAQMX_BUFFER_TIME)
+        task.timing.cfg_samp_clk_timing(wanted, sample_mode=continuous, samps_per_chan=buffer)
+        rate = float(task.timing.samp_clk_rate)
         reader = NidaqmxReader(task, len(inputs), rate)
         cleanup.pop_all()
         return LibraryDevice(port, reader, _read_identity(device), channels, rate, "buffer overrun")
@@ -87,7 +89,7 @@ class NidaqmxReader(LibraryReader):
         self.errors: tuple[type[Exception], ...] = (library_device.load_library("nidaqmx.errors").Error,)
         self._task = task
         self._reader = library_device.load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
-        self._shape = n_channels, round(rate * NIDAQMX_BLOCK_TIME)
+        self._shape = n_channels, round(rate * library_device.BLOCK_TIME)
 
     def start(self) -> None:
         self._task.start()
@@ -131,10 +133,3 @@ def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
         entry.ai_excit_src = constants.ExcitationSource.INTERNAL
         entry.ai_excit_val = max(currents)
     return replace(sensor.channel, adc_bits=24, full_scale=float(entry.ai_rng_high))
-
-
-def _set_rate(task: Any, rate: float) -> float:
-    """Set the clock of a task and return the real sample rate (Hz)."""
-    continuous = library_device.load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
-    task.timing.cfg_samp_clk_timing(rate, sample_mode=continuous, samps_per_chan=round(rate * NIDAQMX_BUFFER_TIME))
-    return float(task.timing.samp_clk_rate)

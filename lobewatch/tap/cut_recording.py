@@ -2,7 +2,6 @@
 
 import contextlib
 import enum
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -289,7 +288,7 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
     """Publish states from the move of the sensor on. An error raised within becomes the last state."""
     cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
     title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
-    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
+    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason))
     try:
         yield publisher
     except (KeyboardInterrupt, OSError, RuntimeError, ValueError) as error:

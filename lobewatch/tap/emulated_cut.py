@@ -102,16 +102,15 @@ def emulate_cut(
     setting: CutSetting,
     seed: int = 1,
     *,
-    realtime: bool = True,
-    tcp: bool = False,
     spindle: Spindle | None = None,
     passage: Passage = DEFAULT_PASSAGE,
+    **serving: bool,
 ) -> EmulatedCut:
     """Emulate a cut that repeats, with the accelerometer on the housing and an idle hammer.
 
     Truth, run-out and housing depend on the seed only, not on the cut. A program fed along both axes is fed along x.
-    spindle: replaces the model of the tool. DataError if machine.toml has no model of it, or lacks the sensors of a
-    device that does not describe them itself.
+    spindle: replaces the model of the tool. serving: as of `emulate_device`. DataError if machine.toml has no model of
+    it, or lacks the sensors of a device that does not describe them itself.
     """
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
@@ -122,7 +121,7 @@ def emulate_cut(
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
 
-    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    device = emulate_device(folder, driver, signal_of, **serving)
     return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
 
 

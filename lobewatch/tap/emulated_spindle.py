@@ -132,17 +132,16 @@ def emulate_machine(
     driver: Driver,
     seed: int = 1,
     *,
-    realtime: bool = True,
-    tcp: bool = False,
     spindle: Spindle | None = None,
     direction: TapDirection = "x",
     axes_angle: float | None = None,
+    **serving: bool,
 ) -> EmulatedMachine:
     """Emulate a device of this kind on the spindle of a machine that is tapped again and again.
 
     spindle: replaces that of machine.toml, with the same damping. axes_angle: angle from x (deg) of its principal
-    directions as in `rotate_structure`, None for a round spindle, the same in x and y. DataError if machine.toml has no
-    spindle, or lacks the sensors of a device that does not describe them itself.
+    directions as in `rotate_structure`, None for a round spindle, the same in x and y. serving: as of `emulate_device`.
+    DataError if machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
     """
     table, random = get_spindle_table(folder), np.random.default_rng(seed)
     position = folder.machine.tap.position_mm / 1e3
@@ -155,27 +154,27 @@ def emulate_machine(
         hammered = HammeredStructure(structure, rate, random, cross_structures=cross)
         return map_signal_to_inputs(inputs, hammered, direction)
 
-    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    device = emulate_device(folder, driver, signal_of, **serving)
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
-InputsSignal = Callable[[Sequence[SensorInput], float], SignalFunction]
-"""Function that returns the signal function of sensors at a sample rate (Hz)."""
-
-
 def emulate_device(
-    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, *, realtime: bool, tcp: bool
+    folder: MachineFolder,
+    driver: Driver,
+    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
+    **serving: bool,
 ) -> acquisition.EmulatorThread:
-    """Make an emulated device of this kind. signal_of: function of its sensors and sample rate (Hz).
+    """Make an emulated device of this kind.
 
+    signal_of: function of its sensors and sample rate (Hz). serving: `realtime` and `tcp` of `EmulationSetup`.
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
         raise acquisition.DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     inputs = get_emulated_inputs(folder, driver)
-    has_clock = folder.machine.daq.digital_clock
-    signal_at = partial(signal_of, inputs)
-    return driver.emulate(acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, realtime, tcp, has_clock))
+    signal_at, clock = partial(signal_of, inputs), folder.machine.daq.digital_clock
+    setup = acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, digital_clock=clock, **serving)
+    return driver.emulate(setup)
 
 
 def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:

@@ -5,10 +5,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Remark, Trigger
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
+from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, describe_device, estimate_resting_rms
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
@@ -27,16 +28,6 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
     """Raised when the operator ends the test early. The hits stay stored, and the next test resumes with them."""
 
 
-@dataclass(frozen=True)
-class OperatorRequests:
-    """Requests to undo or stop, made by any thread and handled by that of the test."""
-
-    undos: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
-    """Number of times that the last good hit is to be taken back."""
-    stopping: threading.Event = field(default_factory=threading.Event)
-    """Event that is set when the test is to end."""
-
-
 SELF_CHECK_DURATION = 1.0
 """Length of the record of the self-check (s)."""
 RECONNECT_INTERVAL = 0.5
@@ -51,10 +42,9 @@ class TapPhases:
 
     def __init__(
         self,
-        tap: TapInProgress,
+        folder: MachineFolder,
         open_device: Callable[[], Device],
         publisher: StatePublisher[TapState],
-        requests: OperatorRequests,
         *,
         guided: bool,
         sleep: Callable[[float], None] = time.sleep,
@@ -64,14 +54,17 @@ class TapPhases:
         guided False omits the curves, the time to take back the last hit, re-arming by decay, and the self-check if no
         trial hits need it.
         """
-        self._tap, self._open_device, self._publisher, self._requests = tap, open_device, publisher, requests
-        self._guided, self._sleep, self._folder = guided, sleep, tap.folder
+        self._folder, self._open_device, self._publisher = folder, open_device, publisher
+        self._guided, self._sleep = guided, sleep
+        self.undos, self.stopping = threading.Semaphore(0), threading.Event()
+        """Requests of any thread to take back the last good hit, each once, and to end the test."""
         self._trial: TrialHits | None = None
         self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
 
-    def run(self) -> None:
+    def run(self, tap: TapInProgress) -> None:
         """Run all phases, reconnecting as often as needed. DeviceError if the first connection fails."""
+        self._tap = tap
         connection = self._connect()
         while True:
             try:
@@ -202,9 +195,9 @@ class TapPhases:
 
     def _handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
-        if self._requests.stopping.is_set():
+        if self.stopping.is_set():
             raise TapStopped(f"stopped with {self._tap.good} good hits; the same command goes on with them")
-        while self._requests.undos.acquire(blocking=False):
+        while self.undos.acquire(blocking=False):
             self._undo()
 
     def _hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:

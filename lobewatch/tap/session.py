@@ -17,7 +17,7 @@ from lobewatch.measurement.recording_questions import check_question_codes, find
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceOpener
-from lobewatch.tap.hit_loop import OperatorRequests, TapPhases, TapStopped
+from lobewatch.tap.hit_loop import TapPhases, TapStopped
 from lobewatch.tap.state import Outcome, ProgramVerdict, StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import CrossTapResult, TapInProgress, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
@@ -68,8 +68,8 @@ class TapSession:
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
-        self._publisher, self._requests = StatePublisher(first, clock), OperatorRequests()
-        self._open_device, self._sleep = open_device, sleep
+        self._publisher = StatePublisher(first, clock)
+        self._phases = TapPhases(folder, open_device, self._publisher, guided=guided, sleep=sleep)
         self._measurement: Measurement | None = None
         self.wakes = self._publisher.wakes
         """Functions called after every change by the thread of the test. None may take time."""
@@ -94,11 +94,11 @@ class TapSession:
 
     def undo(self) -> None:
         """Take back the last good hit. Again: the one before."""
-        self._requests.undos.release()
+        self._phases.undos.release()
 
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
-        self._requests.stopping.set()
+        self._phases.stopping.set()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Reject a choice: nothing comes after a single test.
@@ -136,8 +136,7 @@ class TapSession:
                 tap = self._begin()
                 tap.reserve = reserve
                 if tap.missing:
-                    shared = self._open_device, self._publisher, self._requests
-                    TapPhases(tap, *shared, guided=self._guided, sleep=self._sleep).run()
+                    self._phases.run(tap)
                 reserve.release()
                 return self._finish(tap)
         except TapStopped:

@@ -1,6 +1,7 @@
 """State of a tap test as the operator sees it, the same for browser and terminal."""
 
 import enum
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -196,7 +197,7 @@ class StatePublisher(Generic[State]):
     The thread of the test replaces the state, never changes it. Any thread may read it.
     """
 
-    def __init__(self, first: State, clock: Callable[[], float]) -> None:
+    def __init__(self, first: State, clock: Callable[[], float] = time.monotonic) -> None:
         """Publish the first state. clock: monotonic time (s)."""
         self.state: State = first
         """Newest state."""

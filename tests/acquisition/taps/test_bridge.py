@@ -166,7 +166,7 @@ class Fast(SimulatedSource):
 
 def test_a_host_that_is_late_is_told_what_it_missed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.taps.bridge.BRIDGE_BUFFER_BYTES", 20_000)
-    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 60.0)  # a busy computer may delay the device
+    monkeypatch.setattr("acquisition.taps.source.SILENCE_TIMEOUT", 60.0)  # a busy computer may delay the device
     device = Fast(12, 16)
     with bridged(lambda: device) as bridge, TapsSource(bridge.port) as host:
         assert (host.identity.serial, host.channels[0].adc_bits) == ("no-number", 16)

@@ -174,7 +174,7 @@ def test_a_counter_that_begins_anew_is_no_loss(bits: int) -> None:
     counts = (start + np.arange(600)) % 2**bits
     counts = np.delete(counts, [50, 450, 451])
     rows = np.column_stack([counts, counts, counts]).astype(np.float64)
-    lost = [run.lost_before for part in (rows[:100], rows[100:]) for run in counter.split_runs(PrintedRows(part))]
+    lost = [lost for part in (rows[:100], rows[100:]) for _, lost in counter.split_runs(PrintedRows(part))]
     assert [gap for gap in lost if gap] == [1, 2]
 
 
@@ -202,7 +202,7 @@ def silent_port() -> Iterator[tuple[int, str]]:
 
 
 def test_a_board_that_prints_something_else_is_a_device_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.text_boards.source.BOARD_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.text_boards.source.SILENCE_TIMEOUT", 0.3)
     with silent_port() as (master, port), TextBoardSource(port, INPUTS, RATE) as source:
         source.start()
         os.write(master, b"hello\nthe answer is 42\n" * 10)

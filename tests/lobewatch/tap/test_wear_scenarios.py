@@ -27,7 +27,8 @@ def planned(
     folder: MachineFolder, story: WearScenario, seed: int = 1, scatter: float = 0.001, **more: Any
 ) -> list[PlannedTap]:
     """Return the tests in x."""
-    taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, MountingVariation(**more), NOW)
+    wear, mounting = SpindleWear.of(folder, MONTHS, story), MountingVariation(scatter, **more)
+    taps = plan_taps(folder, wear, np.random.default_rng(seed), mounting, NOW)
     return [tap for tap in taps if tap.direction == "x"]
 
 

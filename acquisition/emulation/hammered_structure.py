@@ -152,19 +152,16 @@ class HammeredStructure:
         fault = self.random.uniform()
         if fault > 1 - self.hammering.overloads:
             peak *= 20
+        structures = self.structure, *self.cross_structures
+        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in structures)
+        length = int((13 * width + 14 / slowest) * self.sample_rate)  # until it has decayed to a millionth
         start = int(np.ceil(scan))
-        time = (start - scan + np.arange(self._response_length(width))) / self.sample_rate
+        time = (start - scan + np.arange(length)) / self.sample_rate
         wave = peak * self._pulse(time, width)
         if fault < self.hammering.double_hits:
             delay = self.random.uniform(4, 12) * width
             wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
         return start, wave
-
-    def _response_length(self, width: float) -> int:
-        """Return the samples until the slowest mode has decayed to a millionth."""
-        structures = (self.structure, *self.cross_structures)
-        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in structures)
-        return int((13 * width + 14 / slowest) * self.sample_rate)
 
     def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)

@@ -112,11 +112,6 @@ class Passage:
         """Time from first to last contact (s)."""
         return 2 * self.ramp + self.steady
 
-    @property
-    def seconds(self) -> float:
-        """Total time (s)."""
-        return self.before + self.cutting + self.after
-
 
 MIN_STEPS_PER_CYCLE, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC = 16, 30, 16
 """Fewest steps per cycle of the fastest mode (as stiffened by the cut), per tooth period, and per arc of cut."""

@@ -179,7 +179,8 @@ def _fit_scan_period(scans: Floats, arrived: Floats) -> tuple[float, float]:
 
 def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
     """Return least-squares slope and standard error without the points far above the others."""
-    rough = y - _median_slope(x, y) * x
+    first, second = np.triu_indices(x.size, 1)
+    rough = y - float(np.median((y[second] - y[first]) / (x[second] - x[first]))) * x  # slope of Theil and Sen
     above = rough - np.median(rough)
     spread = 1.4826 * np.median(np.abs(above))
     keep = above <= 4 * spread + 1e-9
@@ -190,12 +191,6 @@ def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
     alike = float(np.clip(residual[1:] @ residual[:-1] / energy, 0.0, 0.9)) if energy > 0 else 0.0
     variance = energy / (x.size - 2) / float(x @ x) * (1 + alike) / (1 - alike)
     return slope, float(np.sqrt(variance))
-
-
-def _median_slope(x: Floats, y: Floats) -> float:
-    """Return the median of the slopes of all pairs of points (Theil and Sen). x increases."""
-    first, second = np.triu_indices(x.size, 1)
-    return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
 
 
 SKEW_SEGMENT_SAMPLES = 1024

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from shown_power import FEED, ShownPower
+from turn_repetition import nonperiodic_share
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
@@ -159,7 +160,7 @@ def heard(cuts: Sequence[MillingCut]) -> list[float]:
     """Chatter frequency (Hz) of cuts from their motion alone; NaN of those that repeat from turn to turn."""
     sounds = [math.nan] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
-        if motion.nonperiodic_share < CHATTERS:
+        if nonperiodic_share(motion, cuts[number], PASSAGE) < CHATTERS:
             continue
         turn = round(motion.sample_rate * cuts[number].tooth_period * TEETH)
         steady = motion.acceleration[:, int(motion.sample_rate * 0.4) : int(motion.sample_rate * 0.82)]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,8 +131,7 @@ def count_steps_needed(cut: MillingCut) -> int:
     return math.ceil(max(rate * cut.tooth_period, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC * pitch / arc))
 
 
-@dataclass(frozen=True, eq=False)
-class ModeTables:
+class ModeTables(NamedTuple):
     """Modes m of cuts c. A real mode is z = (q' + zeta w q) / w_d + i q, so that free vibration is a factor."""
 
     pole: Complexes
@@ -145,8 +144,7 @@ class ModeTables:
     """Step length (s), shape (c,)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ToothTables:
+class ToothTables(NamedTuple):
     """Teeth (and slices of helical ones) e in the cut at each step s, of cuts c.
 
     Chip and force each carry the square root of the share of a step and of the depth in which the tooth cuts.

@@ -13,8 +13,7 @@ import time
 import zlib
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from cobs import cobs
@@ -60,8 +59,7 @@ class MessageType(enum.IntEnum):
     DATA = 0x10
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """TAPS/1 frame."""
 
     type: int
@@ -76,8 +74,7 @@ class Frame:
     """Bit 0: samples were lost before this frame."""
 
 
-@dataclass(frozen=True)
-class DeviceStatus:
+class DeviceStatus(NamedTuple):
     """Body of a STATUS frame."""
 
     samples_taken: int
@@ -93,7 +90,7 @@ class DeviceStatus:
 
     def encode(self) -> bytes:
         """Encode the body."""
-        *counts, temperature = astuple(self)
+        *counts, temperature = self
         return _STATUS_BODY.pack(*counts, round(temperature * 100))
 
     @classmethod

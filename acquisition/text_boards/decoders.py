@@ -7,6 +7,7 @@ checksum is the lowest byte of the sum of the payload's bytes (SerialPlot, "cust
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,7 @@ COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
 """Values at which board counters wrap to 0."""
 
 
-@dataclass(frozen=True, eq=False)
-class PrintedRows:
+class PrintedRows(NamedTuple):
     """Consecutive rows of numbers without a broken one between them."""
 
     rows: Floats

@@ -79,8 +79,7 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
         cleanup.callback(library.close, handle)
         for sensor in inputs:
             library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
-        numbers = [sensor.number for sensor in inputs]
-        reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
+        reader = LjmReader(library, handle, [sensor.number for sensor in inputs], sample_rate or T7_DEFAULT_RATE)
         serial = library.getHandleInfo(handle)[2]
         firmware = library.eReadName(handle, "FIRMWARE_VERSION")
         cleanup.pop_all()

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,8 +65,7 @@ def check_input_numbers(inputs: Sequence[SensorInput], count: int, device: str) 
             raise ValueError(text)
 
 
-@dataclass(frozen=True, eq=False)
-class VoltageBlock:
+class VoltageBlock(NamedTuple):
     """Consecutive scans as a library returns them."""
 
     volts: Floats

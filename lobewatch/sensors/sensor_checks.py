@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 import acquisition
 from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
@@ -56,8 +55,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
     SensorList
         Channels, rates and remarks.
     """
-    today = datetime.now(UTC).date()
-    remarks = sensor_remarks(device.channels, today, folder.machine.daq.calibration_interval_months)
+    remarks = sensor_remarks(device.channels, folder.machine.daq.calibration_interval_months)
     remarks += _aliasing_remarks(folder.machine.daq.anti_alias, device.sample_rate)
     nominal, measured = device.sample_rate, None
     if has_clock(device):

@@ -77,11 +77,6 @@ class CutState(LiveState):
     """Curves of the recorded cut, see build_cut_curves."""
 
 
-def get_result_step(comparison: CutComparison) -> CutStep:
-    """Return the step that shows the result of a recorded cut."""
-    return CutStep[comparison.detected.verdict.upper().replace(" ", "_")]
-
-
 def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
     """Build the spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), reduced without losing a peak.
 
@@ -166,12 +161,8 @@ Publish = Callable[..., None]
 """Function called with changed fields of CutState."""
 
 
-def _ignore_state(**_: Any) -> None:
-    """Nobody looks."""
-
-
 def record_cut(
-    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = _ignore_state
+    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
 ) -> CutSignal:
     """Record the next whole cut of a started device, from the air before it to the air after it.
 
@@ -266,21 +257,19 @@ def acquire_cut(
         return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
 
 
-def check_sensor_kind(sensor: str, file: Path | None) -> str:
-    """Return a kind of sensor. ValueError for an unknown one, and for a microphone at a device."""
+def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
+    """Return the fields of a description that name the sensor and the tachometer.
+
+    ValueError for an unknown kind of sensor, and for a microphone or a tachometer at a device, which has none.
+    """
+    if file is None and (tacho or pulses is not None):
+        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
+        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
     if sensor not in get_args(CutSensor):
         raise ValueError(f"Description.sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
     if sensor == "microphone" and file is None:
         raise ValueError("Description.sensor microphone is for a acquire_cut.file; a device hears by its accelerometer")
-    return sensor
-
-
-def check_tacho_options(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
-    """Return the tachometer fields of a description. ValueError at a device, which has none."""
-    if file is None and (tacho or pulses is not None):
-        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
-        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
-    return {"tacho": tacho, "pulses": pulses}
+    return {"sensor": sensor, "tacho": tacho, "pulses": pulses}
 
 
 @contextlib.contextmanager
@@ -304,5 +293,6 @@ def evaluate_live_cut(
     publisher.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
     comparisons = compare_cuts(logbook, setting, signal)
     last = comparisons[-1]
-    publisher.show(word=get_result_step(last), reason="", comparison=last, plots=build_cut_curves(last))
+    word = CutStep[last.detected.verdict.upper().replace(" ", "_")]
+    publisher.show(word=word, reason="", comparison=last, plots=build_cut_curves(last))
     return comparisons

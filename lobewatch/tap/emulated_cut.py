@@ -4,7 +4,7 @@ Spindle and cut differ from the tapped machine and from machine.toml by a hidden
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +18,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.emulated_spindle import build_structure, emulate_device, get_spindle_table, map_signal_to_inputs
-from lobewatch.verdicts.program_samples import (
-    ROTATING_DAMPING_FACTOR,
-    ROTATING_FREQUENCY_FACTOR,
-    ROTATING_STIFFNESS_FACTOR,
-)
+from lobewatch.verdicts import program_samples as rotating
 from modal import Mode
 
 DEFAULT_PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
@@ -82,8 +78,7 @@ class HiddenTruth(NamedTuple):
         return modes | {"tangential": self.tangential, "speed": self.speed}
 
 
-@dataclass(frozen=True)
-class EmulatedCut:
+class EmulatedCut(NamedTuple):
     """Emulated device and its hidden truth."""
 
     device: EmulatorThread
@@ -127,8 +122,7 @@ def emulate_cut(
 
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Return the modes of the tip that a cut moves."""
-    damping_ratio = get_spindle_table(folder).damping_ratio
-    structure = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
+    structure = build_structure(spindle or folder.machine.model(setting.tool), get_spindle_table(folder).damping_ratio)
     softest = int(np.argmin(structure.stiffness))
     is_moved = structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]
     is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY
@@ -149,10 +143,9 @@ def _build_true_cut(
     edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
     tangential_edge, radial_edge = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS).tolist()
     feed = setting.table.feed_per_tooth_mm or DEFAULT_FEED_SHARE * setting.table.tool_diameter_mm
+    unchanged = ("teeth", "entry_angle", "exit_angle", "helix_lag", "pitch")
     return MillingCut(
-        teeth=cut.teeth,
-        entry_angle=cut.entry_angle,
-        exit_angle=cut.exit_angle,
+        **{name: getattr(cut, name) for name in unchanged},
         tangential=cut.tangential * truth.tangential,
         radial=cut.radial * truth.tangential,
         tangential_edge=tangential_edge,
@@ -163,8 +156,6 @@ def _build_true_cut(
         x=truth.x.apply_to(at_rest),
         y=truth.y.apply_to(at_rest),
         runout=runout,
-        helix_lag=cut.helix_lag,
-        pitch=cut.pitch,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )
 
@@ -180,7 +171,7 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
-    priors = ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR
+    priors = rotating.ROTATING_FREQUENCY_FACTOR, rotating.ROTATING_DAMPING_FACTOR, rotating.ROTATING_STIFFNESS_FACTOR
     x, y = (ModeFactors(*(_draw_factor(random, *prior) for prior in priors)) for _ in range(2))
     tangential = _draw_factor(random, *ROTATING_FORCE_PRIOR)
     return HiddenTruth(x, y, tangential, 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION))

@@ -4,9 +4,9 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,7 @@ HOST_WAIT_TIME = 0.2
 """Time that a synchronized device waits for its host (s). Then it sends a block anyway."""
 
 
-@dataclass(frozen=True)
-class EmulatedMachine:
+class EmulatedMachine(NamedTuple):
     """Emulated device and the true values of its first mode."""
 
     device: acquisition.EmulatorThread
@@ -144,8 +143,7 @@ def emulate_machine(
     DataError if machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
     """
     table, random = get_spindle_table(folder), np.random.default_rng(seed)
-    position = folder.machine.tap.position_mm / 1e3
-    built = build_structure(spindle or table.build(), table.damping_ratio, position)
+    built = build_structure(spindle or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
     structure = _select_direction(built, axes_angle, direction)
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
@@ -158,11 +156,11 @@ def emulate_machine(
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
+InputsSignal = Callable[[Sequence[SensorInput], float], SignalFunction]
+
+
 def emulate_device(
-    folder: MachineFolder,
-    driver: Driver,
-    signal_of: Callable[[Sequence[SensorInput], float], SignalFunction],
-    **serving: bool,
+    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, **serving: bool
 ) -> acquisition.EmulatorThread:
     """Make an emulated device of this kind.
 

@@ -249,8 +249,7 @@ class TapPhases:
         self._show_curves(hit)
         if not verdict.flags and (outlier := self._tap.recheck_first_hits()) is not None:
             number, now = outlier
-            reason = f"Hit {number + 1} does not fit the others and counts no more. {now.text}"
-            self._show_taken_out(now.flags, reason)
+            self._show_taken_out(now.flags, f"Hit {number + 1} does not fit the others and counts no more. {now.text}")
 
     def _undo(self, means: str = "") -> None:
         if (number := self._tap.undo()) is not None:

@@ -57,8 +57,7 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
     low, high = np.searchsorted(spectrum.frequency, limits)
     size *= DECAY_PEAK_RECEPTANCE / np.max(size[low:high])
     lines = low + find_extremes([size[low:]], int(high - low))
-    frequency = spectrum.frequency[lines]
-    return LiveCurves(hit.time[shown], None, hit.acceleration[shown], frequency, last=size[lines])
+    return LiveCurves(hit.time[shown], None, hit.acceleration[shown], spectrum.frequency[lines], last=size[lines])
 
 
 def _select_samples(hit: Hit) -> Integers:

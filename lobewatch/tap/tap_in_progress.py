@@ -11,17 +11,7 @@ from typing import Any
 import numpy as np
 
 import acquisition
-from acquisition import (
-    CROSS_TAP,
-    Circumstances,
-    Hit,
-    HitFlags,
-    HitVerdict,
-    RunningMean,
-    TapTest,
-    evaluate_hit,
-    write_hit,
-)
+from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, TapTest, evaluate_hit, write_hit
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
@@ -66,7 +56,7 @@ class TapInProgress:
     """Sentence on what is wrong with each hit, empty if it is averaged."""
     numbers: list[int] = field(default_factory=list)
     """Number of each hit in the name of its file."""
-    mean: RunningMean = field(default_factory=RunningMean)
+    mean: acquisition.RunningMean = field(default_factory=acquisition.RunningMean)
     """Mean of the good hits, always of all of them."""
     n_resumed: int = 0
     """Number of hits that an interrupted test already had."""

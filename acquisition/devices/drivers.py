@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from acquisition.errors import DeviceError
 
 if TYPE_CHECKING:
     from acquisition.channel import SensorInput
     from acquisition.emulation import EmulationSetup, EmulatorThread
     from acquisition.ports import SerialLink
     from acquisition.source import Device, DeviceAddress, DeviceIdentity
-    from acquisition.text_boards import OutputFormat
+    from acquisition.text_boards.decoders import OutputFormat
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
 
 
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
-    from acquisition.text_boards import TextBoardEmulator
+    from acquisition.text_boards.source import TextBoardEmulator
 
     volts = tuple(sensor.channel.sensitivity for sensor in setup.inputs)
     rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), setup.inputs[0].channel.full_scale
@@ -164,7 +165,12 @@ def _make_library_driver(name: str, title: str, module: str) -> Driver:
     def open_device(port: str, settings: DeviceSettings) -> Any:
         return call("open", port, settings.inputs, settings.sample_rate)
 
-    search = partial(call, "search")
+    def search() -> Any:
+        try:
+            return call("search")
+        except DeviceError:  # its library is not installed
+            return []
+
     return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=name)
 
 
@@ -191,11 +197,11 @@ BUILT_IN_DRIVERS = (
     Driver(
         "lines",
         "a board that prints lines of numbers",
-        lambda port, settings: _import("text_boards").TextBoardSource(
+        lambda port, settings: _import("text_boards.source").TextBoardSource(
             port, settings.inputs, settings.sample_rate, settings.printing
         ),
-        lambda link: _import("text_boards").probe_text_board(link),
-        lambda settings: _import("text_boards").check_text_board(settings.inputs, settings.sample_rate),
+        lambda link: _import("text_boards.source").probe_text_board(link),
+        lambda settings: _import("text_boards.source").check_text_board(settings.inputs, settings.sample_rate),
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,

@@ -80,10 +80,14 @@ def search_audio() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_audio` takes, empty if the library is not installed.
+        Addresses that `open_audio` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    library = library_device.find_library("sounddevice")
-    devices = library.query_devices() if library else ()
+    devices = library_device.load_library("sounddevice").query_devices()
     return [_make_address(entry) for entry in devices if entry["max_input_channels"] >= 2]
 
 

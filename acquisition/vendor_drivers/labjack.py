@@ -33,10 +33,14 @@ def search_ljm() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_ljm` takes, empty if the library is not installed.
+        Addresses that `open_ljm` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("labjack.ljm")) is None:
-        return []
+    library = library_device.load_library("labjack.ljm")
     constants = library.constants
     names = {constants.dtT7: "LabJack T7", constants.dtT8: "LabJack T8"}
     count, kinds, _, numbers, _ = library.listAll(constants.dtANY, constants.ctANY)

@@ -41,14 +41,6 @@ def load_library(module: str) -> Any:  # a module without types
         raise DeviceError(f"the library {package} cannot be used ({text})", remedy) from error
 
 
-def find_library(module: str) -> Any | None:  # as above
-    """Import a module of a vendor library for a search. None if that fails."""
-    try:
-        return load_library(module)
-    except DeviceError:
-        return None
-
-
 @contextmanager
 def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: str = OPEN_REMEDY) -> Iterator[None]:
     """Convert errors of a vendor library to DeviceError. failure: what cannot be done or has failed."""

@@ -33,10 +33,14 @@ def search_mcc172() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_mcc172` takes, empty if the library is not installed.
+        Addresses that `open_mcc172` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("daqhats")) is None:
-        return []
+    library = library_device.load_library("daqhats")
     boards, identity = library.hat_list(filter_by_id=library.HatIDs.MCC_172), DeviceIdentity("MCC 172")
     return [DeviceAddress(f"mcc172:{board.address}", identity, f"{board.product_name}, 2 inputs") for board in boards]
 
@@ -139,10 +143,14 @@ def search_uldaq() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_uldaq` takes, empty if the library is not installed.
+        Addresses that `open_uldaq` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("uldaq")) is None:
-        return []
+    library = library_device.load_library("uldaq")
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
     return [DeviceAddress(f"uldaq:{box.unique_id}", _read_uldaq_identity(box), box.product_name) for box in devices]
 

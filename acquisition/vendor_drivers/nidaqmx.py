@@ -24,10 +24,13 @@ def search_nidaqmx() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_nidaqmx` takes, empty if the library or NI's driver is not installed.
+        Addresses that `open_nidaqmx` takes, empty if NI's driver is not installed.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if library_device.find_library("nidaqmx") is None:
-        return []
     try:
         devices = [*library_device.load_library("nidaqmx.system").System.local().devices]
         listed = [(device, len(device.ai_physical_chans)) for device in devices]

@@ -111,7 +111,9 @@ def emulate_cut(
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
     motion = emulation.simulate_cut(cut, passage)
-    housing = _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm))
+    housing = emulation.make_random_housing(random, cut.speed_rpm)
+    largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))  # chatter: no overload
+    housing = replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
@@ -128,12 +130,6 @@ def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spind
     is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY
     is_moved[softest] = True
     return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
-
-
-def _normalize_gain(housing: emulation.Housing) -> emulation.Housing:
-    """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
-    largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
-    return replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
 
 
 def _build_true_cut(

@@ -14,7 +14,6 @@ TAP_X_CHOICE, TAP_Y_CHOICE = Choice("x", "tap x"), Choice("y", "tap y")
 CROSS_TAP_CHOICE = Choice("xy", "tap xy: hit in x, sensor in y")
 NEXT_TOOL_CHOICE, DONE_CHOICE = Choice("tool", "next tool"), Choice("done", "done")
 DIRECTION_CHOICES: dict[TapDirection, Choice] = {"x": TAP_X_CHOICE, "y": TAP_Y_CHOICE}
-VISIT_DIRECTIONS = [choice.key for choice in (TAP_X_CHOICE, TAP_Y_CHOICE, CROSS_TAP_CHOICE)]
 
 
 def choose_first_direction(folder: MachineFolder, tool: str) -> TapDirection:
@@ -92,7 +91,7 @@ class TapVisit:
                 return
             if key == NEXT_TOOL_CHOICE.key:
                 self._tool, tapped = tool, set()
-            self._direction = parse_direction(key) if key in VISIT_DIRECTIONS else "x"
+            self._direction = "x" if key == NEXT_TOOL_CHOICE.key else parse_direction(key)
             self._session = self._plan(self._tool, self._direction)
             self._show(None)
 

@@ -26,8 +26,15 @@ from acquisition import (
 )
 from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.emulation import SignalFunction
-from acquisition.text_boards import FrameFormat, OutputFormat, TextBoardEmulator, TextBoardSource, TextBoardTraits
-from acquisition.text_boards.decoders import LineDecoder, PrintedRows, ScanCounter, SimpleFrameDecoder
+from acquisition.text_boards.decoders import (
+    FrameFormat,
+    LineDecoder,
+    OutputFormat,
+    PrintedRows,
+    ScanCounter,
+    SimpleFrameDecoder,
+)
+from acquisition.text_boards.source import TextBoardEmulator, TextBoardSource, TextBoardTraits
 
 FORCE, ACCELERATION = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
 INPUTS = SensorInput(0, FORCE), SensorInput(1, ACCELERATION)

@@ -7,12 +7,10 @@ A static residual flexibility represents the modes left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.arrays import Complexes, Floats
+from acquisition.arrays import AnyFloats, Complexes, Floats
 
 NOISE_BLOCK_SCANS = 512
 """Scans whose noise is generated at once. Blocks of any multiple of them have the same noise."""
@@ -42,7 +40,7 @@ class Structure:
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 
-    def response(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
+    def response(self, time: AnyFloats, width: float) -> Floats:
         """Return the acceleration after a pulse sin^4(pi t/T) of 1 N.
 
         Parameters
@@ -163,7 +161,7 @@ class HammeredStructure:
             wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
         return start, wave
 
-    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
+    def _pulse(self, time: AnyFloats, width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         structures = (self.structure, *self.cross_structures)
         return np.stack([force, *(structure.response(time, width) for structure in structures)])

@@ -18,7 +18,8 @@ Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation wit
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,7 @@ MAX_CUTS_PER_GROUP = 48
 """Most cuts that are stepped together."""
 
 
-@dataclass(frozen=True, eq=False)
-class TipMotion:
+class TipMotion(NamedTuple):
     """Motion of a tool tip in a passage through a part."""
 
     sample_rate: float

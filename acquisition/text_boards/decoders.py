@@ -5,7 +5,6 @@ checksum is the lowest byte of the sum of the payload's bytes (SerialPlot, "cust
 """
 
 from collections.abc import Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
@@ -110,8 +109,7 @@ class LineDecoder(_RowDecoder):
         return row if len(row) == self._columns else []
 
 
-@dataclass(frozen=True)
-class FrameFormat:
+class FrameFormat(NamedTuple):
     """Layout of a binary frame."""
 
     start: bytes
@@ -153,8 +151,7 @@ DEFAULT_BAUD_RATE = 115200
 """Default rate of a port that is no USB device itself (baud)."""
 
 
-@dataclass(frozen=True)
-class OutputFormat:
+class OutputFormat(NamedTuple):
     """Output format of a board."""
 
     adc_bits: int | None = None

@@ -8,8 +8,8 @@ Source: The Modal Shop, MAN-0343, USB audio interface guide, 2021.
 import queue
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ _DATA = r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\
 MODAL_SHOP_NAME_PATTERN = re.compile(_MODEL + _DATA)
 
 
-@dataclass(frozen=True)
-class NameCalibration:
+class NameCalibration(NamedTuple):
     """Calibration in the name of a Modal Shop device."""
 
     model: str

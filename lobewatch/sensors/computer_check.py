@@ -8,11 +8,10 @@ import time
 import webbrowser
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from acquisition import DeviceError, ScannedPort, explain_no_ports, find_driver, scan_ports
 from acquisition.ports import SerialLink
@@ -30,8 +29,7 @@ MIN_CLOCK_YEAR = 2025
 """Year before which a clock is certainly wrong."""
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Result of one check."""
 
     subject: str

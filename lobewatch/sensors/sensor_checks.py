@@ -1,7 +1,7 @@
 """Check the sensors of a machine: sample rate, known mass, and channel skew."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import acquisition
 from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
@@ -15,8 +15,7 @@ RATE_MEASUREMENT_SECONDS = 5.0
 """Length of the rate measurement (s)."""
 
 
-@dataclass(frozen=True)
-class SensorList:
+class SensorList(NamedTuple):
     """Device, its channels, and what is wrong with them."""
 
     identity: acquisition.DeviceIdentity
@@ -84,8 +83,7 @@ MASS_CHECK_BASELINE_SECONDS = 0.5
 """Length of the record before the first hit (s)."""
 
 
-@dataclass(frozen=True)
-class MassCheck:
+class MassCheck(NamedTuple):
     """Result of the check with a hung mass, and where to correct a sensitivity."""
 
     calibration: acquisition.MassCalibration
@@ -143,8 +141,7 @@ SKEW_RECORDING_SECONDS = 2.0
 """Length of the recording of a common signal (s)."""
 
 
-@dataclass(frozen=True)
-class SkewCheck:
+class SkewCheck(NamedTuple):
     """Measured skew of a device, and where to enter it."""
 
     measured: acquisition.MeasuredSkew

@@ -49,8 +49,7 @@ class SpindleState:
         return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
 
 
-@dataclass(frozen=True)
-class PlannedTap:
+class PlannedTap(NamedTuple):
     """Tap test of the demo before it is taken."""
 
     date: datetime
@@ -69,8 +68,7 @@ TakenTap = tuple[PlannedTap, str]
 """Test as planned, with its truth, and the id of the stored tap test."""
 
 
-@dataclass(frozen=True)
-class DemoTap:
+class DemoTap(NamedTuple):
     """Tap test of the demo with its result."""
 
     plan: PlannedTap

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
+from acquisition.arrays import Codes
 from dsm import format_rounded, natural_frequencies
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
@@ -96,7 +96,7 @@ def _check_samples(baseline: Hit) -> Check:
     return Check("samples", not lost, text or f"come at {baseline.sample_rate:g} Hz, none lost")
 
 
-def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
+def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
     """Yield codes and channel of all sensors, the cross sensor last."""
     if baseline.codes is not None and baseline.channels is not None:
         yield from zip(baseline.codes, baseline.channels, strict=True)
@@ -104,7 +104,7 @@ def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel
         yield from list(_iterate_sensors(baseline.cross_hit))[1:]
 
 
-def _check_sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
+def _check_sensor(codes: Codes, channel: Channel) -> Check:
     name, low, high = f"{channel.name} sensor", *channel.effective_rails(codes)
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
         return Check(name, False, "stands at the end of its range: cable open or sensor not powered")

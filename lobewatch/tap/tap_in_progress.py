@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -263,8 +263,7 @@ MIN_CROSS_TAP_HITS = 3
 """Good hits needed for a cross FRF, chosen: fewer do not show their scatter."""
 
 
-@dataclass(frozen=True, eq=False)
-class CrossTapResult:
+class CrossTapResult(NamedTuple):
     """Result of the cross tap test that the same hits give."""
 
     tap_id: str | None

@@ -78,8 +78,7 @@ class DataqSource(ClosedOnExit):
         """Number of overflows of its buffer."""
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
-        self._has_sent = False
-        self._last_arrival = 0.0
+        self._has_sent, self._last_arrival = False, 0.0
         self._link = SerialLink(port)
         self._commands = DataqCommandLink(self._link)
         try:

@@ -122,8 +122,7 @@ class TapsEmulator(TapsServer, EmulatorThread):
         super().__init__(tcp, link)
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or TapsFaults()
-        self._clock = 0
-        self._restarted = False
+        self._clock, self._restarted = 0, False
         self._pending_events: deque[Event] = deque()
         self._active_faults: dict[tuple[int, int | None], Event] = {}
         self._power_on()
@@ -202,10 +201,9 @@ class TapsEmulator(TapsServer, EmulatorThread):
 
     def _stream(self) -> None:
         """Send the frames that are due, drop them if the host is late, report from time to time."""
-        now = time.monotonic()
         if self._is_blocked():
             return
-        due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
+        due = int((time.monotonic() - self._started) * self._rate) if self._realtime else self._scan + self._per_frame
         while self._scan + self._per_frame <= due:
             self._send_scans(overrun=not self._has_room())
         self._report_status(31.5)

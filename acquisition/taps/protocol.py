@@ -166,12 +166,9 @@ class FrameDecoder:
 def encode_data(first_scan: int, codes: Codes, bits: int = 16, overload: int = 0) -> bytes:
     """Encode scans (n_channels, n_scans) as the body of a DATA frame, with words of 16, 24 or 32 bits."""
     n_channels, n_scans = codes.shape
-    words = np.ascontiguousarray(codes.T)
-    if bits == 16:
-        samples = words.astype("<i2").tobytes()
-    else:
-        samples = words.astype("<i4").view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes()
-    return _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload) + samples
+    words = codes.T.astype("<i4", order="C").view(np.uint8).reshape(-1, 4)
+    header = _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload)
+    return header + words[:, : bits // 8].tobytes()
 
 
 def decode_data(body: bytes) -> Block:

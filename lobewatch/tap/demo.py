@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import astuple, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -31,8 +30,7 @@ DEMO_DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
 """Directions of the tests of a month, with the minute of the hour at which each is taken."""
 
 
-@dataclass(frozen=True)
-class SpindleState:
+class SpindleState(NamedTuple):
     """Spindle in four numbers."""
 
     frequency: float
@@ -46,7 +44,7 @@ class SpindleState:
 
     def relative_to(self, reference: SpindleState) -> SpindleState:
         """Return the relative differences from a reference (-)."""
-        return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
+        return SpindleState(*(value / base - 1 for value, base in zip(self, reference, strict=True)))
 
 
 class PlannedTap(NamedTuple):

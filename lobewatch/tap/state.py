@@ -33,8 +33,7 @@ class TapStep(enum.StrEnum):
     """The test cannot go on. The reason says why and what to do."""
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """Result of one check before the first hit."""
 
     name: str
@@ -47,8 +46,7 @@ class Check:
     """True if the finding deserves a line even if all is well."""
 
 
-@dataclass(frozen=True)
-class ListedHit:
+class ListedHit(NamedTuple):
     """Hit in the list of the screen."""
 
     number: int
@@ -109,8 +107,7 @@ class ProgramVerdict(NamedTuple):
     """Verdict word."""
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Result of a finished test."""
 
     status: str

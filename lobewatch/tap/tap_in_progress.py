@@ -217,10 +217,9 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     folder.refuse_damage()
     spool.clean_spool(folder)
     _remove_committed(folder)
-    damaged, not_resumed = list[Path](), list[str]()
-    interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
-    tap = interrupted or TapInProgress(acquisition.new_tap_id(circumstances), circumstances, folder)
-    tap.damaged, tap.not_resumed = damaged, not_resumed
+    new = TapInProgress(acquisition.new_tap_id(circumstances), circumstances, folder)
+    tap = _find_interrupted(new, resume) or new
+    tap.damaged, tap.not_resumed = new.damaged, new.not_resumed
     return tap
 
 
@@ -233,21 +232,20 @@ def _remove_committed(folder: MachineFolder) -> None:
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _find_interrupted(
-    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], not_resumed: list[str]
-) -> TapInProgress | None:
-    """Return the newest test of the same tool and direction, if wished. Add all others to `left`."""
+def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
+    """Return the newest test of the tool and direction of a new one, if wished. The new one notes all others."""
+    folder, circumstances = new.folder, new.circumstances
     committed, newest = folder.committed_ids, None
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
             continue
-        hits = spool.read_spooled_hits(path, damaged)
+        hits = spool.read_spooled_hits(path, new.damaged)
         if (first := next(hits, None)) is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
         if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
-            newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, damaged))
+            newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
@@ -255,7 +253,7 @@ def _find_interrupted(
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
             text = f"an interrupted test of {when} is still in {path}"
-            not_resumed.append(f"{text}; delete that folder if it is not needed")
+            new.not_resumed.append(f"{text}; delete that folder if it is not needed")
     return newest
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import astuple
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,7 @@ def test_a_month_of_the_demo_is_found_as_it_was_emulated(switched_on: Callable[.
     logbook = Logbook(folder)
     assert [plan.direction for plan in plans] == ["x", "y"]
     for tap in compare_with_truth(logbook, taken):
-        frequency, damping, stiffness, bearing = map(abs, astuple(tap.result.relative_to(tap.plan.truth)))
+        frequency, damping, stiffness, bearing = map(abs, tap.result.relative_to(tap.plan.truth))
         assert frequency < 5e-5
         assert damping < 2e-3
         assert stiffness < 2e-3

@@ -260,7 +260,9 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     records = _check_records(first, second)
     fit = _fit_phase_slope(records, records[1])
     for _ in range(2):
-        correction = _fit_phase_slope(records, _shift_back(records[1], fit.skew))
+        turn = np.exp(-2j * np.pi * np.fft.rfftfreq(records[1].size) * fit.skew)
+        earlier = np.asarray(np.fft.irfft(np.fft.rfft(records[1]) * turn, records[1].size))  # its ends are not right
+        correction = _fit_phase_slope(records, earlier)
         fit = replace(correction, skew=fit.skew + correction.skew)
     return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
 
@@ -287,12 +289,6 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     without_one = (n * np.mean(turned, axis=0) - turned) / (n - 1)
     std = np.sqrt((n - 1) * np.var(np.angle(without_one) @ weight))
     return MeasuredSkew(rough + float(np.angle(np.mean(turned, axis=0)) @ weight), float(std), share)
-
-
-def _shift_back(record: Floats, samples: float) -> Floats:
-    """Return the record as if taken this many samples earlier. Its ends are not right."""
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(record.size) * samples)
-    return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
 
 
 def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:

@@ -151,19 +151,13 @@ class AudioReader(LibraryReader):
 
     def start(self) -> None:
         self._blocks = queue.SimpleQueue()
-        self._stream.start()
+        super().start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         try:
             return self._blocks.get(timeout=timeout)
         except queue.Empty:
             return None
-
-    def stop(self) -> None:
-        self._stream.stop()
-
-    def close(self) -> None:
-        self._stream.close()
 
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts

@@ -71,9 +71,12 @@ class LibraryReader:
 
     errors: tuple[type[Exception], ...]
     """Exceptions that the library raises."""
+    _stream: Any
+    """Stream or task of the library, unless start, stop and close are overridden."""
 
     def start(self) -> None:
         """Start sampling."""
+        self._stream.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         """Return the scans that have arrived, None if none has arrived in time.
@@ -87,9 +90,11 @@ class LibraryReader:
 
     def stop(self) -> None:
         """End sampling. Harmless if it has ended."""
+        self._stream.stop()
 
     def close(self) -> None:
         """Release the device."""
+        self._stream.close()
 
     def fault(self) -> str:
         """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""

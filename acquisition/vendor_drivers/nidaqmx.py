@@ -90,12 +90,9 @@ class NidaqmxReader(LibraryReader):
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:
         """Take the task with its inputs and its rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library_device.load_library("nidaqmx.errors").Error,)
-        self._task = task
+        self._stream = task
         self._reader = library_device.load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
         self._shape = n_channels, round(rate * library_device.BLOCK_TIME)
-
-    def start(self) -> None:
-        self._task.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         volts = np.empty(self._shape)
@@ -107,15 +104,9 @@ class NidaqmxReader(LibraryReader):
             raise
         return VoltageBlock(volts)
 
-    def stop(self) -> None:
-        self._task.stop()
-
-    def close(self) -> None:
-        self._task.close()
-
     def fault(self) -> str:
         """Describe inputs whose IEPE loop is open."""
-        stream = self._task.in_stream
+        stream = self._stream.in_stream
         if not stream.open_current_loop_chans_exist:
             return ""
         return f"No sensor, or a broken cable, at {', '.join(stream.open_current_loop_chans)}: its IEPE loop is open."

@@ -47,7 +47,7 @@ def demo(
     from lobewatch.show.demo import demo_json, demo_texts
     from lobewatch.show.report.report import write_report
     from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
-    from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario
+    from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario
 
     mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
     mounting.check()

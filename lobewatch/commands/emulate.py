@@ -113,7 +113,7 @@ def _format_help(name: str, title: str) -> str:
 def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
+    from lobewatch.tap.emulated_spindle import MountingVariation, WearScenario, build_mounted_spindle
 
     folder = MachineFolder(options.machine)
     mounting = MountingVariation(options.scatter / 100, options.bad_clampings / 100, options.temperature)

@@ -18,11 +18,17 @@ from lobewatch.machine.folder_updates import add_event
 from lobewatch.measurement import Measurement
 from lobewatch.monitoring.threshold_dates import ThresholdDates
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.tap.emulated_spindle import build_structure, get_spindle_table, open_synchronized_device
+from lobewatch.tap.emulated_spindle import (
+    MountingVariation,
+    SpindleWear,
+    build_structure,
+    get_spindle_table,
+    open_synchronized_device,
+    remount_spindle,
+)
 from lobewatch.tap.hit_loop import TapPhases
 from lobewatch.tap.state import StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
-from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, remount_spindle
 
 TEST_DAY, TEST_HOUR = 15, 9
 """Day of the month, and hour, of the tests of a month."""

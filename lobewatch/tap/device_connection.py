@@ -97,28 +97,6 @@ BUTTON_BOUNCE_TIME = 0.3
 """Time after a button event in which further presses are bouncing (s)."""
 
 
-class Button:
-    """Button of a device that takes back the last good hit.
-
-    The clock of the device separates presses from bouncing: waiting events arrive all at once.
-    """
-
-    def __init__(self, sample_rate: float) -> None:
-        """Set the rate of the scans that time the events (Hz)."""
-        self._bounce = BUTTON_BOUNCE_TIME * sample_rate
-        self._moved: int | None = None
-
-    def count_presses(self, events: deque[acquisition.Event]) -> int:
-        """Take all waiting events and count the presses in them."""
-        count = 0
-        while events:
-            event = events.popleft()
-            if event.kind == acquisition.EventKind.BUTTON:
-                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
-                self._moved = event.scan
-        return count
-
-
 class DeviceConnection:
     """Opened device: its newest samples, button and faults."""
 
@@ -129,7 +107,8 @@ class DeviceConnection:
         self.inputs = TapInputs.select(device.channels, quantity, direction)
         """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
         self._recent: deque[Codes] = deque(maxlen=64)
-        self._button, self._fault = Button(device.sample_rate), ""
+        self._moved: int | None = None
+        self._fault = ""
 
     @property
     def levels(self) -> tuple[float | None, float]:
@@ -150,8 +129,17 @@ class DeviceConnection:
             yield block
 
     def count_presses(self) -> int:
-        """Count button presses since the last call."""
-        return self._button.count_presses(self.device.events)
+        """Count button presses since the last call, each of which takes back the last good hit.
+
+        The clock of the device separates presses from bouncing: waiting events arrive all at once.
+        """
+        count, bounce = 0, BUTTON_BOUNCE_TIME * self.device.sample_rate
+        while self.device.events:
+            event = self.device.events.popleft()
+            if event.kind == acquisition.EventKind.BUTTON:
+                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= bounce)
+                self._moved = event.scan
+        return count
 
     def poll_fault_text(self) -> str:
         """Return a sentence when a sensor fault appears or disappears, once. Empty if nothing changed."""

@@ -15,9 +15,14 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.tap.demo import compare_with_truth, plan_taps
-from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, EMULATED_SAMPLE_RATE
+from lobewatch.tap.emulated_spindle import (
+    EMULATED_CHANNELS,
+    EMULATED_SAMPLE_RATE,
+    MountingVariation,
+    SpindleWear,
+    WearScenario,
+)
 from lobewatch.tap.session import plan_session
-from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario
 
 SECONDS = 30.0
 MONTH = 18

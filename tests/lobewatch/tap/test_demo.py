@@ -13,8 +13,14 @@ from acquisition import Structure, TapsSource
 from dsm import natural_frequencies
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.demo import PlannedTap, plan_taps
-from lobewatch.tap.emulated_spindle import make_emulator, open_synchronized_device, set_bearing_stiffness
-from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario
+from lobewatch.tap.emulated_spindle import (
+    MountingVariation,
+    SpindleWear,
+    WearScenario,
+    make_emulator,
+    open_synchronized_device,
+    set_bearing_stiffness,
+)
 
 MONTHS = 24
 NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)

@@ -92,19 +92,14 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
             yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage)
 
 
-def _build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
-    """Build the tables of one tooth over a turn."""
-    needed = milling_cut.count_steps_needed(cut) * cut.teeth
-    number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
-    steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
-    off = np.max(np.abs(steps - np.rint(steps)), axis=1) / number
-    single = replace(cut, teeth=1, pitch=(), runout=())
-    return milling_cut.build_tables([single], int(number[np.argmin(np.round(off, 9))]))
-
-
 def _simulate_uneven_cut(cut: MillingCut, passage: Passage) -> TipMotion:
-    """Simulate a cut with uneven pitch."""
-    modes, tooth = _build_turn_tables(cut)
+    """Simulate a cut with uneven pitch, with steps that make its pitches nearly whole numbers of steps."""
+    needed = milling_cut.count_steps_needed(cut) * cut.teeth
+    counts = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
+    steps = counts[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
+    off = np.max(np.abs(steps - np.rint(steps)), axis=1) / counts
+    single = replace(cut, teeth=1, pitch=(), runout=())
+    modes, tooth = milling_cut.build_tables([single], int(counts[np.argmin(np.round(off, 9))]))
     cells, step = len(tooth.root), float(modes.step[0])
     behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
     share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)

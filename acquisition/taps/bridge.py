@@ -20,8 +20,6 @@ MAX_UNCLOCKED_BACKLOG_BYTES = 1 << 16
 """Backlog at which a device without a clock waits for its host (bytes). Nothing is dropped."""
 REOPEN_INTERVAL = 0.5
 """Time between two attempts to reopen the device (s)."""
-NO_SERIAL_NUMBER = "no-number"
-"""Serial number that INFO names for a device without one."""
 
 
 class TapsBridge(TapsServer):
@@ -125,7 +123,7 @@ class TapsBridge(TapsServer):
     def _info(self) -> dict[str, Any]:
         clocked = self.device.follows_clock
         info = protocol.build_info(self.device.identity, self._channels, self._rate, follows_clock=clocked)
-        return info | {"serial": info["serial"] or NO_SERIAL_NUMBER}
+        return info | {"serial": info["serial"] or "no-number"}
 
     def _start(self, n_scans: int) -> None:
         self._stop()

@@ -124,12 +124,11 @@ class TapsSource(ClosedOnExit):
         self._link = SerialLink(port)
         self._decoder = FrameDecoder()
         self._frames: deque[Frame] = deque()
-        self._seq = 0
+        self._seq, self._streaming = 0, False
         self._events = EventLog()
         self.events: deque[Event] = self._events.new
         """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
         self._stream: ScanStream | None = None
-        self._streaming = False
         self.status: DeviceStatus | None = None
         """Status that the device reported last, every 0.5 s of a stream."""
         try:

@@ -147,10 +147,6 @@ class SimpleFrameDecoder(_RowDecoder):
         self._rest = received[place:]
 
 
-DEFAULT_BAUD_RATE = 115200
-"""Default rate of a port that is no USB device itself (baud)."""
-
-
 class OutputFormat(NamedTuple):
     """Output format of a board."""
 
@@ -158,7 +154,7 @@ class OutputFormat(NamedTuple):
     """Bits of the converter whose codes, from 0 up, are printed. None for volts."""
     frame: FrameFormat | None = None
     """Frame layout, None for text lines."""
-    baud_rate: int = DEFAULT_BAUD_RATE
+    baud_rate: int = 115200
     """Rate of a serial port that is no USB device itself (baud)."""
 
     @property

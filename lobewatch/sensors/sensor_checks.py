@@ -93,7 +93,7 @@ class MassCheck(NamedTuple):
 
 
 def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, tell: Callable[[str], None]) -> MassCheck:
-    """Take good hits on a freely hung mass and compare force with mass times acceleration.
+    """Take as many good hits as a tap test on a freely hung mass and compare force with mass times acceleration.
 
     Parameters
     ----------
@@ -113,12 +113,6 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
     MassCheck
         Calibration, and where to correct a sensitivity.
     """
-    hits = _capture_good_hits(folder, device, tell)
-    return MassCheck(acquisition.calibrate_by_mass(hits, mass), find_sensor_data(folder.machine.daq, port))
-
-
-def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> list[Hit]:
-    """Capture as many good hits as a tap test takes."""
     wanted = folder.machine.tap.hits
     check_device_rate(folder, device)
     tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
@@ -134,7 +128,7 @@ def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[st
         if len(good) >= wanted:
             break
     device.stop()
-    return good
+    return MassCheck(acquisition.calibrate_by_mass(good, mass), find_sensor_data(folder.machine.daq, port))
 
 
 SKEW_RECORDING_SECONDS = 2.0

@@ -110,7 +110,6 @@ AIR_BEFORE_CUT = 1.0
 SENSOR_CHECK_DELAY = 1.0
 """Time after which the sensor signal is checked (s)."""
 
-BEGIN_CUT_TEXT = "hearing the spindle turn in air; begin the cut"
 SENSOR_ON_HOUSING_TEXT = "The sensor on the housing, the spindle turning in air: now begin the cut."
 CUT_TOO_SHORT_TEXT = "too short for a word, or no air before it; cut again, a second or longer"
 CUT_RUNNING_TEXT = "A second or longer, then out of the cut: it is judged by itself."
@@ -175,7 +174,7 @@ def record_cut(
         raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
     buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
     waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
-    show(BEGIN_CUT_TEXT)
+    show("hearing the spindle turn in air; begin the cut")
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
         has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT

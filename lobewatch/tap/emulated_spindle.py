@@ -82,14 +82,6 @@ def set_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
     return replace(spindle, bearings=[replace(bearing, stiffness=stiffness) for bearing in spindle.bearings])
 
 
-def make_emulator(
-    structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False
-) -> TapsEmulator:
-    """Make a TAPS/1 device on a structure that is tapped again and again."""
-    signal = HammeredStructure(structure, EMULATED_SAMPLE_RATE, random)
-    return TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=realtime, tcp=tcp)
-
-
 @contextmanager
 def open_synchronized_device(
     structure: Structure, random: np.random.Generator, *, tcp: bool = False
@@ -105,27 +97,22 @@ def open_synchronized_device(
         requested.acquire(timeout=HOST_WAIT_TIME)
         return hammered(first_scan, n_scans)
 
+    class SynchronizedSource(acquisition.TapsSource):
+        """Source that requests a block when the previous one is processed. Its frames are longer than usual."""
+
+        _frame_time = 0.06
+
+        def blocks(self) -> Iterator[acquisition.Block]:
+            for block in super().blocks():
+                yield block
+                requested.release()
+
+        def close(self) -> None:
+            requested.release()
+            super().close()
+
     with TapsEmulator(signal, EMULATED_CHANNELS, EMULATED_SAMPLE_RATE, realtime=False, tcp=tcp) as device:
-        yield lambda: _SynchronizedSource(device.port, requested)
-
-
-class _SynchronizedSource(acquisition.TapsSource):
-    """Source that requests a block when the previous one is processed. Its frames are longer than usual."""
-
-    _frame_time = 0.06
-
-    def __init__(self, port: str, requested: threading.Semaphore) -> None:
-        super().__init__(port)
-        self._wanted = requested
-
-    def blocks(self) -> Iterator[acquisition.Block]:
-        for block in super().blocks():
-            yield block
-            self._wanted.release()
-
-    def close(self) -> None:
-        self._wanted.release()
-        super().close()
+        yield lambda: SynchronizedSource(device.port)
 
 
 def emulate_machine(
@@ -336,8 +323,6 @@ BAD_CLAMPING_DROP = 0.02
 """Relative drop of f1 by a bad clamping, chosen."""
 MEAN_SPINDLE_TEMPERATURE = 22.0
 """Yearly mean of the spindle temperature (degC), chosen."""
-MONTHS_PER_YEAR = 12.0
-"""Length of a year (months)."""
 
 
 class MountingVariation(NamedTuple):
@@ -365,7 +350,7 @@ class MountingVariation(NamedTuple):
         """Return the spindle temperature in each month, the first in winter (degC), shape (months,)."""
         if self.temperature_swing is None:
             return None
-        season = np.cos(2 * math.pi * np.arange(months) / MONTHS_PER_YEAR)
+        season = np.cos(2 * math.pi * np.arange(months) / 12.0)
         return np.asarray(MEAN_SPINDLE_TEMPERATURE - self.temperature_swing * season)
 
     def shifts(self, months: int, tests: int, random: np.random.Generator) -> Floats:

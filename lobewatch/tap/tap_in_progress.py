@@ -34,8 +34,6 @@ def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
 
 MIN_HITS_FOR_MEAN = 3
 """Hits in a mean with which others are compared."""
-DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT)
-"""Error numbers of a full disk."""
 
 
 @dataclass
@@ -183,7 +181,7 @@ class TapInProgress:
         try:
             self._write(number, hit, flags)
         except OSError as error:
-            if error.errno not in DISK_FULL_ERRORS or self.reserve is None or not self.reserve.release():
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT) or self.reserve is None or not self.reserve.release():
                 raise
             self._write(number, hit, flags)
 

@@ -17,10 +17,10 @@ from lobewatch.tap.emulated_spindle import (
     MountingVariation,
     SpindleWear,
     WearScenario,
-    make_emulator,
     open_synchronized_device,
     set_bearing_stiffness,
 )
+from tests.lobewatch.tapped_emulator import make_emulator
 
 MONTHS = 24
 NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)

@@ -1,22 +1,11 @@
 """Data acquisition: devices, hits, averaged FRFs, HDF5 files and imported recordings."""
 
 from .channel import CROSS_TAP, Block, Channel, SensorInput, TapDirection, parse_direction
-from .dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits
-from .devices import (
-    DeviceAnswer,
-    DeviceSettings,
-    Driver,
-    PortScan,
-    ScannedPort,
-    SensorDataLocation,
-    check_settings,
-    find_driver,
-    list_driver_names,
-    load_drivers,
-    probe_port,
-    scan_ports,
-    skip_serial_probe,
-)
+from .dataq.emulator import DataqEmulator, DataqFaults, DataqTraits
+from .dataq.source import DataqSource
+from .devices.drivers import DeviceSettings, Driver, SensorDataLocation, skip_serial_probe
+from .devices.port_scan import DeviceAnswer, PortScan, ScannedPort, probe_port, scan_ports
+from .devices.registry import check_settings, find_driver, list_driver_names, load_drivers
 from .emulation import EmulationSetup, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
 from .errors import DataError, DeviceError, Remark, check_name, merge_remarks
 from .estimation.estimate_frf import RunningMean, compute_cross_spectra, estimate_frf, propagate_force_noise
@@ -45,21 +34,10 @@ from .hit_fault import HitFlags
 from .hit_quality.evaluate_hit import HitVerdict, average_good_hits, check_hit, evaluate_hit
 from .hits.capture_hits import HitSearch, Trigger, capture_hits
 from .hits.free_decay import estimate_decay_time, extract_free_decay
-from .ports import PortInfo, explain_no_ports, find_usb_identity, find_usb_port, list_serial_ports
-from .sensors import (
-    MassCalibration,
-    MeasuredRate,
-    MeasuredSkew,
-    calibrate_by_mass,
-    calibration_remark,
-    channel_remarks,
-    check_rate,
-    measure_rate,
-    measure_skew,
-    rate_remark,
-    stiffness_remark,
-    unit_mistake_remark,
-)
+from .ports.serial_ports import PortInfo, explain_no_ports, find_usb_identity, find_usb_port, list_serial_ports
+from .sensors.daq_timing import MeasuredRate, MeasuredSkew, check_rate, measure_rate, measure_skew, rate_remark
+from .sensors.mass_calibration import MassCalibration, calibrate_by_mass
+from .sensors.plausibility import calibration_remark, channel_remarks, stiffness_remark, unit_mistake_remark
 from .source import Device, DeviceAddress, DeviceIdentity, Event, EventKind, Source
 from .tap_test import (
     UNKNOWN_CONDITIONS,
@@ -71,7 +49,8 @@ from .tap_test import (
     parse_machine_name,
     sanitize_id_part,
 )
-from .taps import TapsEmulator, TapsFaults, TapsSource
+from .taps.emulator import TapsEmulator, TapsFaults
+from .taps.source import TapsSource
 
 __all__ = [
     "CROSS_TAP",

@@ -141,7 +141,7 @@ class ScriptedSession:
             raise ValueError(self.refusal)
         hits = list(self.state.hits)
         last = max(i for i, hit in enumerate(hits) if not hit.flags and not hit.undone)
-        hits[last] = replace(hits[last], undone=True)
+        hits[last] = hits[last]._replace(undone=True)
         self.show(TapStep.TAP, hits=tuple(hits), good=self.state.good - 1)
         self.undone.set()
 

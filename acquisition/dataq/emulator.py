@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition.channel import SensorInput
 from acquisition.dataq import protocol
-from acquisition.dataq.protocol import DIGITAL_INPUTS_CODE
+from acquisition.dataq.protocol import DEC_LIMITS, DECA_LIMITS, DIGITAL_INPUTS_CODE, SRATE_LIMITS
 from acquisition.dataq.stream import CLOCK_BIT
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
 
@@ -17,8 +17,7 @@ DATAQ_BUFFER_SECONDS = 1.0
 """Samples kept for a slow host before the device stops (s)."""
 MAX_SCANS_PER_STEP = 512
 """Scans generated at a time, at most."""
-SRATE, DEC, DECA = protocol.SRATE_LIMITS, protocol.DEC_LIMITS, protocol.DECA_LIMITS
-PARAMETER_LIMITS = {"srate": SRATE, "dec": DEC, "deca": DECA, "ps": (0, 7), "encode": (0, 1)}
+PARAMETER_LIMITS = {"srate": SRATE_LIMITS, "dec": DEC_LIMITS, "deca": DECA_LIMITS, "ps": (0, 7), "encode": (0, 1)}
 """Smallest and largest argument of each command with a number."""
 UNKNOWN_COMMAND_REPLY, INVALID_PARAMETER_REPLY = protocol.REFUSAL_REPLIES[:2]
 

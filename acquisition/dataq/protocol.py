@@ -8,7 +8,7 @@ Source: Data Acquisition Instrument Command Protocol, DATAQ Instruments. docs/de
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from acquisition.channel import SensorInput
 from acquisition.errors import DeviceError
@@ -39,8 +39,7 @@ DATAQ_RANGES: Mapping[str, tuple[float, ...]] = {
 """Positive end (V) of the bipolar ranges by model, in the order of their codes."""
 
 
-@dataclass(frozen=True)
-class RateSetting:
+class RateSetting(NamedTuple):
     """Arguments of `srate`, `dec` and `deca`. The rate is dividend / (srate dec deca)."""
 
     srate: int
@@ -141,11 +140,6 @@ def encode_range(model: str, full_scale: float) -> int:
     return DATAQ_RANGES[model].index(full_scale)
 
 
-def encode_scan_entry(number: int, code: int) -> int:
-    """Return the scan list entry of an analog input at a range code."""
-    return number | code << 8
-
-
 DATAQ_ECHO_TIMEOUT = 0.5
 """Time after which a command without an echo is sent again (s)."""
 DATAQ_COMMAND_TRIES = 3
@@ -156,18 +150,6 @@ MAX_DRAIN_TIME = 1.0
 """Time that a device may go on sending before `stop` is sent again (s)."""
 _CDC_STEPS = "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
 CDC_HINT = f"its LED must blink yellow (CDC mode): {_CDC_STEPS}"
-
-
-@dataclass(frozen=True)
-class DataqInfo:
-    """Answers to `info`."""
-
-    model: str
-    """Model, a key of DATAQ_RANGES, e.g. "4108"."""
-    dividend: int
-    """Dividend of the rate formula (Hz)."""
-    identity: DeviceIdentity
-    """Identity in the form common to all devices."""
 
 
 class DataqCommandLink:
@@ -206,16 +188,15 @@ class DataqCommandLink:
         self.send_command("info 0")
         self.drain()
 
-    def identify(self) -> DataqInfo:
-        """Identify the device. DeviceError if it is not of this family."""
+    def identify(self) -> tuple[DeviceIdentity, int]:
+        """Return the identity of the device and its rate dividend. DeviceError if it is not of this family."""
         maker, model, firmware, serial, dividend = (self.send_command(f"info {i}") for i in (0, 1, 2, 6, 9))
         try:
             if maker.upper() != "DATAQ":
                 raise ValueError(f"maker {maker!r} is not DATAQ")
             if not serial:
                 raise ValueError("it names no serial number, by which its measured sample rate is known again")
-            model = parse_model(model)
-            return DataqInfo(model, int(dividend), DeviceIdentity(f"DI-{model}", serial[:8], firmware))
+            return DeviceIdentity(f"DI-{parse_model(model)}", serial[:8], firmware), int(dividend)
         except ValueError as error:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
 
@@ -261,6 +242,6 @@ def probe_dataq(link: SerialLink) -> DeviceIdentity | None:
     commands = DataqCommandLink(link, tries=1)
     try:
         commands.halt()
-        return commands.identify().identity
+        return commands.identify()[0]
     except DeviceError:
         return None

@@ -8,14 +8,12 @@ from contextlib import closing, suppress
 
 from acquisition.channel import Block, SensorInput
 from acquisition.dataq import protocol
-from acquisition.dataq.protocol import DataqCommandLink, DataqInfo
+from acquisition.dataq.protocol import DataqCommandLink
 from acquisition.dataq.stream import ScanDecoder
 from acquisition.errors import DeviceError
-from acquisition.ports.serial_ports import SerialLink
+from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink
 from acquisition.source import ClosedOnExit, Event
 
-DATAQ_SILENCE_TIMEOUT = 3.0
-"""Time without scans after which a scanning device has failed (s)."""
 DATAQ_DEFAULT_RATE = 50_000.0
 """Default sample rate (Hz). Force, acceleration and digital word are 150 000 words a second."""
 
@@ -80,16 +78,15 @@ class DataqSource(ClosedOnExit):
         """Number of overflows of its buffer."""
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
-        self._has_sent = False
-        self._last_arrival = 0.0
+        self._has_sent, self._last_arrival = False, 0.0
         self._link = SerialLink(port)
         self._commands = DataqCommandLink(self._link)
         try:
             self._commands.halt()
-            device = self._identify()
-            self.identity = device.identity
+            self.identity, dividend = self._commands.identify()
+            self._check_firmware()
             wanted = DATAQ_DEFAULT_RATE if sample_rate is None else sample_rate
-            self.sample_rate = self._configure(device, inputs, wanted)
+            self.sample_rate = self._configure(inputs, wanted, dividend)
         except BaseException:
             self._link.close()
             raise
@@ -135,7 +132,7 @@ class DataqSource(ClosedOnExit):
                 self._next_scan = first + codes.shape[1]
                 yield Block(first, codes, lost_before=lost)
                 last_progress = self._last_arrival = time.monotonic()
-            if time.monotonic() - last_progress > DATAQ_SILENCE_TIMEOUT:
+            if time.monotonic() - last_progress > SILENCE_TIMEOUT:
                 raise self._failed(bool(data))
 
     def _start_again(self) -> None:
@@ -152,26 +149,24 @@ class DataqSource(ClosedOnExit):
         if sends:
             text = f"the digital inputs of {daq} do not hold still: lost bytes cannot be told"
             return DeviceError(text, "leave them unconnected, or set loss_detection = false in [daq]")
-        text = f"{daq} has sent no samples for {DATAQ_SILENCE_TIMEOUT:g} s"
+        text = f"{daq} has sent no samples for {SILENCE_TIMEOUT:g} s"
         return DeviceError(text, "switch it off and on and give the same command again")
 
-    def _identify(self) -> DataqInfo:
-        device = self._commands.identify()
-        version = protocol.parse_firmware(device.identity.firmware)
+    def _check_firmware(self) -> None:
+        version = protocol.parse_firmware(self.identity.firmware)
         if version is not None and version < protocol.MIN_FIRMWARE_VERSION:
             remedy = f"{protocol.MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool"
-            raise DeviceError(f"the DI-{device.model} on {self._link.port} has firmware {version:.2f}", remedy)
-        return device
+            raise DeviceError(f"the {self.identity.model} on {self._link.port} has firmware {version:.2f}", remedy)
 
-    def _configure(self, device: DataqInfo, inputs: Sequence[SensorInput], wanted: float) -> float:
+    def _configure(self, inputs: Sequence[SensorInput], wanted: float, dividend: int) -> float:
         """Configure the device and return the resulting sample rate (Hz)."""
-        ranges = [protocol.encode_range(device.model, sensor.channel.full_scale) for sensor in inputs]
-        codes = [protocol.encode_scan_entry(sensor.number, code) for sensor, code in zip(inputs, ranges, strict=True)]
+        model = self.identity.model.removeprefix("DI-")
+        codes = [sensor.number | protocol.encode_range(model, sensor.channel.full_scale) << 8 for sensor in inputs]
         codes += [protocol.DIGITAL_INPUTS_CODE] * (self.loss_detection != "none")
-        setting = protocol.choose_rate(wanted, device.dividend)
-        rate = setting.rate(device.dividend)
+        setting = protocol.choose_rate(wanted, dividend)
+        rate = setting.rate(dividend)
         setup = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
-        setup += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
+        setup += [f"{name} {value}" for name, value in setting._asdict().items()]
         for command in (*setup, f"ps {protocol.choose_packet_code(2 * len(codes) * rate)}"):
             self._commands.send_command(command)
         self._commands.drain()  # a NUL after the last echo would be taken for the first byte of the stream

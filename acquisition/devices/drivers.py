@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from acquisition.errors import DeviceError
+
 if TYPE_CHECKING:
     from acquisition.channel import SensorInput
     from acquisition.emulation import EmulationSetup, EmulatorThread
     from acquisition.ports import SerialLink
     from acquisition.source import Device, DeviceAddress, DeviceIdentity
-    from acquisition.text_boards import OutputFormat
+    from acquisition.text_boards.decoders import OutputFormat
 
 
 @dataclass(frozen=True)
@@ -105,12 +107,6 @@ EMULATED_CLOCK_FREQUENCY = 1000.0
 """Frequency of an emulated clock generator (Hz)."""
 
 
-def _open_taps(port: str, settings: DeviceSettings) -> Device:
-    from acquisition.taps import TapsSource
-
-    return TapsSource(port, settings.sample_rate)
-
-
 def _check_taps(settings: DeviceSettings) -> None:
     if not settings.loss_detection:
         raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
@@ -119,7 +115,7 @@ def _check_taps(settings: DeviceSettings) -> None:
 
 
 def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
-    from acquisition.taps import TapsEmulator
+    from acquisition.taps.emulator import TapsEmulator
 
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
@@ -127,69 +123,63 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
-    from acquisition.dataq import DataqSource
+    from acquisition.dataq.source import DataqSource
 
     rate, clock = settings.sample_rate, settings.digital_clock
     return DataqSource(port, settings.inputs, rate, settings.loss_detection, digital_clock=clock)
 
 
 def _check_dataq(settings: DeviceSettings) -> None:
-    from acquisition.dataq import check_inputs
-
-    check_inputs(settings.inputs)
+    _import("dataq.protocol").check_inputs(settings.inputs)
     if settings.digital_clock and not settings.loss_detection:
         raise ValueError("digital_clock=true: the clock stands in the digital word; leave out loss_detection=false")
 
 
 def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
     """Emulate a DATAQ device. If an input has a skew, the device converts its inputs one after the other."""
-    from acquisition.dataq import DataqEmulator, DataqTraits
+    from acquisition.dataq.emulator import DataqEmulator, DataqTraits
 
     skewed = any(sensor.channel.skew for sensor in setup.inputs)
     traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if setup.digital_clock else None)
     return DataqEmulator(setup.signal_at, setup.inputs, realtime=setup.realtime, tcp=setup.tcp, traits=traits)
 
 
-def _open_text_board(port: str, settings: DeviceSettings) -> Device:
-    from acquisition.text_boards import TextBoardSource
-
-    return TextBoardSource(port, settings.inputs, settings.sample_rate, settings.printing)
-
-
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
-    from acquisition.text_boards import TextBoardEmulator
+    from acquisition.text_boards.source import TextBoardEmulator
 
     volts = tuple(sensor.channel.sensitivity for sensor in setup.inputs)
     rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), setup.inputs[0].channel.full_scale
     return TextBoardEmulator(setup.signal_at(rate), volts, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp)
 
 
-def _import_when_called(package: str, function: str) -> Callable[..., Any]:
-    """Return a function that imports the named function of a package of `acquisition` when it is called."""
-    return lambda *arguments: getattr(import_module(f"acquisition.{package}"), function)(*arguments)
+def _import(module: str) -> Any:
+    return import_module(f"acquisition.{module}")
 
 
-def _make_library_driver(name: str, title: str) -> Driver:
+def _make_library_driver(name: str, title: str, module: str) -> Driver:
     """Make the driver of a device that a vendor library reads. The extra that installs it has the driver's name."""
-    open_device, search = (_import_when_called("vendor_drivers", f"{verb}_{name}") for verb in ("open", "search"))
-    return Driver(
-        name,
-        title,
-        lambda port, settings: open_device(port, settings.inputs, settings.sample_rate),
-        skip_serial_probe,
-        search=search,
-        is_hardware_tested=False,
-        extra=name,
-    )
+
+    def call(verb: str, *arguments: Any) -> Any:
+        return getattr(_import(f"vendor_drivers.{module}"), f"{verb}_{name}")(*arguments)
+
+    def open_device(port: str, settings: DeviceSettings) -> Any:
+        return call("open", port, settings.inputs, settings.sample_rate)
+
+    def search() -> Any:
+        try:
+            return call("search")
+        except DeviceError:  # its library is not installed
+            return []
+
+    return Driver(name, title, open_device, skip_serial_probe, search=search, is_hardware_tested=False, extra=name)
 
 
-_check_text_board = _import_when_called("text_boards", "check_text_board")
 BUILT_IN_DRIVERS = (
     Driver(
         "taps",
         "a TAPS/1 device",
-        _open_taps,
-        _import_when_called("taps", "probe_taps"),
+        lambda port, settings: _import("taps.source").TapsSource(port, settings.sample_rate),
+        lambda link: _import("taps.source").probe_taps(link),
         _check_taps,
         SensorDataLocation("the device's own channel data (INFO)", "sens_V_per_EU", "skew_s"),
         emulate=_emulate_taps,
@@ -199,7 +189,7 @@ BUILT_IN_DRIVERS = (
         "dataq",
         "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B",
         _open_dataq,
-        _import_when_called("dataq", "probe_dataq"),
+        lambda link: _import("dataq.protocol").probe_dataq(link),
         _check_dataq,
         usb_vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
@@ -207,17 +197,19 @@ BUILT_IN_DRIVERS = (
     Driver(
         "lines",
         "a board that prints lines of numbers",
-        _open_text_board,
-        _import_when_called("text_boards", "probe_text_board"),
-        lambda settings: _check_text_board(settings.inputs, settings.sample_rate),
+        lambda port, settings: _import("text_boards.source").TextBoardSource(
+            port, settings.inputs, settings.sample_rate, settings.printing
+        ),
+        lambda link: _import("text_boards.source").probe_text_board(link),
+        lambda settings: _import("text_boards.source").check_text_board(settings.inputs, settings.sample_rate),
         emulate=_emulate_text_board,
         prints_samples=True,
         is_hardware_tested=False,
     ),
-    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39"),
-    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230"),
-    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi"),
-    _make_library_driver("uldaq", "a Measurement Computing USB device"),
-    _make_library_driver("ljm", "a LabJack T7 or T8"),
+    _make_library_driver("audio", "a sound device with two inputs, such as The Modal Shop 485B39", "audio"),
+    _make_library_driver("nidaqmx", "an NI device, such as an NI 9234 or 9230", "nidaqmx"),
+    _make_library_driver("mcc172", "an MCC 172 on a Raspberry Pi", "measurement_computing"),
+    _make_library_driver("uldaq", "a Measurement Computing USB device", "measurement_computing"),
+    _make_library_driver("ljm", "a LabJack T7 or T8", "labjack"),
 )
 """Built-in drivers, in the order in which they probe."""

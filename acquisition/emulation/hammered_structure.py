@@ -7,12 +7,10 @@ A static residual flexibility represents the modes left out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.arrays import Complexes, Floats
+from acquisition.arrays import AnyFloats, Complexes, Floats
 
 NOISE_BLOCK_SCANS = 512
 """Scans whose noise is generated at once. Blocks of any multiple of them have the same noise."""
@@ -42,7 +40,7 @@ class Structure:
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 
-    def response(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
+    def response(self, time: AnyFloats, width: float) -> Floats:
         """Return the acceleration after a pulse sin^4(pi t/T) of 1 N.
 
         Parameters
@@ -152,21 +150,18 @@ class HammeredStructure:
         fault = self.random.uniform()
         if fault > 1 - self.hammering.overloads:
             peak *= 20
+        structures = self.structure, *self.cross_structures
+        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in structures)
+        length = int((13 * width + 14 / slowest) * self.sample_rate)  # until it has decayed to a millionth
         start = int(np.ceil(scan))
-        time = (start - scan + np.arange(self._response_length(width))) / self.sample_rate
+        time = (start - scan + np.arange(length)) / self.sample_rate
         wave = peak * self._pulse(time, width)
         if fault < self.hammering.double_hits:
             delay = self.random.uniform(4, 12) * width
             wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
         return start, wave
 
-    def _response_length(self, width: float) -> int:
-        """Return the samples until the slowest mode has decayed to a millionth."""
-        structures = (self.structure, *self.cross_structures)
-        slowest = min(np.min(2 * np.pi * modes.frequency * modes.damping_ratio) for modes in structures)
-        return int((13 * width + 14 / slowest) * self.sample_rate)
-
-    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> Floats:
+    def _pulse(self, time: AnyFloats, width: float) -> Floats:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         structures = (self.structure, *self.cross_structures)
         return np.stack([force, *(structure.response(time, width) for structure in structures)])

@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.arrays import Complexes, Floats
+from acquisition.arrays import AnyFloats, Complexes, Floats
 from acquisition.emulation.milling import TipMotion
 
 SENSOR_MOUNT_FREQUENCY = 20e3
@@ -35,7 +33,7 @@ class Housing:
     noise: float = 0.0
     """Noise of the sensor and its cable (m/s^2 rms)."""
 
-    def transfer(self, frequency: NDArray[np.floating[Any]]) -> Complexes:
+    def transfer(self, frequency: AnyFloats) -> Complexes:
         """Return the transfer function from tip to sensor acceleration for a gain of 1.
 
         Parameters

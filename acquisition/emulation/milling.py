@@ -18,7 +18,8 @@ Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation wit
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,70 +30,19 @@ from acquisition.emulation.milling_cut import MillingCut, ModeTables, Passage, T
 
 MAX_STEP_COUNT_FACTOR = 1.25
 """Factor by which steps per turn may exceed those needed, to make pitches whole numbers of steps."""
-
-
-def build_turn_tables(cut: MillingCut) -> tuple[ModeTables, ToothTables]:
-    """Build the tables of one tooth over a turn."""
-    needed = milling_cut.count_steps_needed(cut) * cut.teeth
-    number = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
-    steps = number[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
-    off = np.max(np.abs(steps - np.rint(steps)), axis=1) / number
-    single = replace(cut, teeth=1, pitch=(), runout=())
-    return milling_cut.build_tables([single], int(number[np.argmin(np.round(off, 9))]))
-
-
-def simulate_uneven_cutting(
-    cut: MillingCut, modes: ModeTables, tooth: ToothTables, passage: Passage
-) -> tuple[Complexes, Floats, Complexes]:
-    """Simulate a cut with uneven pitch from first to last contact.
-
-    Returns the mode states after each step and their gains in it, both (n, 1, m), and the last state (m,).
-    """
-    cells, step = len(tooth.root), float(modes.step[0])
-    behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
-    share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
-    stands_out = np.array(cut.runout or np.zeros(cut.teeth))
-    tables = tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain
-    thick, root, reach, push, rub = (table[:, 0] for table in tables)
-    number = math.ceil(passage.cutting / step)
-    depth = passage.depth_at(np.asarray((np.arange(number) + 0.5) * step))
-    surface, swing = np.zeros_like(thick), np.zeros(modes.flight.shape[1], dtype=complex)
-    swings, gains = np.empty((number, swing.size), dtype=complex), np.empty((number, swing.size))
-    for n in range(number):
-        at = (n - behind) % cells
-        swing = swing * modes.flight[0]
-        feed = thick[at] * share[:, np.newaxis]
-        chip = feed + root[at] * stands_out[:, np.newaxis] + reach[at] @ swing.imag - surface[at]
-        np.maximum(chip, 0.0, out=chip)
-        surface[at] += chip - feed
-        gains[n] = depth[n] * (np.einsum("jme,je->m", push[at], chip) + np.sum(rub[at], axis=0))
-        swing = swing + gains[n]
-        swings[n] = swing
-    return swings[:, np.newaxis], gains[:, np.newaxis], swing
-
-
 MAX_TOOTH_PERIOD_RATIO = 1.25
 """Largest ratio of tooth periods in a group of cuts that are stepped together."""
 MAX_CUTS_PER_GROUP = 48
 """Most cuts that are stepped together."""
-COMPARED_TURNS = 8
-"""Spindle turns that are compared."""
 
 
-@dataclass(frozen=True, eq=False)
-class TipMotion:
+class TipMotion(NamedTuple):
     """Motion of a tool tip in a passage through a part."""
 
     sample_rate: float
     """Step rate (Hz)."""
     acceleration: Floats
     """Acceleration along x and y of the machine (m/s^2), shape (2, n)."""
-    nonperiodic_share: float = 0.0
-    """Share of the rms that did not repeat from turn to turn late at full depth.
-
-    It is 0 for a stable cut, and for flip chatter with an even number of teeth. A cut above its limit may be stable if
-    run-out keeps teeth out of it.
-    """
 
 
 def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:
@@ -139,15 +89,39 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
         modes, teeth = milling_cut.build_tables(members, max(map(milling_cut.count_steps_needed, members)))
         cutting, swing = _simulate_group(members, modes, teeth, passage)
         for place, number in enumerate(group):
-            steps_per_turn = len(teeth.root) * cuts[number].teeth
-            yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage, steps_per_turn)
+            yield number, _assemble_motion(cutting[:, place], swing[place], modes, place, passage)
 
 
 def _simulate_uneven_cut(cut: MillingCut, passage: Passage) -> TipMotion:
-    modes, tooth = build_turn_tables(cut)
-    swings, gains, swing = simulate_uneven_cutting(cut, modes, tooth, passage)
-    cutting = _tip_acceleration(swings, gains, modes)[:, 0].astype(np.float32)
-    return _assemble_motion(cutting, swing, modes, 0, passage, len(tooth.root))
+    """Simulate a cut with uneven pitch, with steps that make its pitches nearly whole numbers of steps."""
+    needed = milling_cut.count_steps_needed(cut) * cut.teeth
+    counts = np.arange(needed, math.ceil(MAX_STEP_COUNT_FACTOR * needed) + 1)
+    steps = counts[:, np.newaxis] * np.array(cut.pitch) / (2 * np.pi)
+    off = np.max(np.abs(steps - np.rint(steps)), axis=1) / counts
+    single = replace(cut, teeth=1, pitch=(), runout=())
+    modes, tooth = milling_cut.build_tables([single], int(counts[np.argmin(np.round(off, 9))]))
+    cells, step = len(tooth.root), float(modes.step[0])
+    behind = np.rint(np.cumsum((0.0, *cut.pitch[1:])) * cells / (2 * np.pi)).astype(np.int64)
+    share = np.array(cut.pitch) * cut.teeth / (2 * np.pi)
+    stands_out = np.array(cut.runout or np.zeros(cut.teeth))
+    tables = tooth.rigid_chip, tooth.root, tooth.reach, tooth.chip_gain, tooth.edge_gain
+    thick, root, reach, push, rub = (table[:, 0] for table in tables)
+    number = math.ceil(passage.cutting / step)
+    depth = passage.depth_at(np.asarray((np.arange(number) + 0.5) * step))
+    surface, swing = np.zeros_like(thick), np.zeros(modes.flight.shape[1], dtype=complex)
+    swings, gains = np.empty((number, swing.size), dtype=complex), np.empty((number, swing.size))
+    for n in range(number):
+        at = (n - behind) % cells
+        swing = swing * modes.flight[0]
+        feed = thick[at] * share[:, np.newaxis]
+        chip = feed + root[at] * stands_out[:, np.newaxis] + reach[at] @ swing.imag - surface[at]
+        np.maximum(chip, 0.0, out=chip)
+        surface[at] += chip - feed
+        gains[n] = depth[n] * (np.einsum("jme,je->m", push[at], chip) + np.sum(rub[at], axis=0))
+        swing = swing + gains[n]
+        swings[n] = swing
+    cutting = _tip_acceleration(swings[:, np.newaxis], gains[:, np.newaxis], modes)[:, 0].astype(np.float32)
+    return _assemble_motion(cutting, swing, modes, 0, passage)
 
 
 def _group_cuts(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
@@ -218,22 +192,12 @@ def _tip_acceleration(swings: Complexes, gains: Floats, modes: ModeTables) -> Fl
 
 
 def _assemble_motion(
-    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage, steps_per_turn: int
+    cutting: NDArray[np.float32], swing: Complexes, modes: ModeTables, place: int, passage: Passage
 ) -> TipMotion:
-    """Put one cut between rest and free decay. turn: steps per turn."""
+    """Put one cut between rest and free decay."""
     step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]
     n = round((passage.cutting + passage.after) / step)
     remaining = step * np.arange(1, n - len(cutting) + 1)
     ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, remaining)))
     still = np.zeros((2, round(passage.before / step)))
-    full = cutting[: round((passage.ramp + passage.steady) / step)]
-    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _nonperiodic_share(full, steps_per_turn))
-
-
-def _nonperiodic_share(acceleration: NDArray[np.float32], steps_per_turn: int) -> float:
-    """Return the share of the rms by which the last turns differ from their mean. 0 for less than two."""
-    number = min(COMPARED_TURNS, len(acceleration) // steps_per_turn)
-    if number < 2:
-        return 0.0
-    turns = acceleration[-number * steps_per_turn :].reshape(number, -1).astype(float)
-    return float(np.sqrt(np.mean((turns - np.mean(turns, axis=0)) ** 2) / np.mean(turns**2)))
+    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]))

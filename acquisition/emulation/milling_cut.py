@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,11 +112,6 @@ class Passage:
         """Time from first to last contact (s)."""
         return 2 * self.ramp + self.steady
 
-    @property
-    def seconds(self) -> float:
-        """Total time (s)."""
-        return self.before + self.cutting + self.after
-
 
 MIN_STEPS_PER_CYCLE, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC = 16, 30, 16
 """Fewest steps per cycle of the fastest mode (as stiffened by the cut), per tooth period, and per arc of cut."""
@@ -136,8 +131,7 @@ def count_steps_needed(cut: MillingCut) -> int:
     return math.ceil(max(rate * cut.tooth_period, MIN_STEPS_PER_TOOTH_PERIOD, MIN_STEPS_PER_ARC * pitch / arc))
 
 
-@dataclass(frozen=True, eq=False)
-class ModeTables:
+class ModeTables(NamedTuple):
     """Modes m of cuts c. A real mode is z = (q' + zeta w q) / w_d + i q, so that free vibration is a factor."""
 
     pole: Complexes
@@ -150,8 +144,7 @@ class ModeTables:
     """Step length (s), shape (c,)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ToothTables:
+class ToothTables(NamedTuple):
     """Teeth (and slices of helical ones) e in the cut at each step s, of cuts c.
 
     Chip and force each carry the square root of the share of a step and of the depth in which the tooth cuts.

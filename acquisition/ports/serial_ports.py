@@ -152,6 +152,8 @@ try:
 except ImportError:
     TermiosError = OSError  # type: ignore[misc,assignment]
 
+SILENCE_TIMEOUT = 3.0
+"""Time without scans after which a device that streams has failed (s). One that resets when opened needs two."""
 MAX_UNREAD_BYTES = 16 << 20
 """Bytes kept for a slow consumer: ten seconds at 1.6 MB/s."""
 

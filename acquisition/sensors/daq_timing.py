@@ -179,7 +179,8 @@ def _fit_scan_period(scans: Floats, arrived: Floats) -> tuple[float, float]:
 
 def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
     """Return least-squares slope and standard error without the points far above the others."""
-    rough = y - _median_slope(x, y) * x
+    first, second = np.triu_indices(x.size, 1)
+    rough = y - float(np.median((y[second] - y[first]) / (x[second] - x[first]))) * x  # slope of Theil and Sen
     above = rough - np.median(rough)
     spread = 1.4826 * np.median(np.abs(above))
     keep = above <= 4 * spread + 1e-9
@@ -190,12 +191,6 @@ def _fit_robust_slope(x: Floats, y: Floats) -> tuple[float, float]:
     alike = float(np.clip(residual[1:] @ residual[:-1] / energy, 0.0, 0.9)) if energy > 0 else 0.0
     variance = energy / (x.size - 2) / float(x @ x) * (1 + alike) / (1 - alike)
     return slope, float(np.sqrt(variance))
-
-
-def _median_slope(x: Floats, y: Floats) -> float:
-    """Return the median of the slopes of all pairs of points (Theil and Sen). x increases."""
-    first, second = np.triu_indices(x.size, 1)
-    return float(np.median((y[second] - y[first]) / (x[second] - x[first])))
 
 
 SKEW_SEGMENT_SAMPLES = 1024
@@ -265,7 +260,9 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     records = _check_records(first, second)
     fit = _fit_phase_slope(records, records[1])
     for _ in range(2):
-        correction = _fit_phase_slope(records, _shift_back(records[1], fit.skew))
+        turn = np.exp(-2j * np.pi * np.fft.rfftfreq(records[1].size) * fit.skew)
+        earlier = np.asarray(np.fft.irfft(np.fft.rfft(records[1]) * turn, records[1].size))  # its ends are not right
+        correction = _fit_phase_slope(records, earlier)
         fit = replace(correction, skew=fit.skew + correction.skew)
     return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
 
@@ -292,12 +289,6 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     without_one = (n * np.mean(turned, axis=0) - turned) / (n - 1)
     std = np.sqrt((n - 1) * np.var(np.angle(without_one) @ weight))
     return MeasuredSkew(rough + float(np.angle(np.mean(turned, axis=0)) @ weight), float(std), share)
-
-
-def _shift_back(record: Floats, samples: float) -> Floats:
-    """Return the record as if taken this many samples earlier. Its ends are not right."""
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(record.size) * samples)
-    return np.asarray(np.fft.irfft(np.fft.rfft(record) * turn, record.size))
 
 
 def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.arrays import Complexes, Floats
+from acquisition.arrays import AnyFloats, Complexes, Floats
 from acquisition.channel import Channel
 from acquisition.errors import Remark
 from acquisition.estimation.estimate_frf import compute_cross_spectra, estimate_frf
@@ -187,7 +185,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     )
 
 
-def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Complexes) -> int:
+def _count_flat_lines(f: AnyFloats, s_ff: Floats, s_fa: Complexes) -> int:
     """Return the number of lines before m A/F leaves its initial value by 5 %."""
     if f.size < MIN_CALIBRATION_LINES:
         return f.size
@@ -199,7 +197,7 @@ def _count_flat_lines(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Complexe
     return int(off[0]) if off.size else f.size
 
 
-def _fit_ratio(f: NDArray[np.floating[Any]], s_ff: Floats, s_fa: Floats) -> Floats:
+def _fit_ratio(f: AnyFloats, s_ff: Floats, s_fa: Floats) -> Floats:
     """Return q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
     root = np.sqrt(s_ff)
     rows = np.stack([root, root * (f / f[-1]) ** 2], axis=1)

@@ -20,11 +20,9 @@ MAX_UNCLOCKED_BACKLOG_BYTES = 1 << 16
 """Backlog at which a device without a clock waits for its host (bytes). Nothing is dropped."""
 REOPEN_INTERVAL = 0.5
 """Time between two attempts to reopen the device (s)."""
-NO_SERIAL_NUMBER = "no-number"
-"""Serial number that INFO names for a device without one."""
 
 
-class TapsBridge:
+class TapsBridge(TapsServer):
     """TAPS/1 server for one device and one host at a time. It accepts no host while the device is away.
 
     Parameters
@@ -59,9 +57,10 @@ class TapsBridge:
         """Device, as opened last."""
         with ExitStack() as cleanup:
             cleanup.callback(self.device.close)
-            self._wire = TcpWire(number, address)
+            self.wire: TcpWire = TcpWire(number, address)
+            """Wire to the host."""
             cleanup.pop_all()
-        self.port = self._wire.port
+        self.port = self.wire.port
         """Port that the host opens."""
 
     def stop(self) -> None:
@@ -73,14 +72,14 @@ class TapsBridge:
         try:
             while not self._stopping:
                 try:
-                    _BridgeSession(self.device, self._wire).serve(lambda: self._stopping)
+                    self._serve()
                 except DeviceError as error:
-                    self._wire.close()
+                    self.wire.close()
                     self.device.close()
                     self._tell(str(error))
                     self._wait()
         finally:
-            self._wire.close()
+            self.wire.close()
             self.device.close()
 
     def _wait(self) -> None:
@@ -91,34 +90,25 @@ class TapsBridge:
                 self.device = self._open()
             except DeviceError:
                 continue
-            self._wire = TcpWire(int(self.port.rpartition(":")[2]), self._address)
+            self.wire = TcpWire(int(self.port.rpartition(":")[2]), self._address)
             self._tell("the device is back")
             return
 
-
-class _BridgeSession(TapsServer):
-    """Device and the wire to its host."""
-
-    wire: TcpWire
-
-    def __init__(self, device: Device, wire: TcpWire) -> None:
-        self._device, self.wire, self._channels, self._rate = device, wire, device.channels, device.sample_rate
-        self._shift = [max(channel.adc_bits for channel in device.channels) - c.adc_bits for c in device.channels]
+    def _serve(self) -> None:
+        """Answer and send until stopped. DeviceError if the device goes away or falls silent."""
+        self._channels, self._rate = self.device.channels, self.device.sample_rate
         self._power_on()
-
-    def serve(self, is_over: Callable[[], bool]) -> None:
-        """Answer and send until `is_over`. DeviceError if the device goes away or falls silent."""
-        while not is_over():
+        while not self._stopping:
             if not self._streaming:
                 self._answer(0.05)
                 continue
             session = self._session
-            for block in self._device.blocks():
+            for block in self.device.blocks():
                 self._send_block(block)
                 self._answer(0.0)
-                while not self._device.follows_clock and len(self.wire.pending) > MAX_UNCLOCKED_BACKLOG_BYTES:
+                while not self.device.follows_clock and len(self.wire.pending) > MAX_UNCLOCKED_BACKLOG_BYTES:
                     self._answer(0.05)
-                if is_over() or not self._streaming or session != self._session:
+                if self._stopping or not self._streaming or session != self._session:
                     break
             else:
                 self._streaming = False
@@ -131,27 +121,28 @@ class _BridgeSession(TapsServer):
             self._stop()
 
     def _info(self) -> dict[str, Any]:
-        clocked = self._device.follows_clock
-        info = protocol.build_info(self._device.identity, self._channels, self._rate, follows_clock=clocked)
-        return info | {"serial": info["serial"] or NO_SERIAL_NUMBER}
+        clocked = self.device.follows_clock
+        info = protocol.build_info(self.device.identity, self._channels, self._rate, follows_clock=clocked)
+        return info | {"serial": info["serial"] or "no-number"}
 
     def _start(self, n_scans: int) -> None:
         self._stop()
-        self._device.events.clear()
-        self._device.start()
+        self.device.events.clear()
+        self.device.start()
         self._session = (self._session + 1) % 2**16
         self._begin_count(n_scans)
 
     def _stop(self) -> None:
         if self._streaming:
             super()._stop()
-            self._device.stop()
+            self.device.stop()
 
     def _send_block(self, block: Block) -> None:
         """Send the scans of a block, or drop them if the host is late. Scan indices show what is missing."""
         self._scan += block.lost_before
         self._lost = self._lost or block.lost_before > 0
-        codes = block.codes << np.array(self._shift, np.int32)[:, np.newaxis]
+        bits = np.array([channel.adc_bits for channel in self._channels], np.int32)
+        codes = block.codes << (np.max(bits) - bits)[:, np.newaxis]
         if self._n_scans:
             codes = codes[:, : max(self._n_scans - self._scan, 0)]
         for begin in range(0, codes.shape[1], self._per_frame):
@@ -162,8 +153,8 @@ class _BridgeSession(TapsServer):
             else:
                 self._send_data(part, block.overload)
             self._scan += part.shape[1]
-        while self._device.events:
-            self._send(MessageType.EVENT, protocol.encode_event(self._device.events.popleft()))
+        while self.device.events:
+            self._send(MessageType.EVENT, protocol.encode_event(self.device.events.popleft()))
         self._note_fill(BRIDGE_BUFFER_BYTES)
         self._report_status(protocol.NO_TEMPERATURE)
         if self._n_scans and self._scan >= self._n_scans:

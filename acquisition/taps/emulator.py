@@ -122,8 +122,7 @@ class TapsEmulator(TapsServer, EmulatorThread):
         super().__init__(tcp, link)
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or TapsFaults()
-        self._clock = 0
-        self._restarted = False
+        self._clock, self._restarted = 0, False
         self._pending_events: deque[Event] = deque()
         self._active_faults: dict[tuple[int, int | None], Event] = {}
         self._power_on()
@@ -160,7 +159,10 @@ class TapsEmulator(TapsServer, EmulatorThread):
     def serve_once(self) -> bool:
         self._serve_host(0.0 if self._streaming and self._has_room() else 0.05)
         while self._pending_events:
-            self._send_now(self._pending_events.popleft())
+            event = self._pending_events.popleft()
+            if event.kind != EventKind.BUTTON:
+                self._active_faults[event.kind, event.channel] = event
+            self._send(MessageType.EVENT, protocol.encode_event(replace(event, scan=self._scan)))
         if self._streaming:
             self._stream()
         if self._faults.unplug_after is None or self._scan < self._faults.unplug_after:
@@ -187,11 +189,6 @@ class TapsEmulator(TapsServer, EmulatorThread):
             if self._infos <= self._faults.cut_infos:
                 del self.wire.pending[place + len(encoded) // 2 :]
 
-    def _send_now(self, event: Event) -> None:
-        if event.kind != EventKind.BUTTON:
-            self._active_faults[event.kind, event.channel] = event
-        self._send(MessageType.EVENT, protocol.encode_event(replace(event, scan=self._scan)))
-
     def _info(self) -> dict[str, Any]:
         return protocol.build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
 
@@ -204,10 +201,9 @@ class TapsEmulator(TapsServer, EmulatorThread):
 
     def _stream(self) -> None:
         """Send the frames that are due, drop them if the host is late, report from time to time."""
-        now = time.monotonic()
         if self._is_blocked():
             return
-        due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
+        due = int((time.monotonic() - self._started) * self._rate) if self._realtime else self._scan + self._per_frame
         while self._scan + self._per_frame <= due:
             self._send_scans(overrun=not self._has_room())
         self._report_status(31.5)

@@ -13,8 +13,7 @@ import time
 import zlib
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from cobs import cobs
@@ -60,8 +59,7 @@ class MessageType(enum.IntEnum):
     DATA = 0x10
 
 
-@dataclass(frozen=True)
-class Frame:
+class Frame(NamedTuple):
     """TAPS/1 frame."""
 
     type: int
@@ -76,8 +74,7 @@ class Frame:
     """Bit 0: samples were lost before this frame."""
 
 
-@dataclass(frozen=True)
-class DeviceStatus:
+class DeviceStatus(NamedTuple):
     """Body of a STATUS frame."""
 
     samples_taken: int
@@ -93,7 +90,7 @@ class DeviceStatus:
 
     def encode(self) -> bytes:
         """Encode the body."""
-        *counts, temperature = astuple(self)
+        *counts, temperature = self
         return _STATUS_BODY.pack(*counts, round(temperature * 100))
 
     @classmethod
@@ -169,12 +166,9 @@ class FrameDecoder:
 def encode_data(first_scan: int, codes: Codes, bits: int = 16, overload: int = 0) -> bytes:
     """Encode scans (n_channels, n_scans) as the body of a DATA frame, with words of 16, 24 or 32 bits."""
     n_channels, n_scans = codes.shape
-    words = np.ascontiguousarray(codes.T)
-    if bits == 16:
-        samples = words.astype("<i2").tobytes()
-    else:
-        samples = words.astype("<i4").view(np.uint8).reshape(-1, 4)[:, : bits // 8].tobytes()
-    return _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload) + samples
+    words = codes.T.astype("<i4", order="C").view(np.uint8).reshape(-1, 4)
+    header = _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload)
+    return header + words[:, : bits // 8].tobytes()
 
 
 def decode_data(body: bytes) -> Block:

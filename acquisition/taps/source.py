@@ -10,7 +10,7 @@ from typing import Any
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
-from acquisition.ports.serial_ports import SerialLink
+from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.taps import protocol
 from acquisition.taps.protocol import SAMPLE_BITS, DeviceStatus, EventLog, Frame, FrameDecoder, MessageType
@@ -92,8 +92,6 @@ TAPS_ANSWER_TIMEOUT = 1.0
 """Time after which an unanswered command is sent again (s)."""
 TAPS_COMMAND_TRIES = 3
 """Number of times a command is sent."""
-TAPS_SILENCE_TIMEOUT = 3.0
-"""Time without scans after which a streaming device has failed (s). It reports itself every 0.5 s."""
 MIN_SCANS_PER_FRAME = 512
 """Scans per frame requested from the device, if as many fit into a frame."""
 TARGET_FRAME_TIME = 0.01
@@ -126,12 +124,11 @@ class TapsSource(ClosedOnExit):
         self._link = SerialLink(port)
         self._decoder = FrameDecoder()
         self._frames: deque[Frame] = deque()
-        self._seq = 0
+        self._seq, self._streaming = 0, False
         self._events = EventLog()
         self.events: deque[Event] = self._events.new
         """Events at the device, oldest first. Take them with popleft() in any thread (IndexError if empty)."""
         self._stream: ScanStream | None = None
-        self._streaming = False
         self.status: DeviceStatus | None = None
         """Status that the device reported last, every 0.5 s of a stream."""
         try:
@@ -192,15 +189,11 @@ class TapsSource(ClosedOnExit):
                 if block is not None:
                     yield block
                     last_arrival = time.monotonic()  # not before: a slow consumer is no silent device
-            if time.monotonic() - last_arrival > TAPS_SILENCE_TIMEOUT:
-                raise self._silent()
-
-    def _silent(self) -> DeviceError:
-        reason = f"has sent no samples for {TAPS_SILENCE_TIMEOUT:g} s"
-        if self._stream is not None and self._stream.foreign:
-            reason = "has begun another stream by itself"
-        text = f"the DAQ on {self._link.port} {reason}"
-        return DeviceError(text, "switch it off and on and give the same command again")
+            if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
+                is_foreign = bool(self._stream.foreign)
+                silent = f"has sent no samples for {SILENCE_TIMEOUT:g} s"
+                text = f"the DAQ on {self._link.port} {'has begun another stream by itself' if is_foreign else silent}"
+                raise DeviceError(text, "switch it off and on and give the same command again")
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body

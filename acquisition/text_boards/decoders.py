@@ -4,8 +4,9 @@ The payload of a frame is a scan: the counter (u16), if there is one, and a valu
 checksum is the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
 """
 
-from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,24 +17,13 @@ COUNTER_MODULI = (1 << 8, 1 << 16, 1 << 32)
 """Values at which board counters wrap to 0."""
 
 
-@dataclass(frozen=True, eq=False)
-class PrintedRows:
+class PrintedRows(NamedTuple):
     """Consecutive rows of numbers without a broken one between them."""
 
     rows: Floats
     """Numbers, shape (n_scans, n_columns)."""
     broken_before: int = 0
     """Number of broken lines or frames before them."""
-
-
-@dataclass(frozen=True, eq=False)
-class ScanRun:
-    """Consecutive scans."""
-
-    values: Floats
-    """Values as printed, one row per sensor, shape (n_sensors, n_scans)."""
-    lost_before: int = 0
-    """Scans lost before them, by the counter. Without one, the broken lines or frames: a lower bound."""
 
 
 class ScanCounter:
@@ -45,16 +35,20 @@ class ScanCounter:
         self._last: int | None = None
         self._largest = 0
 
-    def split_runs(self, printed: PrintedRows) -> Iterator[ScanRun]:
-        """Yield runs of consecutive scans from rows of values, with or without a counter."""
+    def split_runs(self, printed: PrintedRows) -> Iterator[tuple[Floats, int]]:
+        """Yield runs of consecutive scans from rows of values, with or without a counter.
+
+        Each is its values as printed, shape (n_sensors, n_scans), and the number of scans lost before it, by the
+        counter. Without one, that is the number of broken lines or frames: a lower bound.
+        """
         values = printed.rows[:, -self._values :].T
         if printed.rows.shape[1] == self._values:
-            yield ScanRun(values, printed.broken_before)
+            yield values, printed.broken_before
             return
         counts = printed.rows[:, 0].astype(np.int64)
         lost = self._lost(counts)
         for run in np.split(np.arange(counts.size), np.flatnonzero(lost[1:]) + 1):
-            yield ScanRun(values[:, run], int(lost[run[0]]))
+            yield values[:, run], int(lost[run[0]])
 
     def _lost(self, counts: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the scans lost before each row. The counter wraps at the smallest modulus above all counts so far."""
@@ -71,12 +65,28 @@ MAX_LINE_BYTES = 200
 """Longest line of numbers (bytes)."""
 
 
-class LineDecoder:
+class _RowDecoder:
+    """Decoder of a stream into rows of numbers, which counts the broken ones."""
+
+    def __init__(self) -> None:
+        self._rest, self._begun, self._broken = b"", False, 0
+
+    def _split_at_broken(self, rows: Iterable[Sequence[float]]) -> Iterator[PrintedRows]:
+        """Yield the runs of rows between broken ones, which are empty."""
+        for is_good, run in groupby(rows, bool):
+            values = np.array([*run], np.float64)
+            if is_good:
+                yield PrintedRows(values, self._broken)
+            self._broken = 0 if is_good else self._broken + len(values)
+
+
+class LineDecoder(_RowDecoder):
     """Decoder of a text stream into rows of numbers."""
 
     def __init__(self, counts: Container[int] = (2, 3)) -> None:
         """Accept lines with these counts of numbers. The rest of the first line is not counted."""
-        self._rest, self._begun, self._columns, self._broken, self._counts = b"", False, 0, 0, counts
+        super().__init__()
+        self._columns, self._counts = 0, counts
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the rows that these bytes complete."""
@@ -84,37 +94,22 @@ class LineDecoder:
         self._rest = self._rest[-MAX_LINE_BYTES:]
         if lines and not self._begun:
             self._begun, lines = True, lines[1:]
-        rows: list[list[float]] = []
-        for line in lines:
-            row = _parse_numbers(line)
-            row = row if len(row) in self._counts else []
-            self._columns = self._columns or len(row)
-            if row and len(row) == self._columns:
-                rows.append(row)
-            elif line.strip():
-                if rows:
-                    yield self._printed(rows)
-                rows, self._broken = [], self._broken + 1
-        if rows:
-            yield self._printed(rows)
+        yield from self._split_at_broken(self._parse_line(line) for line in lines if line.strip())
 
-    def _printed(self, rows: list[list[float]]) -> PrintedRows:
-        printed, self._broken = PrintedRows(np.array(rows), self._broken), 0
-        return printed
+    def _parse_line(self, line: bytes) -> list[float]:
+        """Return the finite numbers of a line, as many as in the first, none if it contains anything else."""
+        words = line.strip().translate(NUMBER_SEPARATORS).split(b",")
+        try:
+            row = [float(word) for word in words if word]
+        except ValueError:
+            return []
+        if len(row) not in self._counts or not np.isfinite(row).all():
+            return []
+        self._columns = self._columns or len(row)
+        return row if len(row) == self._columns else []
 
 
-def _parse_numbers(line: bytes) -> list[float]:
-    """Return the finite numbers of a line, none if it contains anything else."""
-    words = [word for word in line.strip().translate(NUMBER_SEPARATORS).split(b",") if word]
-    try:
-        numbers = [float(word) for word in words]
-    except ValueError:
-        return []
-    return numbers if np.isfinite(numbers).all() else []
-
-
-@dataclass(frozen=True)
-class FrameFormat:
+class FrameFormat(NamedTuple):
     """Layout of a binary frame."""
 
     start: bytes
@@ -125,56 +120,41 @@ class FrameFormat:
     """True if a checksum follows the values."""
 
 
-class SimpleFrameDecoder:
+class SimpleFrameDecoder(_RowDecoder):
     """Decoder of a stream of frames into rows of numbers."""
 
     def __init__(self, form: FrameFormat, values: int = 2) -> None:
         """Expect this number of values per frame. Bytes before the first whole frame are not counted."""
-        self._form, self._rest, self._broken, self._begun = form, b"", 0, False
-        self._payload = 2 * (values + form.counter)
+        super().__init__()
+        self._form, self._payload = form, 2 * (values + form.counter)
         self._size = len(form.start) + self._payload + form.checksum
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the complete rows. Bytes between frames, and a wrong checksum, are a broken frame."""
-        form, received, place = self._form, self._rest + data, 0
-        rows: list[tuple[int, ...]] = []
+        return self._split_at_broken(self._parse_frames(self._rest + data))
+
+    def _parse_frames(self, received: bytes) -> Iterator[list[int]]:
+        form, place = self._form, 0
         while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= self._size:
             payload = received[begin + len(form.start) :][: self._payload]
             good = not form.checksum or received[begin + self._size - 1] == sum(payload) & 0xFF
             if self._begun and (begin > place or not good):
-                if rows:
-                    yield self._printed(rows)
-                rows, self._broken = [], self._broken + 1
+                yield []
             if good:
-                rows.append(_parse_payload(payload, form.counter))
+                words = np.frombuffer(payload, "<i2").tolist()
+                yield [words[0] & 0xFFFF, *words[1:]] if form.counter else words
             self._begun, place = self._begun or good, begin + (self._size if good else 1)
         self._rest = received[place:]
-        if rows:
-            yield self._printed(rows)
-
-    def _printed(self, rows: list[tuple[int, ...]]) -> PrintedRows:
-        printed, self._broken = PrintedRows(np.array(rows, np.float64), self._broken), 0
-        return printed
 
 
-def _parse_payload(payload: bytes, counter: bool) -> tuple[int, ...]:
-    words = tuple(int(word) for word in np.frombuffer(payload, "<i2"))
-    return (words[0] & 0xFFFF, *words[1:]) if counter else words
-
-
-DEFAULT_BAUD_RATE = 115200
-"""Default rate of a port that is no USB device itself (baud)."""
-
-
-@dataclass(frozen=True)
-class OutputFormat:
+class OutputFormat(NamedTuple):
     """Output format of a board."""
 
     adc_bits: int | None = None
     """Bits of the converter whose codes, from 0 up, are printed. None for volts."""
     frame: FrameFormat | None = None
     """Frame layout, None for text lines."""
-    baud_rate: int = DEFAULT_BAUD_RATE
+    baud_rate: int = 115200
     """Rate of a serial port that is no USB device itself (baud)."""
 
     @property

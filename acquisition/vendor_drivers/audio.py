@@ -8,8 +8,8 @@ Source: The Modal Shop, MAN-0343, USB audio interface guide, 2021.
 import queue
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,7 @@ _DATA = r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\
 MODAL_SHOP_NAME_PATTERN = re.compile(_MODEL + _DATA)
 
 
-@dataclass(frozen=True)
-class NameCalibration:
+class NameCalibration(NamedTuple):
     """Calibration in the name of a Modal Shop device."""
 
     model: str
@@ -66,8 +65,6 @@ def parse_name_calibration(name: str) -> NameCalibration | None:
 
 AUDIO_DEFAULT_RATE = 48000.0
 """Default sample rate (Hz)."""
-AUDIO_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 FULL_SCALE_CODE = 2.0**31
 """32-bit code of full scale. Devices of 24 bits fill the upper bits."""
 PORTAUDIO_INVALID_RATE = -9997
@@ -82,10 +79,14 @@ def search_audio() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_audio` takes, empty if the library is not installed.
+        Addresses that `open_audio` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    library = library_device.find_library("sounddevice")
-    devices = library.query_devices() if library else ()
+    devices = library_device.load_library("sounddevice").query_devices()
     return [_make_address(entry) for entry in devices if entry["max_input_channels"] >= 2]
 
 
@@ -140,7 +141,7 @@ class AudioReader(LibraryReader):
         self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
         self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / FULL_SCALE_CODE
         self._blocks = queue.SimpleQueue[VoltageBlock]()
-        size, count = round(rate * AUDIO_BLOCK_TIME), max(numbers) + 1
+        size, count = round(rate * library_device.BLOCK_TIME), max(numbers) + 1
         self._stream = library.InputStream(rate, size, index, count, "int32", callback=self._keep)
         actual = self._stream.samplerate
         if abs(actual / rate - 1) > 1e-3:
@@ -150,19 +151,13 @@ class AudioReader(LibraryReader):
 
     def start(self) -> None:
         self._blocks = queue.SimpleQueue()
-        self._stream.start()
+        super().start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         try:
             return self._blocks.get(timeout=timeout)
         except queue.Empty:
             return None
-
-    def stop(self) -> None:
-        self._stream.stop()
-
-    def close(self) -> None:
-        self._stream.close()
 
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts

@@ -19,8 +19,6 @@ from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryRead
 
 T7_DEFAULT_RATE = 40000.0
 """Default sample rate (Hz) for two inputs of a T7, which samples 100 000 values a second."""
-T7_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 SKIPPED_SAMPLE_VALUE = -9999.0
 """Value that LJM inserts for a sample that the device had no room for."""
 T7_INPUT_COUNT = 14
@@ -35,10 +33,14 @@ def search_ljm() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_ljm` takes, empty if the library is not installed.
+        Addresses that `open_ljm` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("labjack.ljm")) is None:
-        return []
+    library = library_device.load_library("labjack.ljm")
     constants = library.constants
     names = {constants.dtT7: "LabJack T7", constants.dtT8: "LabJack T8"}
     count, kinds, _, numbers, _ = library.listAll(constants.dtANY, constants.ctANY)
@@ -81,8 +83,7 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
         cleanup.callback(library.close, handle)
         for sensor in inputs:
             library.eWriteName(handle, f"AIN{sensor.number}_RANGE", sensor.channel.full_scale)
-        numbers = [sensor.number for sensor in inputs]
-        reader = LjmReader(library, handle, numbers, sample_rate or T7_DEFAULT_RATE)
+        reader = LjmReader(library, handle, [sensor.number for sensor in inputs], sample_rate or T7_DEFAULT_RATE)
         serial = library.getHandleInfo(handle)[2]
         firmware = library.eReadName(handle, "FIRMWARE_VERSION")
         cleanup.pop_all()
@@ -106,7 +107,7 @@ class LjmReader(LibraryReader):
 
     def start(self) -> None:
         self._lost, self._blocks = 0, deque[VoltageBlock]()
-        size = round(self.rate * T7_BLOCK_TIME)
+        size = round(self.rate * library_device.BLOCK_TIME)
         self.rate = float(self._library.eStreamStart(self._handle, size, len(self._inputs), self._inputs, self.rate))
 
     def read(self, _timeout: float) -> VoltageBlock | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,8 @@ EXTRAS = {"daqhats": "mcc172", "labjack": "ljm", "nidaqmx": "nidaqmx", "sounddev
 """Extra of lobewatch that installs each vendor library."""
 OPEN_REMEDY = "`acquisition.scan_ports` lists what there is"
 """Remedy for a device that cannot be opened."""
+BLOCK_TIME = 0.02
+"""Duration of the blocks that a library delivers (s)."""
 LIBRARY_SILENCE_TIMEOUT = 3.0
 """Time without scans after which a started device has failed (s)."""
 LIBRARY_READ_TIMEOUT = 0.2
@@ -39,14 +41,6 @@ def load_library(module: str) -> Any:  # a module without types
         raise DeviceError(f"the library {package} cannot be used ({text})", remedy) from error
 
 
-def find_library(module: str) -> Any | None:  # as above
-    """Import a module of a vendor library for a search. None if that fails."""
-    try:
-        return load_library(module)
-    except DeviceError:
-        return None
-
-
 @contextmanager
 def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: str = OPEN_REMEDY) -> Iterator[None]:
     """Convert errors of a vendor library to DeviceError. failure: what cannot be done or has failed."""
@@ -63,8 +57,7 @@ def check_input_numbers(inputs: Sequence[SensorInput], count: int, device: str) 
             raise ValueError(text)
 
 
-@dataclass(frozen=True, eq=False)
-class VoltageBlock:
+class VoltageBlock(NamedTuple):
     """Consecutive scans as a library returns them."""
 
     volts: Floats
@@ -78,9 +71,12 @@ class LibraryReader:
 
     errors: tuple[type[Exception], ...]
     """Exceptions that the library raises."""
+    _stream: Any
+    """Stream or task of the library, unless start, stop and close are overridden."""
 
     def start(self) -> None:
         """Start sampling."""
+        self._stream.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         """Return the scans that have arrived, None if none has arrived in time.
@@ -94,9 +90,11 @@ class LibraryReader:
 
     def stop(self) -> None:
         """End sampling. Harmless if it has ended."""
+        self._stream.stop()
 
     def close(self) -> None:
         """Release the device."""
+        self._stream.close()
 
     def fault(self) -> str:
         """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""

@@ -23,8 +23,6 @@ MCC172_MAX_RATE = 51200.0
 """Highest sample rate (Hz). The others are this rate divided by 2 to 256."""
 MCC172_FULL_SCALE = 5.0
 """Only range (V)."""
-MCC172_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 MCC172_SYNC_TIMEOUT = 2.0
 """Time limit for synchronizing the converters (s). The documentation says 128 clock cycles."""
 
@@ -35,10 +33,14 @@ def search_mcc172() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_mcc172` takes, empty if the library is not installed.
+        Addresses that `open_mcc172` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("daqhats")) is None:
-        return []
+    library = library_device.load_library("daqhats")
     boards, identity = library.hat_list(filter_by_id=library.HatIDs.MCC_172), DeviceIdentity("MCC 172")
     return [DeviceAddress(f"mcc172:{board.address}", identity, f"{board.product_name}, 2 inputs") for board in boards]
 
@@ -93,7 +95,7 @@ class Mcc172Reader(LibraryReader):
         """Take the opened board. numbers: its inputs in order. rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.HatError,)
         self._library, self._board, self._numbers = library, board, list(numbers)
-        self._size = round(rate * MCC172_BLOCK_TIME)
+        self._size = round(rate * library_device.BLOCK_TIME)
 
     def start(self) -> None:
         self._board.a_in_scan_start(0b11, 0, self._library.OptionFlags.CONTINUOUS)
@@ -141,10 +143,14 @@ def search_uldaq() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_uldaq` takes, empty if the library is not installed.
+        Addresses that `open_uldaq` takes.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if (library := library_device.find_library("uldaq")) is None:
-        return []
+    library = library_device.load_library("uldaq")
     devices = library.get_daq_device_inventory(library.InterfaceType.USB)
     return [DeviceAddress(f"uldaq:{box.unique_id}", _read_uldaq_identity(box), box.product_name) for box in devices]
 

@@ -12,8 +12,6 @@ from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers import library_device
 from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
 
-NIDAQMX_BLOCK_TIME = 0.02
-"""Length of a block (s)."""
 NIDAQMX_BUFFER_TIME = 10.0
 """Length of the NI-DAQmx buffer (s). A late reader gets an error there, never a gap."""
 SAMPLES_NOT_AVAILABLE_ERROR = -200284
@@ -26,10 +24,13 @@ def search_nidaqmx() -> Sequence[DeviceAddress]:
     Returns
     -------
     Sequence of DeviceAddress
-        Addresses that `open_nidaqmx` takes, empty if the library or NI's driver is not installed.
+        Addresses that `open_nidaqmx` takes, empty if NI's driver is not installed.
+
+    Raises
+    ------
+    DeviceError
+        The library is not installed.
     """
-    if library_device.find_library("nidaqmx") is None:
-        return []
     try:
         devices = [*library_device.load_library("nidaqmx.system").System.local().devices]
         listed = [(device, len(device.ai_physical_chans)) for device in devices]
@@ -73,7 +74,11 @@ def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | 
         task = library.Task()
         cleanup.callback(task.close)
         channels = tuple(_add_input(task, device, sensor) for sensor in inputs)
-        rate = _set_rate(task, sample_rate or device.ai_max_multi_chan_rate)
+        wanted = sample_rate or device.ai_max_multi_chan_rate
+        continuous = library_device.load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
+        buffer = round(wanted * NIDAQMX_BUFFER_TIME)
+        task.timing.cfg_samp_clk_timing(wanted, sample_mode=continuous, samps_per_chan=buffer)
+        rate = float(task.timing.samp_clk_rate)
         reader = NidaqmxReader(task, len(inputs), rate)
         cleanup.pop_all()
         return LibraryDevice(port, reader, _read_identity(device), channels, rate, "buffer overrun")
@@ -85,12 +90,9 @@ class NidaqmxReader(LibraryReader):
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:
         """Take the task with its inputs and its rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library_device.load_library("nidaqmx.errors").Error,)
-        self._task = task
+        self._stream = task
         self._reader = library_device.load_library("nidaqmx.stream_readers").AnalogMultiChannelReader(task.in_stream)
-        self._shape = n_channels, round(rate * NIDAQMX_BLOCK_TIME)
-
-    def start(self) -> None:
-        self._task.start()
+        self._shape = n_channels, round(rate * library_device.BLOCK_TIME)
 
     def read(self, timeout: float) -> VoltageBlock | None:
         volts = np.empty(self._shape)
@@ -102,15 +104,9 @@ class NidaqmxReader(LibraryReader):
             raise
         return VoltageBlock(volts)
 
-    def stop(self) -> None:
-        self._task.stop()
-
-    def close(self) -> None:
-        self._task.close()
-
     def fault(self) -> str:
         """Describe inputs whose IEPE loop is open."""
-        stream = self._task.in_stream
+        stream = self._stream.in_stream
         if not stream.open_current_loop_chans_exist:
             return ""
         return f"No sensor, or a broken cable, at {', '.join(stream.open_current_loop_chans)}: its IEPE loop is open."
@@ -131,10 +127,3 @@ def _add_input(task: Any, device: Any, sensor: SensorInput) -> Channel:
         entry.ai_excit_src = constants.ExcitationSource.INTERNAL
         entry.ai_excit_val = max(currents)
     return replace(sensor.channel, adc_bits=24, full_scale=float(entry.ai_rng_high))
-
-
-def _set_rate(task: Any, rate: float) -> float:
-    """Set the clock of a task and return the real sample rate (Hz)."""
-    continuous = library_device.load_library("nidaqmx.constants").AcquisitionType.CONTINUOUS
-    task.timing.cfg_samp_clk_timing(rate, sample_mode=continuous, samps_per_chan=round(rate * NIDAQMX_BUFFER_TIME))
-    return float(task.timing.samp_clk_rate)

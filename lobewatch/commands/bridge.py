@@ -34,8 +34,9 @@ def bridge(
       lobewatch tap mill-3 --port socket://10.0.0.5:5025  # on the other computer, with driver = "taps"
     """
     from acquisition import DataError, find_driver
-    from acquisition.taps import TapsBridge
-    from lobewatch.machine import DaqTable, MachineFolder
+    from acquisition.taps.bridge import TapsBridge
+    from lobewatch.machine.folder import MachineFolder
+    from lobewatch.machine.settings.setup_tables import DaqTable
     from lobewatch.tap.device_connection import DeviceOpener
 
     print_note = partial(notes.print, markup=False)

@@ -43,7 +43,7 @@ def demo(
     from lobewatch.show.demo import demo_json, demo_texts
     from lobewatch.show.report.report import write_report
     from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
-    from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario
+    from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario
 
     mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
     mounting.check()
@@ -51,12 +51,13 @@ def demo(
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
-        tests = age_spindle(folder, taps, seed, mounting.scatter, WearScenario(story), mounting, tcp=tcp)
+        wear = SpindleWear.of(folder, taps, WearScenario(story))
+        tests = age_spindle(folder, wear, seed, mounting, tcp=tcp)
         taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
         progress.add_task("history", total=None)
         logbook = Logbook(folder)
         compared = compare_with_truth(logbook, taken)
-        forecasts = forecast_levels(logbook, SpindleWear.of(folder, taps, WearScenario(story)))
+        forecasts = forecast_levels(logbook, wear)
         with publish_on_change(logbook):
             report = write_report(logbook)
     emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))

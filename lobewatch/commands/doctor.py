@@ -22,7 +22,7 @@ def doctor(
       lobewatch doctor mill-3 --json
     """
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.sensors import check_computer
+    from lobewatch.sensors.computer_check import check_computer
     from lobewatch.show.sensors import findings_json, findings_texts
 
     findings = check_computer(MachineFolder(machine) if machine else None)

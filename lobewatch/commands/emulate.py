@@ -66,7 +66,8 @@ options without the port."""
 
 
 def _add_commands() -> None:
-    from acquisition import DataError, find_driver, list_driver_names
+    from acquisition import find_driver, list_driver_names
+    from acquisition.errors import DataError
 
     for name in list_driver_names():
         try:
@@ -103,7 +104,7 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     """Emulate tap tests, or a cut if a program was chosen, until Ctrl-C."""
     from acquisition import find_driver
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.tap.wear_scenarios import MountingVariation, WearScenario, build_mounted_spindle
+    from lobewatch.tap.emulated_spindle import MountingVariation, WearScenario, build_mounted_spindle
 
     folder = MachineFolder(options.machine)
     mounting = MountingVariation(options.scatter / 100, options.bad_clampings / 100, options.temperature)

@@ -77,8 +77,7 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    tacho_fields = recorder.check_tacho_options(tacho, pulses, file)
-    description = file_options.description(sensor=recorder.check_sensor_kind(sensor, file), **tacho_fields)
+    description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
             from lobewatch.screen import CutScreenServer  # imports aiohttp

@@ -20,7 +20,7 @@ def ports(
       lobewatch ports
       lobewatch ports --port /dev/pts/3
     """
-    from acquisition.devices import scan_ports
+    from acquisition import scan_ports
     from lobewatch.show.sensors import ports_json, ports_texts
 
     survey = scan_ports(port)

@@ -29,7 +29,7 @@ def sensors(
       lobewatch sensors mill-3 --skew
     """
     from lobewatch.machine.folder import MachineFolder
-    from lobewatch.sensors import check_mass, check_skew, list_sensors
+    from lobewatch.sensors.sensor_checks import check_mass, check_skew, list_sensors
     from lobewatch.show import sensors as show
     from lobewatch.tap.device_connection import open_device
 

@@ -8,14 +8,12 @@ import time
 import webbrowser
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from acquisition import DeviceError, explain_no_ports, find_driver, scan_ports
-from acquisition.devices import ScannedPort
+from acquisition import DeviceError, ScannedPort, explain_no_ports, find_driver, scan_ports
 from acquisition.ports import SerialLink
 from lobewatch.machine.folder import MachineFolder
 
@@ -31,8 +29,7 @@ MIN_CLOCK_YEAR = 2025
 """Year before which a clock is certainly wrong."""
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Result of one check."""
 
     subject: str
@@ -92,7 +89,12 @@ def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
         yield Finding("ports", "note", "none", explain_no_ports())
     wanted = machine.machine.daq.port if machine else ""
     if wanted and wanted not in [port.port.device for port in survey.ports]:
-        yield _check_named_port(wanted)
+        subject = f"port {wanted}"  # a pseudo-terminal, the network, or missing
+        try:
+            SerialLink(wanted).close()
+            yield Finding(subject, "fine", "named in [daq], opens")
+        except DeviceError as error:
+            yield Finding(subject, "hinders", f"named in [daq]: {error.text}", error.cure)
 
 
 def _check_port(port: ScannedPort) -> Finding:
@@ -103,16 +105,6 @@ def _check_port(port: ScannedPort) -> Finding:
     if port.answer is None:
         return Finding(subject, "fine", port.text)
     return Finding(subject, "fine", f"{port.answer.identity.model} answers ({port.answer.driver})")
-
-
-def _check_named_port(name: str) -> Finding:
-    """Check a port of machine.toml that is not listed: a pseudo-terminal, the network, or missing."""
-    subject = f"port {name}"
-    try:
-        SerialLink(name).close()
-    except DeviceError as error:
-        return Finding(subject, "hinders", f"named in [daq]: {error.text}", error.cure)
-    return Finding(subject, "fine", "named in [daq], opens")
 
 
 def _check_latency(folder: Path) -> Iterator[Finding]:

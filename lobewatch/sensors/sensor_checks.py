@@ -1,14 +1,13 @@
 """Check the sensors of a machine: sample rate, known mass, and channel skew."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from typing import NamedTuple
 
 import acquisition
 from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
 from lobewatch.machine.daq_rates import apply_measured_rate, check_device_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LiveSignal, collect_codes, find_sensor_data
+from lobewatch.tap.device_connection import DeviceConnection, collect_codes, find_sensor_data
 from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor_remarks
 from lobewatch.tap.trial_hits import TrialHits
 
@@ -16,8 +15,7 @@ RATE_MEASUREMENT_SECONDS = 5.0
 """Length of the rate measurement (s)."""
 
 
-@dataclass(frozen=True)
-class SensorList:
+class SensorList(NamedTuple):
     """Device, its channels, and what is wrong with them."""
 
     identity: acquisition.DeviceIdentity
@@ -56,8 +54,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
     SensorList
         Channels, rates and remarks.
     """
-    today = datetime.now(UTC).date()
-    remarks = sensor_remarks(device.channels, today, folder.machine.daq.calibration_interval_months)
+    remarks = sensor_remarks(device.channels, folder.machine.daq.calibration_interval_months)
     remarks += _aliasing_remarks(folder.machine.daq.anti_alias, device.sample_rate)
     nominal, measured = device.sample_rate, None
     if has_clock(device):
@@ -86,8 +83,7 @@ MASS_CHECK_BASELINE_SECONDS = 0.5
 """Length of the record before the first hit (s)."""
 
 
-@dataclass(frozen=True)
-class MassCheck:
+class MassCheck(NamedTuple):
     """Result of the check with a hung mass, and where to correct a sensitivity."""
 
     calibration: acquisition.MassCalibration
@@ -97,7 +93,7 @@ class MassCheck:
 
 
 def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, tell: Callable[[str], None]) -> MassCheck:
-    """Take good hits on a freely hung mass and compare force with mass times acceleration.
+    """Take as many good hits as a tap test on a freely hung mass and compare force with mass times acceleration.
 
     Parameters
     ----------
@@ -117,18 +113,12 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
     MassCheck
         Calibration, and where to correct a sensitivity.
     """
-    hits = _capture_good_hits(folder, device, tell)
-    return MassCheck(acquisition.calibrate_by_mass(hits, mass), find_sensor_data(folder.machine.daq, port))
-
-
-def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> list[Hit]:
-    """Capture as many good hits as a tap test takes."""
     wanted = folder.machine.tap.hits
     check_device_rate(folder, device)
     tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
     good: list[Hit] = []
     device.start()
-    baseline = find_quiet_part(LiveSignal(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
+    baseline = find_quiet_part(DeviceConnection(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
     for hit in acquisition.capture_hits(device, TrialHits(folder.machine.tap, baseline).trigger):
         verdict = acquisition.evaluate_hit(hit)
         if not verdict.flags:
@@ -138,15 +128,14 @@ def _capture_good_hits(folder: MachineFolder, device: Device, tell: Callable[[st
         if len(good) >= wanted:
             break
     device.stop()
-    return good
+    return MassCheck(acquisition.calibrate_by_mass(good, mass), find_sensor_data(folder.machine.daq, port))
 
 
 SKEW_RECORDING_SECONDS = 2.0
 """Length of the recording of a common signal (s)."""
 
 
-@dataclass(frozen=True)
-class SkewCheck:
+class SkewCheck(NamedTuple):
     """Measured skew of a device, and where to enter it."""
 
     measured: acquisition.MeasuredSkew

@@ -1,7 +1,6 @@
 """Show the tap tests of the demo: true and measured values."""
 
 from collections.abc import Sequence
-from dataclasses import astuple
 from pathlib import Path
 
 from lobewatch.monitoring.threshold_dates import date_of_days
@@ -28,7 +27,7 @@ def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], repor
 
 def _state_json(state: SpindleState) -> JsonObject:
     keys = "frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m"
-    return dict(zip(keys, astuple(state), strict=True))
+    return dict(zip(keys, state, strict=True))
 
 
 def _date_text(days: float | None) -> str | None:
@@ -42,7 +41,7 @@ def demo_texts(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scat
     measured = last.result.relative_to(first.result).stiffness
     true = last.plan.truth.relative_to(first.plan.truth).stiffness
     headings = [word for heading, _, _ in DEMO_COLUMNS for word in (heading, "found")]
-    errors = zip(*(astuple(tap.result.relative_to(tap.plan.truth)) for tap in taps), strict=True)
+    errors = zip(*(tap.result.relative_to(tap.plan.truth) for tap in taps), strict=True)
     worst = (f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(STATE_NAMES, errors, strict=True))
     heading = "Foretold after the last test, and what the emulated spindle does if it goes on so:"
     return [
@@ -62,6 +61,6 @@ def demo_texts(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scat
 
 
 def _demo_cells(tap: DemoTap) -> list[str]:
-    pairs = zip(astuple(tap.plan.truth), astuple(tap.result), DEMO_COLUMNS, strict=True)
+    pairs = zip(tap.plan.truth, tap.result, DEMO_COLUMNS, strict=True)
     values = (f"{value / scale:.{digits}f}" for *pair, (_, scale, digits) in pairs for value in pair)
     return [f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *values]

@@ -7,7 +7,8 @@ from rich.markup import escape
 
 from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPort, explain_no_ports
 from dsm import format_with_error
-from lobewatch.sensors import Finding, MassCheck, SensorList, SkewCheck
+from lobewatch.sensors.computer_check import Finding
+from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 
 NO_ANSWER_TEXT = (

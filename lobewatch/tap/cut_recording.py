@@ -2,7 +2,6 @@
 
 import contextlib
 import enum
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +23,7 @@ from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, open_device
 from lobewatch.tap.live_curves import find_extremes
-from lobewatch.tap.state import StatePublisher
+from lobewatch.tap.state import LiveState, StatePublisher
 
 MAX_CURVE_FREQUENCY = 8000.0
 """Highest frequency of the curves (Hz)."""
@@ -53,11 +52,9 @@ class CutStep(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class CutState:
+class CutState(LiveState):
     """State of a cut recording."""
 
-    revision: int
-    """Number that increases with every change."""
     word: CutStep
     """Step."""
     title: str
@@ -78,11 +75,6 @@ class CutState:
     """Name under which it is saved, empty if it is not or not yet."""
     plots: Mapping[str, Floats] | None = None
     """Curves of the recorded cut, see build_cut_curves."""
-
-
-def get_result_step(comparison: CutComparison) -> CutStep:
-    """Return the step that shows the result of a recorded cut."""
-    return CutStep[comparison.detected.verdict.upper().replace(" ", "_")]
 
 
 def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
@@ -118,7 +110,6 @@ AIR_BEFORE_CUT = 1.0
 SENSOR_CHECK_DELAY = 1.0
 """Time after which the sensor signal is checked (s)."""
 
-BEGIN_CUT_TEXT = "hearing the spindle turn in air; begin the cut"
 SENSOR_ON_HOUSING_TEXT = "The sensor on the housing, the spindle turning in air: now begin the cut."
 CUT_TOO_SHORT_TEXT = "too short for a word, or no air before it; cut again, a second or longer"
 CUT_RUNNING_TEXT = "A second or longer, then out of the cut: it is judged by itself."
@@ -169,12 +160,8 @@ Publish = Callable[..., None]
 """Function called with changed fields of CutState."""
 
 
-def _ignore_state(**_: Any) -> None:
-    """Nobody looks."""
-
-
 def record_cut(
-    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = _ignore_state
+    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
 ) -> CutSignal:
     """Record the next whole cut of a started device, from the air before it to the air after it.
 
@@ -187,7 +174,7 @@ def record_cut(
         raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
     buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
     waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
-    show(BEGIN_CUT_TEXT)
+    show("hearing the spindle turn in air; begin the cut")
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
         has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT
@@ -269,21 +256,19 @@ def acquire_cut(
         return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
 
 
-def check_sensor_kind(sensor: str, file: Path | None) -> str:
-    """Return a kind of sensor. ValueError for an unknown one, and for a microphone at a device."""
+def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
+    """Return the fields of a description that name the sensor and the tachometer.
+
+    ValueError for an unknown kind of sensor, and for a microphone or a tachometer at a device, which has none.
+    """
+    if file is None and (tacho or pulses is not None):
+        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
+        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
     if sensor not in get_args(CutSensor):
         raise ValueError(f"Description.sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
     if sensor == "microphone" and file is None:
         raise ValueError("Description.sensor microphone is for a acquire_cut.file; a device hears by its accelerometer")
-    return sensor
-
-
-def check_tacho_options(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
-    """Return the tachometer fields of a description. ValueError at a device, which has none."""
-    if file is None and (tacho or pulses is not None):
-        given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
-        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
-    return {"tacho": tacho, "pulses": pulses}
+    return {"sensor": sensor, "tacho": tacho, "pulses": pulses}
 
 
 @contextlib.contextmanager
@@ -291,7 +276,7 @@ def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StateP
     """Publish states from the move of the sensor on. An error raised within becomes the last state."""
     cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
     title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
-    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
+    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason))
     try:
         yield publisher
     except (KeyboardInterrupt, OSError, RuntimeError, ValueError) as error:
@@ -307,5 +292,6 @@ def evaluate_live_cut(
     publisher.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
     comparisons = compare_cuts(logbook, setting, signal)
     last = comparisons[-1]
-    publisher.show(word=get_result_step(last), reason="", comparison=last, plots=build_cut_curves(last))
+    word = CutStep[last.detected.verdict.upper().replace(" ", "_")]
+    publisher.show(word=word, reason="", comparison=last, plots=build_cut_curves(last))
     return comparisons

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Iterator
-from dataclasses import astuple, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
@@ -13,7 +11,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from acquisition import UNKNOWN_CONDITIONS, Circumstances, Conditions, DataError, Structure, TapDirection
-from dsm import Spindle
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.machine_forecast import forecast_machine
 from lobewatch.machine import MachineFolder
@@ -21,24 +18,25 @@ from lobewatch.machine.folder_updates import add_event
 from lobewatch.measurement import Measurement
 from lobewatch.monitoring.threshold_dates import ThresholdDates
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
-from lobewatch.tap.device_connection import DeviceConnector
-from lobewatch.tap.emulated_spindle import build_structure, open_synchronized_device
-from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import OperatorRequests, TapPhases
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.emulated_spindle import (
+    MountingVariation,
+    SpindleWear,
+    build_structure,
+    get_spindle_table,
+    open_synchronized_device,
+    remount_spindle,
+)
+from lobewatch.tap.hit_loop import TapPhases
+from lobewatch.tap.state import StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
-from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, remount_spindle
 
-SCATTER_ONLY = MountingVariation()
-"""Variation of tests that differ by their scatter only."""
 TEST_DAY, TEST_HOUR = 15, 9
 """Day of the month, and hour, of the tests of a month."""
 DEMO_DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
 """Directions of the tests of a month, with the minute of the hour at which each is taken."""
 
 
-@dataclass(frozen=True)
-class SpindleState:
+class SpindleState(NamedTuple):
     """Spindle in four numbers."""
 
     frequency: float
@@ -52,11 +50,10 @@ class SpindleState:
 
     def relative_to(self, reference: SpindleState) -> SpindleState:
         """Return the relative differences from a reference (-)."""
-        return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
+        return SpindleState(*(value / base - 1 for value, base in zip(self, reference, strict=True)))
 
 
-@dataclass(frozen=True)
-class PlannedTap:
+class PlannedTap(NamedTuple):
     """Tap test of the demo before it is taken."""
 
     date: datetime
@@ -71,18 +68,11 @@ class PlannedTap:
     """Conditions of the test."""
 
 
-@dataclass(frozen=True)
-class TakenTap:
-    """Committed tap test of the demo."""
-
-    plan: PlannedTap
-    """Test as planned, with its truth."""
-    id: str
-    """Id in the journal."""
+TakenTap = tuple[PlannedTap, str]
+"""Test as planned, with its truth, and the id of the stored tap test."""
 
 
-@dataclass(frozen=True)
-class DemoTap:
+class DemoTap(NamedTuple):
     """Tap test of the demo with its result."""
 
     plan: PlannedTap
@@ -92,23 +82,16 @@ class DemoTap:
 
 
 def plan_taps(
-    folder: MachineFolder,
-    months: int,
-    random: np.random.Generator,
-    scatter: float,
-    story: WearScenario = WearScenario.STEADY,
-    mounting: MountingVariation = SCATTER_ONLY,
-    now: datetime | None = None,
+    folder: MachineFolder, wear: SpindleWear, random: np.random.Generator, mounting: MountingVariation, now: datetime
 ) -> list[PlannedTap]:
     """Plan tap tests in x and y every month of a scenario up to now. The tool is reclamped before each test.
 
-    scatter: relative standard deviation of f1 from test to test (-), replaces that of `mounting`. Each test has
-    bearings whose stiffness gives the f1 after reclamping. now: the last two tests are those of its month, or of the
-    month before if that day is still to come, None for the clock's. DataError without [spindle].
+    Each test has bearings whose stiffness gives the f1 after reclamping. now: the last two tests are those of its
+    month, or of the month before if that day is still to come.
     """
-    wear, mounting = SpindleWear.of(folder, months, story), mounting._replace(scatter=scatter)
+    months, damping_ratio = wear.months, get_spindle_table(folder).damping_ratio
     shifts, warmth = mounting.shifts(months, len(DEMO_DIRECTIONS), random), mounting.temperatures(months)
-    last = _find_last_month(now or datetime.now(UTC))
+    last = _find_last_month(now)
     plans = []
     for month in range(months):
         year, index = divmod(last - months + 1 + month, 12)
@@ -116,7 +99,10 @@ def plan_taps(
         under = UNKNOWN_CONDITIONS if warmth is None else Conditions(temperature_c=round(float(warmth[month]), 1))
         for (direction, minute), shift in zip(DEMO_DIRECTIONS.items(), shifts[month].tolist(), strict=True):
             date = datetime(year, index + 1, TEST_DAY, TEST_HOUR, minute, tzinfo=UTC)
-            plans.append(_plan_tap(folder, date, direction, remount_spindle(spindle, shift), under))
+            mounted = remount_spindle(spindle, shift)
+            structure = build_structure(mounted, damping_ratio)
+            truth = structure.frequency[0], damping_ratio, structure.stiffness[0], mounted.bearings[0].stiffness
+            plans.append(PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under))
     return plans
 
 
@@ -128,23 +114,15 @@ def _find_last_month(now: datetime) -> int:
 
 
 def age_spindle(
-    folder: MachineFolder,
-    months: int,
-    seed: int,
-    scatter: float,
-    story: WearScenario = WearScenario.STEADY,
-    mounting: MountingVariation = SCATTER_ONLY,
-    *,
-    tcp: bool = False,
+    folder: MachineFolder, wear: SpindleWear, seed: int, mounting: MountingVariation, *, tcp: bool = False
 ) -> Iterator[TakenTap]:
     """Take the tap tests of `plan_taps`, each through a real port: a pseudo-terminal, or TCP on loopback."""
     random = np.random.default_rng(seed)
-    plans = plan_taps(folder, months, random, scatter, story, mounting)
-    replaced = SpindleWear.of(folder, months, story).replaced_at
+    plans = plan_taps(folder, wear, random, mounting, datetime.now(UTC))
     for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
-        if replaced is not None and number == len(DEMO_DIRECTIONS) * replaced:
+        if wear.replaced_at is not None and number == len(DEMO_DIRECTIONS) * wear.replaced_at:
             add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)
-        yield TakenTap(plan, _run_tap(folder, plan, hammering, tcp))
+        yield plan, _run_tap(folder, plan, hammering, tcp)
 
 
 def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
@@ -152,16 +130,7 @@ def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[Demo
 
     The history is computed once, after the last test, and not after every one with a verdict on every program.
     """
-    return [DemoTap(tap.plan, _get_measured_state(logbook.measurement(tap.id))) for tap in taken]
-
-
-def _plan_tap(
-    folder: MachineFolder, date: datetime, direction: TapDirection, spindle: Spindle, under: Conditions
-) -> PlannedTap:
-    damping = folder.machine.spindle.damping_ratio if folder.machine.spindle else 0.0
-    structure = build_structure(spindle, damping)
-    truth = (structure.frequency[0], damping, structure.stiffness[0], spindle.bearings[0].stiffness)
-    return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under)
+    return [DemoTap(plan, _get_measured_state(logbook.measurement(tap_id))) for plan, tap_id in taken]
 
 
 def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator, tcp: bool) -> str:
@@ -169,17 +138,16 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
     machine, toml = folder.machine, folder.toml_text
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
-    publisher = TapPublisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    publisher = StatePublisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits))
     with (
         open_synchronized_device(plan.structure, random, tcp=tcp) as open_device,
         threadpool_limits(limits=1),
         folder.locked(),
     ):
-        hits = EvaluatedHits(begin_tap(folder, about, resume=False), machine)
-        connector = DeviceConnector(folder, open_device, publisher, time.sleep)
-        TapPhases(folder, hits, publisher, OperatorRequests(), guided=False).run(connector)
-        folder.commit(hits.tap.finish())
-    return hits.tap.id
+        tap = begin_tap(folder, about, resume=False)
+        TapPhases(folder, open_device, publisher, guided=False).run(tap)
+        folder.commit(tap.finish())
+    return tap.id
 
 
 def _get_measured_state(measurement: Measurement) -> SpindleState:

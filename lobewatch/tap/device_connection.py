@@ -1,7 +1,7 @@
-"""Open, watch and reconnect the device of a live test."""
+"""Open and watch the device of a live test."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -9,14 +9,9 @@ import acquisition
 from acquisition import Block, Device, DeviceError, Hit, find_driver, find_usb_identity
 from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
-from acquisition.devices import convert_driver_errors
+from acquisition.devices.registry import convert_driver_errors
 from acquisition.hit import TapInputs
-from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
-from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.setup_tables import DaqTable
-from lobewatch.tap.evaluated_hits import TapPublisher
-from lobewatch.tap.state import Check, TapStep
-from lobewatch.tap.tap_in_progress import TapInProgress
 
 REPLAY_PREFIX = "file:"
 """Prefix of a port that is a recording, whatever the driver."""
@@ -92,153 +87,61 @@ def collect_codes(blocks: Iterable[Block], count: float) -> tuple[Codes, int]:
     return np.concatenate(codes, axis=1), lost
 
 
-class LiveSignal:
-    """Newest samples of force and acceleration, or of the acceleration only."""
-
-    def __init__(self, source: acquisition.Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
-        """Select the inputs. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
-        self.inputs = TapInputs.select(source.channels, quantity, direction)
-        """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
-        self._rate = source.sample_rate
-        self._recent: deque[Codes] = deque(maxlen=64)
-
-    @property
-    def levels(self) -> tuple[float | None, float]:
-        """RMS about the mean of force (N, None if not measured) and acceleration (m/s^2) over LEVEL_WINDOW."""
-        steps = np.std(get_newest_codes(self._recent, self._rate)[list(self.inputs.rows)], axis=1)
-        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
-        return rms[0] if len(rms) > 1 else None, rms[-1]
-
-    def add(self, block: Block) -> None:
-        self._recent.append(block.codes)
-
-    def record(self, blocks: Iterable[Block], duration: float) -> Hit:
-        """Return the next blocks of this duration (s) as one record."""
-        codes, lost = collect_codes(blocks, duration * self._rate)
-        return self.inputs.make_hit(codes[list(self.inputs.rows)], self._rate, lost_scans=lost)
-
-
 def estimate_resting_rms(baseline: Hit, width: int) -> float:
     """Return the median rms of the acceleration at rest over windows of `width` samples (m/s^2)."""
     pieces = baseline.acceleration[: max(baseline.acceleration.size // width, 1) * width]
     return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))
 
 
-RECONNECT_INTERVAL = 0.5
-"""Time between two attempts to find the device again (s)."""
 BUTTON_BOUNCE_TIME = 0.3
 """Time after a button event in which further presses are bouncing (s)."""
 
 
-class Button:
-    """Button of a device that takes back the last good hit.
-
-    The clock of the device separates presses from bouncing: waiting events arrive all at once.
-    """
-
-    def __init__(self, sample_rate: float) -> None:
-        """Set the rate of the scans that time the events (Hz)."""
-        self._bounce = BUTTON_BOUNCE_TIME * sample_rate
-        self._moved: int | None = None
-
-    def count_presses(self, events: deque[acquisition.Event]) -> int:
-        """Take all waiting events and count the presses in them."""
-        count = 0
-        while events:
-            event = events.popleft()
-            if event.kind == acquisition.EventKind.BUTTON:
-                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
-                self._moved = event.scan
-        return count
-
-
 class DeviceConnection:
-    """Opened device: its scans, button and faults."""
+    """Opened device: its newest samples, button and faults."""
 
     def __init__(self, device: Device, quantity: ChannelQuantity = "force", direction: str = "") -> None:
-        """Wrap a device. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
-        self._device = device
-        self.direction = direction
-        """Direction that is tapped. It selects one of several accelerations."""
-        self.signal = LiveSignal(device, quantity, direction)
-        """Newest samples."""
-        self.channels, self.sample_rate = device.channels, device.sample_rate
-        """All channels of the device, and its sample rate (Hz)."""
-        self._button, self._fault = Button(device.sample_rate), ""
+        """Select the inputs. quantity: that triggers. direction: that is tapped. DataError as `TapInputs.of`."""
+        self.device, self.direction = device, direction
+        """Device, and direction that is tapped. It selects one of several accelerations."""
+        self.inputs = TapInputs.select(device.channels, quantity, direction)
+        """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
+        self._recent: deque[Codes] = deque(maxlen=64)
+        self._moved: int | None = None
+        self._fault = ""
 
-    def start(self) -> None:
-        """Start the stream. Earlier button presses do not count."""
-        self._device.start()
-        self._device.events.clear()
+    @property
+    def levels(self) -> tuple[float | None, float]:
+        """RMS about the mean of force (N, None if not measured) and acceleration (m/s^2) over LEVEL_WINDOW."""
+        steps = np.std(get_newest_codes(self._recent, self.device.sample_rate)[list(self.inputs.rows)], axis=1)
+        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
+        return rms[0] if len(rms) > 1 else None, rms[-1]
+
+    def record(self, blocks: Iterable[Block], duration: float) -> Hit:
+        """Return the next blocks of this duration (s) as one record."""
+        codes, lost = collect_codes(blocks, duration * self.device.sample_rate)
+        return self.inputs.make_hit(codes[list(self.inputs.rows)], self.device.sample_rate, lost_scans=lost)
 
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks that the device sends from now on."""
-        for block in self._device.blocks():
-            self.signal.add(block)
+        for block in self.device.blocks():
+            self._recent.append(block.codes)
             yield block
 
     def count_presses(self) -> int:
-        """Count button presses since the last call."""
-        return self._button.count_presses(self._device.events)
+        """Count button presses since the last call, each of which takes back the last good hit.
+
+        The clock of the device separates presses from bouncing: waiting events arrive all at once.
+        """
+        count, bounce = 0, BUTTON_BOUNCE_TIME * self.device.sample_rate
+        while self.device.events:
+            event = self.device.events.popleft()
+            if event.kind == acquisition.EventKind.BUTTON:
+                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= bounce)
+                self._moved = event.scan
+        return count
 
     def poll_fault_text(self) -> str:
         """Return a sentence when a sensor fault appears or disappears, once. Empty if nothing changed."""
-        before, self._fault = self._fault, self._device.fault
+        before, self._fault = self._fault, self.device.fault
         return "" if self._fault == before else self._fault or "The sensor is connected again."
-
-    def close(self) -> None:
-        self._device.close()
-
-
-class DeviceConnector:
-    """Opener of the device of a test, which reconnects it when needed."""
-
-    def __init__(
-        self,
-        folder: MachineFolder,
-        open_device: Callable[[], Device],
-        publisher: TapPublisher,
-        sleep: Callable[[float], None],
-    ) -> None:
-        self._folder, self._open_device, self._publisher, self._sleep = folder, open_device, publisher, sleep
-
-    def connect(self, tap: TapInProgress) -> DeviceConnection:
-        """Open and start a device that fits the hits of a test.
-
-        Raises DeviceError if there is none, ValueError if its set-up differs from that of earlier hits.
-        """
-        device = self._open_device()
-        try:
-            self._check_rate(device)
-            connection = DeviceConnection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
-            tap.accept_device(device.sample_rate, connection.signal.inputs.channels, describe_device(device))
-            connection.start()
-        except BaseException:
-            device.close()
-            raise
-        self._publisher.show(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
-        return connection
-
-    def reconnect(self, error: DeviceError, tap: TapInProgress, serve: Callable[[], None]) -> DeviceConnection:
-        """Wait for the device as long as needed. `serve` is called meanwhile."""
-        while True:
-            reason = f"{error.text}; plug it in: the test goes on at this hit"
-            self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
-            self._sleep(RECONNECT_INTERVAL)
-            serve()
-            try:
-                connection = self.connect(tap)
-            except DeviceError as again:
-                error = again
-            else:
-                self._publisher.show(word=TapStep.WAIT, reason="")
-                return connection
-
-    def _check_rate(self, device: Device) -> None:
-        """Measure the sample rate of a device that this machine does not know yet."""
-        if has_clock(device) and find_stored_rate(self._folder, device) is None:
-            self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
-        remarks = list[acquisition.Remark]()
-        check_device_rate(self._folder, device, remarks=remarks)
-        if remarks:
-            self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))

@@ -4,7 +4,7 @@ Spindle and cut differ from the tapped machine and from machine.toml by a hidden
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +18,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.emulated_spindle import build_structure, emulate_device, get_spindle_table, map_signal_to_inputs
-from lobewatch.verdicts.program_samples import (
-    ROTATING_DAMPING_FACTOR,
-    ROTATING_FREQUENCY_FACTOR,
-    ROTATING_STIFFNESS_FACTOR,
-)
+from lobewatch.verdicts import program_samples as rotating
 from modal import Mode
 
 DEFAULT_PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
@@ -82,8 +78,7 @@ class HiddenTruth(NamedTuple):
         return modes | {"tangential": self.tangential, "speed": self.speed}
 
 
-@dataclass(frozen=True)
-class EmulatedCut:
+class EmulatedCut(NamedTuple):
     """Emulated device and its hidden truth."""
 
     device: EmulatorThread
@@ -102,45 +97,39 @@ def emulate_cut(
     setting: CutSetting,
     seed: int = 1,
     *,
-    realtime: bool = True,
-    tcp: bool = False,
     spindle: Spindle | None = None,
     passage: Passage = DEFAULT_PASSAGE,
+    **serving: bool,
 ) -> EmulatedCut:
     """Emulate a cut that repeats, with the accelerometer on the housing and an idle hammer.
 
     Truth, run-out and housing depend on the seed only, not on the cut. A program fed along both axes is fed along x.
-    spindle: replaces the model of the tool. DataError if machine.toml has no model of it, or lacks the sensors of a
-    device that does not describe them itself.
+    spindle: replaces the model of the tool. serving: as of `emulate_device`. DataError if machine.toml has no model of
+    it, or lacks the sensors of a device that does not describe them itself.
     """
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
     cut = _build_true_cut(folder, setting, _select_tip_modes(folder, setting, spindle), truth, runout)
     motion = emulation.simulate_cut(cut, passage)
-    housing = _normalize_gain(emulation.make_random_housing(random, cut.speed_rpm))
+    housing = emulation.make_random_housing(random, cut.speed_rpm)
+    largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))  # chatter: no overload
+    housing = replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
 
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         return map_signal_to_inputs(inputs, emulation.HousingSignal(motion, housing, cut.speed_rpm, rate, noise))
 
-    device = emulate_device(folder, driver, signal_of, realtime=realtime, tcp=tcp)
+    device = emulate_device(folder, driver, signal_of, **serving)
     return EmulatedCut(device, truth, cut.speed_rpm, _find_true_limit(cut, setting))
 
 
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Return the modes of the tip that a cut moves."""
-    damping_ratio = get_spindle_table(folder).damping_ratio
-    structure = build_structure(spindle or folder.machine.model(setting.tool), damping_ratio)
+    structure = build_structure(spindle or folder.machine.model(setting.tool), get_spindle_table(folder).damping_ratio)
     softest = int(np.argmin(structure.stiffness))
     is_moved = structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]
     is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY
     is_moved[softest] = True
     return Structure(structure.frequency[is_moved], structure.damping_ratio[is_moved], structure.stiffness[is_moved])
-
-
-def _normalize_gain(housing: emulation.Housing) -> emulation.Housing:
-    """Return the housing with its gain limited to that away from its modes, so that chatter causes no overload."""
-    largest_gain = float(np.max(np.abs(housing.transfer(HOUSING_GAIN_FREQUENCIES))))
-    return replace(housing, gain=(housing.gain[0] / largest_gain, housing.gain[1] / largest_gain))
 
 
 def _build_true_cut(
@@ -150,10 +139,9 @@ def _build_true_cut(
     edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
     tangential_edge, radial_edge = np.where(np.isfinite(edges), edges, DEFAULT_EDGE_COEFFICIENTS).tolist()
     feed = setting.table.feed_per_tooth_mm or DEFAULT_FEED_SHARE * setting.table.tool_diameter_mm
+    unchanged = ("teeth", "entry_angle", "exit_angle", "helix_lag", "pitch")
     return MillingCut(
-        teeth=cut.teeth,
-        entry_angle=cut.entry_angle,
-        exit_angle=cut.exit_angle,
+        **{name: getattr(cut, name) for name in unchanged},
         tangential=cut.tangential * truth.tangential,
         radial=cut.radial * truth.tangential,
         tangential_edge=tangential_edge,
@@ -164,8 +152,6 @@ def _build_true_cut(
         x=truth.x.apply_to(at_rest),
         y=truth.y.apply_to(at_rest),
         runout=runout,
-        helix_lag=cut.helix_lag,
-        pitch=cut.pitch,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )
 
@@ -181,7 +167,7 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
-    priors = ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR
+    priors = rotating.ROTATING_FREQUENCY_FACTOR, rotating.ROTATING_DAMPING_FACTOR, rotating.ROTATING_STIFFNESS_FACTOR
     x, y = (ModeFactors(*(_draw_factor(random, *prior) for prior in priors)) for _ in range(2))
     tangential = _draw_factor(random, *ROTATING_FORCE_PRIOR)
     return HiddenTruth(x, y, tangential, 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION))

@@ -2,18 +2,19 @@
 
 import shutil
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from acquisition import Block, DataError, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Trigger
+from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Remark, Trigger
+from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, DeviceConnector, estimate_resting_rms
-from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
+from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, describe_device, estimate_resting_rms
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
-from lobewatch.tap.state import Check, TapStep
-from lobewatch.tap.tap_in_progress import evaluate_safely
+from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
+from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
@@ -27,166 +28,110 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
     """Raised when the operator ends the test early. The hits stay stored, and the next test resumes with them."""
 
 
-@dataclass(frozen=True)
-class OperatorRequests:
-    """Requests to undo or stop, made by any thread and handled by that of the test."""
-
-    undos: threading.Semaphore = field(default_factory=lambda: threading.Semaphore(0))
-    """Number of times that the last good hit is to be taken back."""
-    stopping: threading.Event = field(default_factory=threading.Event)
-    """Event that is set when the test is to end."""
-
-
-class HitLoop:
-    """Loop that captures, evaluates and shows hits, and handles requests between two blocks."""
-
-    def __init__(
-        self, hits: EvaluatedHits, publisher: TapPublisher, requests: OperatorRequests, *, guided: bool
-    ) -> None:
-        """Set up the loop. guided False omits the curves and the time to take back the last hit."""
-        self._hits, self._publisher, self._requests, self._guided = hits, publisher, requests, guided
-        self._verdict, self._scan_count = TapStep.TAP, 0
-        self._verdict_at: int | None = None
-
-    def blocks(self, connection: DeviceConnection) -> Iterator[Block]:
-        """Yield the blocks of the device. Handle requests and show levels in between."""
-        for block in connection.blocks():
-            self._scan_count += block.codes.shape[1]
-            for _ in range(connection.count_presses()):
-                self._undo(" by the button")
-            self.handle_requests()
-            if fault_text := connection.poll_fault_text():
-                self._publisher.show(reason=fault_text)
-            yield block
-            if self._publisher.age >= LEVEL_WINDOW:
-                self._publisher.show(levels=connection.signal.levels)
-        if self._hits.missing:
-            raise DataError(f"the samples have ended with {self._hits.progress}; record more of them")
-
-    def handle_requests(self) -> None:
-        """Do what other threads have requested. TapStopped if that ends the test."""
-        if self._requests.stopping.is_set():
-            raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
-        while self._requests.undos.acquire(blocking=False):
-            self._undo()
-
-    def hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
-        """Yield hits as they come, and None after every block. The shown step follows the trigger."""
-        search = HitSearch(connection.channels, connection.sample_rate, trigger, connection.direction)
-        n_early = 0
-        for block in self.blocks(connection):
-            yield from search.feed(block)
-            yield None
-            if search.too_early > n_early:
-                n_early = search.too_early
-                self._publisher.show(reason=EARLY_HIT_TEXT)
-            self._show_trigger_step(search, connection.sample_rate)
-
-    def take_hits(self, connection: DeviceConnection, trigger: Trigger) -> None:
-        """Take hits until enough are good and the time to take back the last one has passed."""
-        undo_time = LAST_HIT_UNDO_TIME if self._guided else 0.0
-        for hit in self.hits(connection, trigger):
-            if self._hits.missing and hit is not None:
-                self._take(hit)
-            elif not self._hits.missing and self._verdict_age(connection.sample_rate) >= undo_time:
-                return
-
-    def show_verdict(self, flags: HitFlags, reason: str, *, trial: bool = False) -> None:
-        """Show the verdict on a hit."""
-        self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._scan_count
-        self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
-
-    def show_curves(self, hit: Hit) -> None:
-        """Show the curves of a hit and of the mean, none if they cannot be computed."""
-        if not self._guided:
-            return
-        try:
-            plots = build_curves(hit, self._hits.mean)
-        except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without them
-            plots = None
-        self._publisher.show(plots=plots)
-
-    def _verdict_age(self, sample_rate: float) -> float:
-        """Return how long the verdict has been shown (s), inf if none is."""
-        return float("inf") if self._verdict_at is None else (self._scan_count - self._verdict_at) / sample_rate
-
-    def _show_trigger_step(self, search: HitSearch, sample_rate: float) -> None:
-        """Show the step that matches the trigger."""
-        word = TapStep.TAP if search.armed else TapStep.WAIT
-        is_fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._hits.missing
-        if self._verdict_at is not None and is_fresh and not search.recording:
-            word = self._verdict
-        if word != self._publisher.state.word:
-            self._publisher.show(word=word)
-
-    def _take(self, hit: Hit) -> None:
-        """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
-        verdict = self._hits.evaluate(hit)
-        self.show_verdict(verdict.flags, verdict.text)
-        self._hits.tap.add(hit, verdict.flags, verdict.text)
-        self._publisher.show_hits(self._hits)
-        self.show_curves(hit)
-        if not verdict.flags and (outlier := self._hits.recheck_first_hits()) is not None:
-            number, now = outlier
-            reason = f"Hit {number + 1} does not fit the others and counts no more. {now.text}"
-            self._show_taken_out(now.flags, reason)
-
-    def _undo(self, means: str = "") -> None:
-        if (number := self._hits.undo()) is not None:
-            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
-
-    def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
-        """Show that a good hit no longer counts. The word GOOD must disappear."""
-        self._verdict_at = None
-        word = self._publisher.state.word
-        word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
-        self._publisher.show_hits(self._hits, word=word, verdict=flags.words, trial=False, reason=reason)
-        self.show_curves(self._hits.tap.hits[-1])
-
-
 SELF_CHECK_DURATION = 1.0
 """Length of the record of the self-check (s)."""
+RECONNECT_INTERVAL = 0.5
+"""Time between two attempts to find the device again (s)."""
 
 
 class TapPhases:
-    """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away."""
+    """Phases of a live test: self-check, trial hits, counted hits. Each resumes where the device went away.
+
+    Hits are captured, evaluated and shown, and requests are handled, between two blocks of the device.
+    """
 
     def __init__(
-        self, folder: MachineFolder, hits: EvaluatedHits, publisher: TapPublisher, asked: OperatorRequests, guided: bool
+        self,
+        folder: MachineFolder,
+        open_device: Callable[[], Device],
+        publisher: StatePublisher[TapState],
+        *,
+        guided: bool,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Set up the phases. guided False omits re-arming by decay, and the self-check if no trial hits need it."""
-        self._folder, self._hits, self._publisher, self._tap, self._guided = folder, hits, publisher, hits.tap, guided
-        self._loop = HitLoop(hits, publisher, asked, guided=guided)
-        self._trial: TrialHits | None = None
+        """Set up the phases.
 
-    def run(self, connector: DeviceConnector) -> None:
+        guided False omits the curves, the time to take back the last hit, re-arming by decay, and the self-check if no
+        trial hits need it.
+        """
+        self._folder, self._open_device, self._publisher = folder, open_device, publisher
+        self._guided, self._sleep = guided, sleep
+        self.undos, self.stopping = threading.Semaphore(0), threading.Event()
+        """Requests of any thread to take back the last good hit, each once, and to end the test."""
+        self._trial: TrialHits | None = None
+        self._verdict, self._scan_count = TapStep.TAP, 0
+        self._verdict_at: int | None = None
+
+    def run(self, tap: TapInProgress) -> None:
         """Run all phases, reconnecting as often as needed. DeviceError if the first connection fails."""
-        connection = connector.connect(self._tap)
+        self._tap = tap
+        connection = self._connect()
         while True:
             try:
-                with closing(connection):
+                with closing(connection.device):
                     self._check(connection)
                     self._try(connection)
-                    self._take(connection)
+                    self._take_hits(connection)
                 return
             except DeviceError as error:
-                if not self._hits.missing:
+                if not self._tap.missing:
                     return
-                connection = connector.reconnect(error, self._tap, self._loop.handle_requests)
+                connection = self._reconnect(error)
+
+    def _connect(self) -> DeviceConnection:
+        """Open and start a device that fits the hits so far. Earlier button presses do not count.
+
+        Raises DeviceError if there is none, ValueError if its set-up differs from that of earlier hits.
+        """
+        device, tap = self._open_device(), self._tap
+        try:
+            self._check_rate(device)
+            connection = DeviceConnection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
+            tap.accept_device(device.sample_rate, connection.inputs.channels, describe_device(device))
+            device.start()
+            device.events.clear()
+        except BaseException:
+            device.close()
+            raise
+        self._publisher.show(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        return connection
+
+    def _reconnect(self, error: DeviceError) -> DeviceConnection:
+        """Wait for the device as long as needed."""
+        while True:
+            reason = f"{error.text}; plug it in: the test goes on at this hit"
+            self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
+            self._sleep(RECONNECT_INTERVAL)
+            self._handle_requests()
+            try:
+                connection = self._connect()
+            except DeviceError as again:
+                error = again
+            else:
+                self._publisher.show(word=TapStep.WAIT, reason="")
+                return connection
+
+    def _check_rate(self, device: Device) -> None:
+        """Measure the sample rate of a device that this machine does not know yet."""
+        if has_clock(device) and find_stored_rate(self._folder, device) is None:
+            self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
+        remarks = list[Remark]()
+        check_device_rate(self._folder, device, remarks=remarks)
+        if remarks:
+            self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))
 
     def _check(self, connection: DeviceConnection) -> None:
         """Run the self-check, once per session."""
         machine = self._folder.machine
-        trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.sample_rate)
+        trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.device.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
         self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
-        signal, months = connection.signal, machine.daq.calibration_interval_months
-        baseline = find_quiet_part(signal.record(self._loop.blocks(connection), SELF_CHECK_DURATION))
+        baseline = find_quiet_part(connection.record(self._blocks(connection), SELF_CHECK_DURATION))
         self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
         checks = [*self._publisher.state.checks]
         checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
-        checks.append(check_calibration(signal.inputs.channels, months))
+        checks.append(check_calibration(connection.inputs.channels, machine.daq.calibration_interval_months))
         if not baseline.has_force:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
@@ -195,7 +140,7 @@ class TapPhases:
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
         tap, setup = self._tap, self._folder.machine.tap
-        tap.trigger = tap.trigger or trigger_from_setup(setup, connection.sample_rate)
+        tap.trigger = tap.trigger or trigger_from_setup(setup, connection.device.sample_rate)
         if tap.trigger is not None or tap.baseline is None:
             return
         self._trial = trial = self._trial or TrialHits(setup, tap.baseline)
@@ -210,23 +155,113 @@ class TapPhases:
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
-        hit = next(filter(None, self._loop.hits(connection, self._at_rest(trial.trigger))))
+        hit = next(filter(None, self._hits(connection, self._at_rest(trial.trigger))))
         verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
-        self._loop.show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
-        self._loop.show_curves(hit)
+        self._show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
+        self._show_curves(hit)
         return not verdict.flags
 
-    def _take(self, connection: DeviceConnection) -> None:
-        trigger = self._tap.trigger
-        if trigger is None or any(hit.acceleration.size != trigger.n_samples for hit in self._tap.hits):
-            raise self._tap.make_setup_error()
-        self._loop.take_hits(connection, self._at_rest(trigger))
+    def _take_hits(self, connection: DeviceConnection) -> None:
+        """Take hits until enough are good and the time to take back the last one has passed."""
+        tap, undo_time = self._tap, LAST_HIT_UNDO_TIME if self._guided else 0.0
+        if tap.trigger is None or any(hit.acceleration.size != tap.trigger.n_samples for hit in tap.hits):
+            raise tap.make_setup_error()
+        for hit in self._hits(connection, self._at_rest(tap.trigger)):
+            if tap.missing and hit is not None:
+                self._take(hit)
+            elif not tap.missing and self._verdict_age(connection.device.sample_rate) >= undo_time:
+                return
 
     def _at_rest(self, trigger: Trigger) -> Trigger:
         """Return a trigger that is armed only at rest, if a person taps by hand."""
         if not self._guided or self._tap.baseline is None:
             return trigger
         return replace(trigger, rest_rms=estimate_resting_rms(self._tap.baseline, trigger.pre_trigger))
+
+    def _blocks(self, connection: DeviceConnection) -> Iterator[Block]:
+        """Yield the blocks of the device. Handle requests and show levels in between."""
+        for block in connection.blocks():
+            self._scan_count += block.codes.shape[1]
+            for _ in range(connection.count_presses()):
+                self._undo(" by the button")
+            self._handle_requests()
+            if fault_text := connection.poll_fault_text():
+                self._publisher.show(reason=fault_text)
+            yield block
+            if self._publisher.age >= LEVEL_WINDOW:
+                self._publisher.show(levels=connection.levels)
+        if self._tap.missing:
+            raise DataError(f"the samples have ended with {self._tap.progress}; record more of them")
+
+    def _handle_requests(self) -> None:
+        """Do what other threads have requested. TapStopped if that ends the test."""
+        if self.stopping.is_set():
+            raise TapStopped(f"stopped with {self._tap.good} good hits; the same command goes on with them")
+        while self.undos.acquire(blocking=False):
+            self._undo()
+
+    def _hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
+        """Yield hits as they come, and None after every block. The shown step follows the trigger."""
+        search = HitSearch(connection.device.channels, connection.device.sample_rate, trigger, connection.direction)
+        n_early = 0
+        for block in self._blocks(connection):
+            yield from search.feed(block)
+            yield None
+            if search.too_early > n_early:
+                n_early = search.too_early
+                self._publisher.show(reason=EARLY_HIT_TEXT)
+            self._show_trigger_step(search, connection.device.sample_rate)
+
+    def _show_verdict(self, flags: HitFlags, reason: str, *, trial: bool = False) -> None:
+        """Show the verdict on a hit."""
+        self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._scan_count
+        self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
+
+    def _show_curves(self, hit: Hit) -> None:
+        """Show the curves of a hit and of the mean, none if they cannot be computed."""
+        if not self._guided:
+            return
+        try:
+            plots = build_curves(hit, self._tap.mean)
+        except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without them
+            plots = None
+        self._publisher.show(plots=plots)
+
+    def _verdict_age(self, sample_rate: float) -> float:
+        """Return how long the verdict has been shown (s), inf if none is."""
+        return float("inf") if self._verdict_at is None else (self._scan_count - self._verdict_at) / sample_rate
+
+    def _show_trigger_step(self, search: HitSearch, sample_rate: float) -> None:
+        """Show the step that matches the trigger."""
+        word = TapStep.TAP if search.armed else TapStep.WAIT
+        is_fresh = self._verdict_age(sample_rate) < MIN_VERDICT_TIME or not self._tap.missing
+        if self._verdict_at is not None and is_fresh and not search.recording:
+            word = self._verdict
+        if word != self._publisher.state.word:
+            self._publisher.show(word=word)
+
+    def _take(self, hit: Hit) -> None:
+        """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
+        verdict = self._tap.evaluate(hit)
+        self._show_verdict(verdict.flags, verdict.text)
+        self._tap.add(hit, verdict.flags, verdict.text)
+        self._publisher.show(**self._tap.shown)
+        self._show_curves(hit)
+        if not verdict.flags and (outlier := self._tap.recheck_first_hits()) is not None:
+            number, now = outlier
+            self._show_taken_out(now.flags, f"Hit {number + 1} does not fit the others and counts no more. {now.text}")
+
+    def _undo(self, means: str = "") -> None:
+        if (number := self._tap.undo()) is not None:
+            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
+
+    def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
+        """Show that a good hit no longer counts. The word GOOD must disappear."""
+        self._verdict_at = None
+        word = self._publisher.state.word
+        word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
+        self._publisher.show(**self._tap.shown, word=word, verdict=flags.words, trial=False, reason=reason)
+        self._show_curves(self._tap.hits[-1])
 
 
 def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:

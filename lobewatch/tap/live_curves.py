@@ -1,15 +1,13 @@
 """Curves of the last hit and of the mean, reduced for display."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Hit, RunningMean, compute_cross_spectra, extract_free_decay
 from acquisition.estimation.estimate_frf import estimate_frf_from_spectra
 from acquisition.hits.pulse import find_pulse
-from lobewatch.arrays import Integers
+from lobewatch.arrays import Floats, Integers
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import LiveCurves
 from modal import decay_spectra
@@ -57,8 +55,7 @@ def _build_decay_curves(hit: Hit) -> LiveCurves:
     low, high = np.searchsorted(spectrum.frequency, limits)
     size *= DECAY_PEAK_RECEPTANCE / np.max(size[low:high])
     lines = low + find_extremes([size[low:]], int(high - low))
-    frequency = spectrum.frequency[lines]
-    return LiveCurves(hit.time[shown], None, hit.acceleration[shown], frequency, last=size[lines])
+    return LiveCurves(hit.time[shown], None, hit.acceleration[shown], spectrum.frequency[lines], last=size[lines])
 
 
 def _select_samples(hit: Hit) -> Integers:
@@ -72,7 +69,7 @@ def _select_samples(hit: Hit) -> Integers:
     return np.union1d(kept, around[:: around.size // CURVE_BINS + 1])
 
 
-def find_extremes(curves: Sequence[NDArray[Any]], end: int) -> Integers:
+def find_extremes(curves: Sequence[Floats], end: int) -> Integers:
     """Return increasing indices below `end` at which a curve is highest or lowest in its bin."""
     width = max(-(-end // CURVE_BINS), 1)
     if width == 1 or not curves:

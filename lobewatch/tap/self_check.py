@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from datetime import UTC, date, datetime
+from datetime import UTC, datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
+from acquisition.arrays import Codes
 from dsm import format_rounded, natural_frequencies
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
@@ -48,8 +48,7 @@ def find_quiet_part(record: Hit) -> Hit:
     count = record.acceleration.size // size
     if count < 2:
         return record
-    signals = record.signals[:, : count * size].reshape(-1, count, size)
-    rms = np.std(signals, axis=2)
+    rms = np.std(record.signals[:, : count * size].reshape(-1, count, size), axis=2)
     floor = np.quantile(rms, 0.2, axis=1, keepdims=True)
     quiet = np.concatenate(([0], np.all(rms <= QUIET_RMS_FACTOR * floor, axis=0).astype(np.int8), [0]))
     starts, ends = np.flatnonzero(np.diff(quiet) == 1), np.flatnonzero(np.diff(quiet) == -1)
@@ -79,13 +78,13 @@ def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple
 
 def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
     """Check sensitivities and calibration dates."""
-    remarks = sensor_remarks(channels, datetime.now(UTC).date(), interval_months)
+    remarks = sensor_remarks(channels, interval_months)
     return Check("calibration", not remarks, "; ".join(map(str, remarks)) or "dates known and not too old")
 
 
-def sensor_remarks(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
+def sensor_remarks(channels: Sequence[Channel], interval_months: float) -> list[Remark]:
     """Return remarks on implausible sensitivities and ranges and on old, unknown or impossible calibrations."""
-    remarks: list[Remark] = []
+    remarks, today = list[Remark](), datetime.now(UTC).date()
     for channel in channels:
         remarks += [*channel_remarks(channel), *filter(None, [calibration_remark(channel, today, interval_months)])]
     return remarks
@@ -97,7 +96,7 @@ def _check_samples(baseline: Hit) -> Check:
     return Check("samples", not lost, text or f"come at {baseline.sample_rate:g} Hz, none lost")
 
 
-def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel]]:
+def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
     """Yield codes and channel of all sensors, the cross sensor last."""
     if baseline.codes is not None and baseline.channels is not None:
         yield from zip(baseline.codes, baseline.channels, strict=True)
@@ -105,10 +104,9 @@ def _iterate_sensors(baseline: Hit) -> Iterator[tuple[NDArray[np.int32], Channel
         yield from list(_iterate_sensors(baseline.cross_hit))[1:]
 
 
-def _check_sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
+def _check_sensor(codes: Codes, channel: Channel) -> Check:
     name, low, high = f"{channel.name} sensor", *channel.effective_rails(codes)
-    stuck = np.mean((codes <= low) | (codes >= high))
-    if stuck > 0.5:
+    if np.mean((codes <= low) | (codes >= high)) > 0.5:
         return Check(name, False, "stands at the end of its range: cable open or sensor not powered")
     if np.ptp(codes) == 0:
         return Check(name, False, f"stands still at {codes[0] * channel.scale:.3g}: cable shorted or not plugged in")

@@ -16,11 +16,10 @@ from lobewatch.measurement import Measurement
 from lobewatch.measurement.recording_questions import check_question_codes, find_open_questions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
-from lobewatch.tap.device_connection import DeviceConnector, DeviceOpener
-from lobewatch.tap.evaluated_hits import EvaluatedHits, TapPublisher
-from lobewatch.tap.hit_loop import OperatorRequests, TapPhases, TapStopped
-from lobewatch.tap.state import Outcome, ProgramVerdict, TapState, TapStep
-from lobewatch.tap.tap_in_progress import CrossTapResult, begin_tap, commit_cross_tap
+from lobewatch.tap.device_connection import DeviceOpener
+from lobewatch.tap.hit_loop import TapPhases, TapStopped
+from lobewatch.tap.state import Outcome, ProgramVerdict, StatePublisher, TapState, TapStep
+from lobewatch.tap.tap_in_progress import CrossTapResult, TapInProgress, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
 
 
@@ -69,8 +68,8 @@ class TapSession:
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
-        self._publisher, self._requests = TapPublisher(first, clock), OperatorRequests()
-        self._connector = DeviceConnector(folder, open_device, self._publisher, sleep)
+        self._publisher = StatePublisher(first, clock)
+        self._phases = TapPhases(folder, open_device, self._publisher, guided=guided, sleep=sleep)
         self._measurement: Measurement | None = None
         self.wakes = self._publisher.wakes
         """Functions called after every change by the thread of the test. None may take time."""
@@ -95,11 +94,11 @@ class TapSession:
 
     def undo(self) -> None:
         """Take back the last good hit. Again: the one before."""
-        self._requests.undos.release()
+        self._phases.undos.release()
 
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
-        self._requests.stopping.set()
+        self._phases.stopping.set()
 
     def choose(self, key: str, tool: str = "") -> None:
         """Reject a choice: nothing comes after a single test.
@@ -134,13 +133,12 @@ class TapSession:
         """
         try:
             with self._folder.locked(), DiskReserve(self._folder.path) as reserve:
-                hits = self._begin()
-                hits.tap.reserve = reserve
-                if hits.missing:
-                    phases = TapPhases(self._folder, hits, self._publisher, self._requests, guided=self._guided)
-                    phases.run(self._connector)
+                tap = self._begin()
+                tap.reserve = reserve
+                if tap.missing:
+                    self._phases.run(tap)
                 reserve.release()
-                return self._finish(hits)
+                return self._finish(tap)
         except TapStopped:
             raise
         except Exception as error:
@@ -150,28 +148,27 @@ class TapSession:
                 raise
             raise failure from error
 
-    def _begin(self) -> EvaluatedHits:
-        """Return the hits of an interrupted test, or none yet."""
-        hits = EvaluatedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
-        texts = []
-        if hits.tap.hits:
-            begun = f"{hits.tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            texts.append(f"going on with the test begun {begun}: {hits.progress} are there")
-        if hits.tap.damaged:
-            texts.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
-        texts += hits.tap.not_resumed
+    def _begin(self) -> TapInProgress:
+        """Return the interrupted test, or a new one."""
+        tap, texts = begin_tap(self._folder, self._about, self._resume), []
+        if tap.hits:
+            begun = f"{tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
+            texts.append(f"going on with the test begun {begun}: {tap.progress} are there")
+        if tap.damaged:
+            texts.append(f"damaged and set aside: {', '.join(str(path) for path in tap.damaged)}")
+        texts += tap.not_resumed
         if texts:
-            self._publisher.show_hits(hits, resumed="; ".join(texts))
-        return hits
+            self._publisher.show(**tap.shown, resumed="; ".join(texts))
+        return tap
 
-    def _finish(self, hits: EvaluatedHits) -> TapTest:
+    def _finish(self, in_progress: TapInProgress) -> TapTest:
         """Average, commit and evaluate the test."""
         self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
-        tap = hits.tap.finish()
+        tap = in_progress.finish()
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
         logbook.commit(tap, now)
-        self.across = commit_cross_tap(hits.tap, partial(logbook.commit, now=now))
+        self.across = commit_cross_tap(in_progress, partial(logbook.commit, now=now))
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]
         try:
             self.unasked = logbook.accept(self.saved, self._accept)

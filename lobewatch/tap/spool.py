@@ -7,9 +7,10 @@ import contextlib
 import json
 import zlib
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, IrregularFileError, read_regular_file
@@ -26,8 +27,7 @@ SETUP_FILE_NAME = "setup.json"
 """File with the trigger settings of a test."""
 
 
-@dataclass(frozen=True, eq=False)
-class SpooledHit:
+class SpooledHit(NamedTuple):
     """Hit from its file."""
 
     number: int

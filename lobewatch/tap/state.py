@@ -1,9 +1,10 @@
 """State of a tap test as the operator sees it, the same for browser and terminal."""
 
 import enum
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from acquisition import HitFlags
 from lobewatch.arrays import Floats
@@ -32,8 +33,7 @@ class TapStep(enum.StrEnum):
     """The test cannot go on. The reason says why and what to do."""
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """Result of one check before the first hit."""
 
     name: str
@@ -46,8 +46,7 @@ class Check:
     """True if the finding deserves a line even if all is well."""
 
 
-@dataclass(frozen=True)
-class ListedHit:
+class ListedHit(NamedTuple):
     """Hit in the list of the screen."""
 
     number: int
@@ -108,8 +107,7 @@ class ProgramVerdict(NamedTuple):
     """Verdict word."""
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Result of a finished test."""
 
     status: str
@@ -127,11 +125,17 @@ class Outcome:
 
 
 @dataclass(frozen=True, eq=False)
-class TapState:
-    """State of a tap test."""
+class LiveState:
+    """State of a live test or cut."""
 
     revision: int
     """Number that increases with every change."""
+
+
+@dataclass(frozen=True, eq=False)
+class TapState(LiveState):
+    """State of a tap test."""
+
     word: TapStep
     """Step."""
     title: str
@@ -181,16 +185,6 @@ class TapState:
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()
 
 
-class LiveState(Protocol):
-    """State of a live test: a frozen dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-    @property
-    def revision(self) -> int:
-        """Number that increases with every change."""
-
-
 State = TypeVar("State", bound=LiveState)
 
 
@@ -200,7 +194,7 @@ class StatePublisher(Generic[State]):
     The thread of the test replaces the state, never changes it. Any thread may read it.
     """
 
-    def __init__(self, first: State, clock: Callable[[], float]) -> None:
+    def __init__(self, first: State, clock: Callable[[], float] = time.monotonic) -> None:
         """Publish the first state. clock: monotonic time (s)."""
         self.state: State = first
         """Newest state."""

@@ -1,4 +1,4 @@
-"""A tap test in progress: its hits, set-up and cross FRF."""
+"""A tap test in progress: its hits, their mean, set-up and cross FRF."""
 
 import errno
 import shutil
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, Tap
 from acquisition.errors import format_os_error
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
+from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.tap import spool
@@ -30,8 +32,8 @@ def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
         return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
 
 
-DISK_FULL_ERRORS = (errno.ENOSPC, errno.EDQUOT)
-"""Error numbers of a full disk."""
+MIN_HITS_FOR_MEAN = 3
+"""Hits in a mean with which others are compared."""
 
 
 @dataclass
@@ -42,8 +44,8 @@ class TapInProgress:
     """Id of the future tap test."""
     circumstances: Circumstances
     """Circumstances of the test: operator, machine, time."""
-    folder: Path
-    """Folder in which its hits are stored."""
+    folder: MachineFolder
+    """Machine folder, in whose spool its hits are stored."""
     hits: list[Hit] = field(default_factory=list)
     """All hits so far."""
     flags: list[HitFlags] = field(default_factory=list)
@@ -52,6 +54,8 @@ class TapInProgress:
     """Sentence on what is wrong with each hit, empty if it is averaged."""
     numbers: list[int] = field(default_factory=list)
     """Number of each hit in the name of its file."""
+    mean: acquisition.RunningMean = field(default_factory=acquisition.RunningMean)
+    """Mean of the good hits, always of all of them."""
     n_resumed: int = 0
     """Number of hits that an interrupted test already had."""
     trigger: acquisition.Trigger | None = None
@@ -71,13 +75,25 @@ class TapInProgress:
         return self.flags.count(HitFlags.OK)
 
     @property
-    def taken(self) -> tuple[ListedHit, ...]:
-        """Hits as a screen lists them."""
-        hits = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
-        return tuple(
+    def missing(self) -> int:
+        """Number of good hits still needed."""
+        return max(self.folder.machine.tap.hits - self.good, 0)
+
+    @property
+    def progress(self) -> str:
+        """Progress of the test in words."""
+        return f"{self.good} of {self.folder.machine.tap.hits} good hits"
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        """Fields of TapState: the list of hits, and what follows from it."""
+        listed = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        hits = tuple(
             ListedHit(i, flags, format_peak(hit), bool(flags & HitFlags.UNDONE), reason, i <= self.n_resumed)
-            for i, (hit, flags, reason) in hits
+            for i, (hit, flags, reason) in listed
         )
+        mean = {"mean_change": self.mean.relative_change, "settled": self.mean.has_converged}
+        return {"hits": hits, "good": self.good, **mean}
 
     def accept_device(self, sample_rate: float, channels: tuple[acquisition.Channel, ...], description: str) -> None:
         """Note the set-up of the coming hits. ValueError if earlier hits have another one."""
@@ -102,17 +118,57 @@ class TapInProgress:
         """Resume with a hit that is already on the disk."""
         verdict = evaluate_safely(lambda: evaluate_hit(spooled.hit))
         self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
+        if not self.flags[-1]:
+            self.mean.add(spooled.hit)
         self.circumstances = spooled.circumstances
         self.n_resumed = len(self.hits)
+
+    def evaluate(self, hit: Hit) -> HitVerdict:
+        """Evaluate a hit, also against the mean if that has enough hits. A good one is then part of the mean."""
+        return evaluate_safely(lambda: self._evaluate(hit))
 
     def exclude(self, number: int, flags: HitFlags, reason: str) -> None:
         """Reject a good hit (by its index) afterwards. It stays stored."""
         self._store(self.numbers[number], self.hits[number], flags)
         self.flags[number], self.reasons[number] = flags, reason
+        self.mean.remove(self.hits[number])
+
+    def undo(self) -> int | None:
+        """Take back the last good hit and return its index. None if there is none."""
+        number = max((i for i, flags in enumerate(self.flags) if not flags), default=None)
+        if number is not None:
+            self.exclude(number, HitFlags.UNDONE, "")
+        return number
+
+    def recheck_first_hits(self) -> tuple[int, HitVerdict] | None:
+        """Compare the first hits, which had no mean yet, with the mean of all others.
+
+        Takes the first one that does not fit out of the mean, and returns its index and the reason.
+        """
+        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(self.mean.hits) <= 2 * MIN_HITS_FOR_MEAN:
+            return None
+        for hit in self.mean.hits[:MIN_HITS_FOR_MEAN]:
+            verdict = evaluate_safely(partial(self._compare, hit))
+            if verdict.flags:
+                number = next(i for i, tap_hit in enumerate(self.hits) if tap_hit is hit)
+                self.exclude(number, verdict.flags, verdict.text)
+                return number, verdict
+        return None
 
     def finish(self) -> TapTest:
         """Return the averaged tap test. ValueError if no hit is good."""
         return average_hits(self.id, self.circumstances, self.hits, self.flags)
+
+    def _evaluate(self, hit: Hit) -> HitVerdict:
+        mean = self.mean.frf if len(self.mean.hits) >= MIN_HITS_FOR_MEAN else None
+        verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
+        if not verdict.flags:
+            self.mean.add(hit)
+        return verdict
+
+    def _compare(self, hit: Hit) -> HitVerdict:
+        """Compare a hit of the mean with the others. All else was evaluated when it came."""
+        return HitVerdict.from_findings(evaluate_spectrum(hit, self.mean.estimate_without(hit)))
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
         self.numbers.append(number)
@@ -125,15 +181,16 @@ class TapInProgress:
         try:
             self._write(number, hit, flags)
         except OSError as error:
-            if error.errno not in DISK_FULL_ERRORS or self.reserve is None or not self.reserve.release():
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT) or self.reserve is None or not self.reserve.release():
                 raise
             self._write(number, hit, flags)
 
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
-        make_folder(self.folder)
+        folder = self.folder.spool / self.id
+        make_folder(folder)
         if not self.hits and self.trigger is not None:
-            spool.write_setup(self.folder, self.trigger)
-        write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+            spool.write_setup(folder, self.trigger)
+        write_hit(folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
 def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
@@ -158,11 +215,9 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     folder.refuse_damage()
     spool.clean_spool(folder)
     _remove_committed(folder)
-    damaged, not_resumed = list[Path](), list[str]()
-    interrupted = _find_interrupted(folder, circumstances, resume, damaged, not_resumed)
-    tap_id = acquisition.new_tap_id(circumstances)
-    tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
-    tap.damaged, tap.not_resumed = damaged, not_resumed
+    new = TapInProgress(acquisition.new_tap_id(circumstances), circumstances, folder)
+    tap = _find_interrupted(new, resume) or new
+    tap.damaged, tap.not_resumed = new.damaged, new.not_resumed
     return tap
 
 
@@ -175,21 +230,20 @@ def _remove_committed(folder: MachineFolder) -> None:
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _find_interrupted(
-    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], not_resumed: list[str]
-) -> TapInProgress | None:
-    """Return the newest test of the same tool and direction, if wished. Add all others to `left`."""
+def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
+    """Return the newest test of the tool and direction of a new one, if wished. The new one notes all others."""
+    folder, circumstances = new.folder, new.circumstances
     committed, newest = folder.committed_ids, None
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
             continue
-        hits = spool.read_spooled_hits(path, damaged)
+        hits = spool.read_spooled_hits(path, new.damaged)
         if (first := next(hits, None)) is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
         if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
-            newest = TapInProgress(path.name, about, path, trigger=spool.read_spooled_trigger(path, damaged))
+            newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
@@ -197,7 +251,7 @@ def _find_interrupted(
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
             text = f"an interrupted test of {when} is still in {path}"
-            not_resumed.append(f"{text}; delete that folder if it is not needed")
+            new.not_resumed.append(f"{text}; delete that folder if it is not needed")
     return newest
 
 
@@ -205,8 +259,7 @@ MIN_CROSS_TAP_HITS = 3
 """Good hits needed for a cross FRF, chosen: fewer do not show their scatter."""
 
 
-@dataclass(frozen=True, eq=False)
-class CrossTapResult:
+class CrossTapResult(NamedTuple):
     """Result of the cross tap test that the same hits give."""
 
     tap_id: str | None

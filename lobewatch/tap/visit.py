@@ -10,11 +10,9 @@ from lobewatch.tap.session import TapSession
 from lobewatch.tap.spool import count_interrupted_hits
 from lobewatch.tap.state import Choice, TapState, TapStep
 
-TAP_X_CHOICE, TAP_Y_CHOICE = Choice("x", "tap x"), Choice("y", "tap y")
 CROSS_TAP_CHOICE = Choice("xy", "tap xy: hit in x, sensor in y")
 NEXT_TOOL_CHOICE, DONE_CHOICE = Choice("tool", "next tool"), Choice("done", "done")
-DIRECTION_CHOICES: dict[TapDirection, Choice] = {"x": TAP_X_CHOICE, "y": TAP_Y_CHOICE}
-VISIT_DIRECTIONS = [choice.key for choice in (TAP_X_CHOICE, TAP_Y_CHOICE, CROSS_TAP_CHOICE)]
+DIRECTION_CHOICES: dict[TapDirection, Choice] = {"x": Choice("x", "tap x"), "y": Choice("y", "tap y")}
 
 
 def choose_first_direction(folder: MachineFolder, tool: str) -> TapDirection:
@@ -92,7 +90,7 @@ class TapVisit:
                 return
             if key == NEXT_TOOL_CHOICE.key:
                 self._tool, tapped = tool, set()
-            self._direction = parse_direction(key) if key in VISIT_DIRECTIONS else "x"
+            self._direction = "x" if key == NEXT_TOOL_CHOICE.key else parse_direction(key)
             self._session = self._plan(self._tool, self._direction)
             self._show(None)
 
@@ -110,7 +108,7 @@ class TapVisit:
             state = replace(state, sensor_stays=cross_tap is not None)
         else:
             across = (CROSS_TAP_CHOICE,) if state.outcome is not None and state.outcome.needs_cross_tap else ()
-            choices = (TAP_X_CHOICE, TAP_Y_CHOICE, *across, NEXT_TOOL_CHOICE, DONE_CHOICE)
+            choices = (*DIRECTION_CHOICES.values(), *across, NEXT_TOOL_CHOICE, DONE_CHOICE)
         self._show(replace(state, revision=state.revision + 1, choices=tuple(choices)))
         return self._answers.get()
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shown_power import FEED, ShownPower
 from speed_grid import list_speeds
+from turn_repetition import nonperiodic_share
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
@@ -158,7 +159,7 @@ def heard(cuts: Sequence[MillingCut]) -> list[float]:
     """Chatter frequency (Hz) of cuts from their motion only; NaN for motion that repeats every turn."""
     sounds = [math.nan] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
-        if motion.nonperiodic_share < CHATTERS:
+        if nonperiodic_share(motion, cuts[number], PASSAGE) < CHATTERS:
             continue
         turn = round(motion.sample_rate * cuts[number].tooth_period * TEETH)
         steady = motion.acceleration[:, int(motion.sample_rate * 0.4) : int(motion.sample_rate * 0.82)]

@@ -24,7 +24,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import lobewatch
-from acquisition.devices import find_driver
+from acquisition import find_driver
 from acquisition.emulation import Passage
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder

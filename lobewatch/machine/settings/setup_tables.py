@@ -10,7 +10,7 @@ from msgspec import Meta
 import acquisition
 from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
-from acquisition.text_boards import FrameFormat, OutputFormat
+from acquisition.text_boards.decoders import FrameFormat, OutputFormat
 from lobewatch.machine.settings.toml import NotNegative, Plausible, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]

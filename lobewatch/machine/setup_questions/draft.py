@@ -5,8 +5,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from acquisition import STANDARD_GRAVITY, Channel, DataError, DeviceError, find_driver
-from acquisition.devices import DeviceSettings, PortScan, convert_driver_errors, scan_ports
+from acquisition import (
+    STANDARD_GRAVITY,
+    Channel,
+    DataError,
+    DeviceError,
+    DeviceSettings,
+    PortScan,
+    find_driver,
+    scan_ports,
+)
+from acquisition.devices.registry import convert_driver_errors
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
 

@@ -257,7 +257,7 @@ def test_old_firmware_is_rejected(emulated: Make) -> None:
 
 
 def test_a_silent_device_is_given_up(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.source.DATAQ_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.dataq.source.SILENCE_TIMEOUT", 0.3)
     with emulated(stall_after=9000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         with pytest.raises(DeviceError, match=r"has sent no samples for 0\.3 s; switch it off and on"):
@@ -272,7 +272,7 @@ def test_hanging_up_is_reported_in_one_sentence(emulated: Make) -> None:
 
 
 def test_digital_inputs_that_do_not_hold_still_are_reported(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.dataq.source.DATAQ_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.dataq.source.SILENCE_TIMEOUT", 0.3)
     with emulated(digital_word=0x0001) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
         with pytest.raises(DeviceError, match=r"do not hold still.*loss_detection = false"):

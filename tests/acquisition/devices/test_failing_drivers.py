@@ -22,9 +22,10 @@ from acquisition import (
     Remark,
     check_settings,
     probe_port,
+    scan_ports,
 )
-from acquisition.devices import convert_driver_errors, scan_ports
 from acquisition.devices.drivers import BUILT_IN_DRIVERS
+from acquisition.devices.registry import convert_driver_errors
 from acquisition.ports import SerialLink
 
 WHO = DeviceIdentity("X", "1", "2")

@@ -16,6 +16,9 @@ import pytest
 from acquisition import (
     Block,
     Channel,
+    DataqEmulator,
+    DataqFaults,
+    DataqSource,
     Device,
     DeviceError,
     Event,
@@ -29,8 +32,7 @@ from acquisition import (
     TapsFaults,
     TapsSource,
 )
-from acquisition.dataq import DataqEmulator, DataqFaults, DataqSource
-from acquisition.taps import TapsBridge
+from acquisition.taps.bridge import TapsBridge
 
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]
@@ -164,7 +166,7 @@ class Fast(SimulatedSource):
 
 def test_a_host_that_is_late_is_told_what_it_missed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.taps.bridge.BRIDGE_BUFFER_BYTES", 20_000)
-    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 60.0)  # a busy computer may delay the device
+    monkeypatch.setattr("acquisition.taps.source.SILENCE_TIMEOUT", 60.0)  # a busy computer may delay the device
     device = Fast(12, 16)
     with bridged(lambda: device) as bridge, TapsSource(bridge.port) as host:
         assert (host.identity.serial, host.channels[0].adc_bits) == ("no-number", 16)

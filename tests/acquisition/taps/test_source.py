@@ -139,7 +139,7 @@ def test_unplugging_is_reported_in_one_sentence(tapper: Tapper, channels: Pair) 
 
 
 def test_a_silent_device_is_given_up(tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.taps.source.SILENCE_TIMEOUT", 0.3)
     with (
         TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(stall_after=20_000)) as device,
         TapsSource(device.port) as source,
@@ -412,7 +412,7 @@ def test_a_device_whose_info_never_arrives_is_rejected(
 def test_a_device_that_restarts_by_itself_is_distinguished_from_a_silent_one(
     tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.taps.source.SILENCE_TIMEOUT", 0.3)
     with (
         TapsEmulator(tapper(), channels, RATE, realtime=False, faults=TapsFaults(restart_after=20 * 512)) as device,
         TapsSource(device.port) as source,
@@ -425,7 +425,7 @@ def test_a_device_that_restarts_by_itself_is_distinguished_from_a_silent_one(
 
 
 def test_a_slow_consumer_is_no_silent_device(device: TapsEmulator, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.taps.source.TAPS_SILENCE_TIMEOUT", 2.0)  # a busy computer delays the device too
+    monkeypatch.setattr("acquisition.taps.source.SILENCE_TIMEOUT", 2.0)  # a busy computer delays the device too
     with TapsSource(device.port) as source:
         source.start()
         for _ in islice(source.blocks(), 2):

@@ -14,12 +14,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquisition import Block, Channel, DeviceError, DeviceSettings, SensorInput, find_driver, probe_port
-from acquisition.devices import check_settings
+from acquisition import (
+    Block,
+    Channel,
+    DeviceError,
+    DeviceSettings,
+    SensorInput,
+    check_settings,
+    find_driver,
+    probe_port,
+)
 from acquisition.devices.drivers import BUILT_IN_DRIVERS
 from acquisition.emulation import SignalFunction
-from acquisition.text_boards import FrameFormat, OutputFormat, TextBoardEmulator, TextBoardSource, TextBoardTraits
-from acquisition.text_boards.decoders import LineDecoder, PrintedRows, ScanCounter, SimpleFrameDecoder
+from acquisition.text_boards.decoders import (
+    FrameFormat,
+    LineDecoder,
+    OutputFormat,
+    PrintedRows,
+    ScanCounter,
+    SimpleFrameDecoder,
+)
+from acquisition.text_boards.source import TextBoardEmulator, TextBoardSource, TextBoardTraits
 
 FORCE, ACCELERATION = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
 INPUTS = SensorInput(0, FORCE), SensorInput(1, ACCELERATION)
@@ -166,7 +181,7 @@ def test_a_counter_that_restarts_is_no_loss(bits: int) -> None:
     counts = (start + np.arange(600)) % 2**bits
     counts = np.delete(counts, [50, 450, 451])
     rows = np.column_stack([counts, counts, counts]).astype(np.float64)
-    lost = [run.lost_before for part in (rows[:100], rows[100:]) for run in counter.split_runs(PrintedRows(part))]
+    lost = [lost for part in (rows[:100], rows[100:]) for _, lost in counter.split_runs(PrintedRows(part))]
     assert [gap for gap in lost if gap] == [1, 2]
 
 
@@ -194,7 +209,7 @@ def silent_port() -> Iterator[tuple[int, str]]:
 
 
 def test_a_board_that_prints_something_else_is_a_device_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.text_boards.source.BOARD_SILENCE_TIMEOUT", 0.3)
+    monkeypatch.setattr("acquisition.text_boards.source.SILENCE_TIMEOUT", 0.3)
     with silent_port() as (master, port), TextBoardSource(port, INPUTS, RATE) as source:
         source.start()
         os.write(master, b"hello\nthe answer is 42\n" * 10)

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from fake_libraries import Volts, Wiring, fake_daqhats, fake_ljm, fake_nidaqmx, fake_sounddevice, fake_uldaq
 
-from acquisition import Channel, DeviceError, DeviceSettings, SensorInput, find_driver
-from acquisition.devices import scan_ports
-from acquisition.vendor_drivers import LibraryDevice, parse_name_calibration
+from acquisition import Channel, DeviceError, DeviceSettings, SensorInput, find_driver, scan_ports
+from acquisition.vendor_drivers.audio import parse_name_calibration
+from acquisition.vendor_drivers.library_device import LibraryDevice
 
 pytestmark = pytest.mark.quick
 
@@ -350,7 +350,7 @@ def test_a_search_that_fails_is_a_remark_and_disables_nothing(
             raise answer
         return answer
 
-    monkeypatch.setattr("acquisition.vendor_drivers.search_uldaq", search)
+    monkeypatch.setattr("acquisition.vendor_drivers.measurement_computing.search_uldaq", search)
     survey = scan_ports("uldaq:1")
     assert len(survey.remarks) == 1
     with pytest.raises(AssertionError, match=reason):

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import HammeredStructure, Hammering
-from acquisition.dataq import DataqEmulator, DataqFaults
+from acquisition import DataqEmulator, DataqFaults, HammeredStructure, Hammering
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder

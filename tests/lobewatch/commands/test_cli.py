@@ -22,8 +22,9 @@ from lobes import read_history
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.emulated_spindle import build_structure, make_emulator
+from lobewatch.tap.emulated_spindle import build_structure
 from tests.lobewatch.commands.conftest import Run, refused
+from tests.lobewatch.tapped_emulator import make_emulator
 
 
 @pytest.fixture

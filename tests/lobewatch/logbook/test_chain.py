@@ -40,7 +40,6 @@ from lobewatch.tap.emulated_spindle import (
     EMULATED_CHANNELS,
     EMULATED_SAMPLE_RATE,
     build_structure,
-    make_emulator,
     set_bearing_stiffness,
 )
 from lobewatch.tap.hit_loop import TapStopped
@@ -49,6 +48,7 @@ from lobewatch.tap.state import TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
 from lobewatch.tool.assembly import speed_grid
 from modal import Mode, synthesize_frf
+from tests.lobewatch.tapped_emulator import make_emulator
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)

@@ -26,8 +26,9 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import ScreenServer
 from lobewatch.screen import access_control as door
-from lobewatch.tap.emulated_spindle import build_structure, make_emulator
+from lobewatch.tap.emulated_spindle import build_structure
 from lobewatch.tap.session import TapSession
+from tests.lobewatch.tapped_emulator import make_emulator
 
 HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 """A head that is not ended."""

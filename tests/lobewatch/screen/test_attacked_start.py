@@ -22,8 +22,9 @@ from lobewatch.screen import CutScreenServer, DashboardServer
 from lobewatch.screen.dashboard_server import LiveTest
 from lobewatch.screen.web_server import WebServerThread
 from lobewatch.tap.cut_recording import CutState, CutStep
-from lobewatch.tap.emulated_spindle import build_structure, make_emulator
+from lobewatch.tap.emulated_spindle import build_structure
 from lobewatch.tap.state import StatePublisher
+from tests.lobewatch.tapped_emulator import make_emulator
 
 TOKEN, WATCH = "a-token-of-the-test", "another-token-to-watch"
 START = "/machines/mill/start"

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.devices import find_driver
+from acquisition import find_driver
 from acquisition.emulation import Passage
 from lobewatch.cli import main
 from lobewatch.logbook import Logbook

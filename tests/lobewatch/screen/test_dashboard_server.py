@@ -24,8 +24,9 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.tap.emulated_spindle import build_structure, make_emulator, set_bearing_stiffness
+from lobewatch.tap.emulated_spindle import build_structure, set_bearing_stiffness
 from lobewatch.tap.session import TapSession
+from tests.lobewatch.tapped_emulator import make_emulator
 
 DAY = datetime(2026, 5, 4, 9, tzinfo=UTC)
 NEW, WORN = 1.28e9, 0.6661e9

@@ -17,7 +17,7 @@ from acquisition import DeviceAnswer, DeviceIdentity, PortInfo, PortScan, Scanne
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.sensors import Finding, check_computer
+from lobewatch.sensors.computer_check import Finding, check_computer
 
 EXAMINE = sys.modules["lobewatch.sensors.computer_check"]
 NOW = datetime(2026, 6, 1, 12, tzinfo=UTC).timestamp()

@@ -29,7 +29,7 @@ from lobewatch.cli import main
 from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.sensors import list_sensors
+from lobewatch.sensors.sensor_checks import list_sensors
 
 RATE = 25600.0
 MASS = 1.2

@@ -10,9 +10,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Channel, Event, EventKind, HammeredStructure, HitFlags, TapsEmulator, TapsSource, TapTest
+from acquisition import (
+    Channel,
+    Event,
+    EventKind,
+    HammeredStructure,
+    HitFlags,
+    SimulatedSource,
+    TapsEmulator,
+    TapsSource,
+    TapTest,
+)
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import Button
+from lobewatch.tap.device_connection import DeviceConnection
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
@@ -87,18 +97,21 @@ def test_what_the_button_did_before_the_stream_counts_for_nothing(
     [((0,), 1), ((0, 100), 1), ((0, 200, 400), 1), ((0, 300), 2), ((500, 900, 100), 3), ((7, 7), 1)],
 )
 def test_presses_are_distinguished_from_bouncing_by_the_clock_of_the_device(
-    scans: tuple[int, ...], presses: int
+    tapper: Tapper, channels: Pair, scans: tuple[int, ...], presses: int
 ) -> None:
-    button = Button(1000.0)
-    events = deque(Event(EventKind.BUTTON, scan=scan) for scan in scans)
-    assert button.count_presses(events) == presses
-    assert not events
+    device = SimulatedSource(tapper(), channels, 1000.0, n_scans=0)
+    device.events.extend(Event(EventKind.BUTTON, scan=scan) for scan in scans)
+    assert DeviceConnection(device).count_presses() == presses
+    assert not device.events
 
 
-def test_a_button_let_go_is_not_pressed_and_bounces_then_too() -> None:
-    def moved(scan: int, begins: bool) -> deque[Event]:
-        return deque([Event(EventKind.BUTTON, begins, scan=scan)])
+def test_a_button_let_go_is_not_pressed_and_bounces_then_too(tapper: Tapper, channels: Pair) -> None:
+    device = SimulatedSource(tapper(), channels, 1000.0, n_scans=0)
+    connection = DeviceConnection(device)
 
-    button = Button(1000.0)
+    def count(scan: int, begins: bool) -> int:
+        device.events.append(Event(EventKind.BUTTON, begins, scan=scan))
+        return connection.count_presses()
+
     moves = ((0, True), (2000, False), (2001, True), (2002, False), (2400, True))
-    assert [button.count_presses(moved(*move)) for move in moves] == [1, 0, 0, 0, 1]
+    assert [count(*move) for move in moves] == [1, 0, 0, 0, 1]

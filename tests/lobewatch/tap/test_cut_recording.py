@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource
-from acquisition.devices import find_driver
+from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource, find_driver
 from acquisition.emulation import Passage
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cuts

@@ -13,7 +13,14 @@ from acquisition import Structure, TapsSource
 from dsm import natural_frequencies
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.demo import PlannedTap, plan_taps
-from lobewatch.tap.emulated_spindle import make_emulator, open_synchronized_device, set_bearing_stiffness
+from lobewatch.tap.emulated_spindle import (
+    MountingVariation,
+    SpindleWear,
+    WearScenario,
+    open_synchronized_device,
+    set_bearing_stiffness,
+)
+from tests.lobewatch.tapped_emulator import make_emulator
 
 MONTHS = 24
 NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)
@@ -22,7 +29,8 @@ SCANS = 50_000
 
 
 def plan(folder: MachineFolder, scatter: float, seed: int = 1) -> list[PlannedTap]:
-    return plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, now=NOW)
+    wear = SpindleWear.of(folder, MONTHS, WearScenario.STEADY)
+    return plan_taps(folder, wear, np.random.default_rng(seed), MountingVariation(scatter), NOW)
 
 
 def frequencies(taps: list[PlannedTap]) -> NDArray[np.float64]:
@@ -44,7 +52,8 @@ def test_every_month_has_a_tap_in_x_and_half_an_hour_later_one_in_y(folder: Mach
 @pytest.mark.parametrize("months", [2, 120])
 def test_the_last_month_is_the_newest_whose_tests_are_past(folder: MachineFolder, months: int) -> None:
     for now, last in ((NOW, NOW), (NOW - timedelta(seconds=1), datetime(2025, 11, 15, 9, 30, tzinfo=UTC))):
-        dates = [tap.date for tap in plan_taps(folder, months, np.random.default_rng(1), 0.0, now=now)]
+        wear = SpindleWear.of(folder, months, WearScenario.STEADY)
+        dates = [tap.date for tap in plan_taps(folder, wear, np.random.default_rng(1), MountingVariation(), now)]
         assert len({(date.year, date.month) for date in dates}) == months
         assert max(dates) == last
 

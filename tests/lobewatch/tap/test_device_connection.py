@@ -111,7 +111,7 @@ def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_
                 ports.append(SimpleNamespace(device=second.port, vid=0x16C0, serial_number="5C2B"))
 
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda **_: ports)
-        monkeypatch.setattr("acquisition.taps.TapsSource", open_taps)
+        monkeypatch.setattr("acquisition.taps.source.TapsSource", open_taps)
         tap = session_of(folder, DeviceOpener(folder.machine.daq, first.port).open, plug).run()
     assert opened == [first.port, second.port]
     assert len(tap.accepted) == 10

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import DataError, TapsSource
-from acquisition.devices import find_driver
+from acquisition import DataError, TapsSource, find_driver
 from acquisition.emulation import Passage
 from lobes import Cut
 from lobewatch.cli import main
@@ -78,8 +77,9 @@ def test_below_the_limit_the_cut_turns_with_the_spindle_and_above_it_chatters(fo
 
 
 def test_before_the_cut_there_is_air_and_then_it_is_repeated(folder: MachineFolder) -> None:
-    sound = heard(emulated(folder, 1.0), 2 * PASSAGE.seconds)
-    n = round(PASSAGE.seconds * RATE)
+    seconds = PASSAGE.before + PASSAGE.cutting + PASSAGE.after
+    sound = heard(emulated(folder, 1.0), 2 * seconds)
+    n = round(seconds * RATE)
     rms = [float(np.std(sound[round(a * RATE) : round(b * RATE)])) for a, b in ((0.02, 0.18), (0.3, 0.7), (0.98, 1.12))]
     assert rms[1] > 3 * max(rms[0], rms[2])
     cutting = slice(round(0.3 * RATE), round(0.7 * RATE))

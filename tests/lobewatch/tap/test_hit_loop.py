@@ -146,7 +146,7 @@ def test_a_hit_on_which_the_judging_fails_is_rejected_and_kept_and_the_test_goes
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    monkeypatch.setattr("lobewatch.tap.evaluated_hits.evaluate_hit", failing_at({3}, evaluate_hit))
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.evaluate_hit", failing_at({3}, evaluate_hit))
     states: list[TapState] = []
     session = session_of(folder, lambda: simulated(tapper(), channels), states.append)
     tap = session.run()
@@ -171,7 +171,7 @@ def test_a_first_hit_that_cannot_be_compared_with_the_others_counts_no_more(
     session_of: OpenSession,
 ) -> None:
     monkeypatch.setattr(
-        "lobewatch.tap.evaluated_hits.evaluate_spectrum", failing_at({2}, evaluate_spectrum)
+        "lobewatch.tap.tap_in_progress.evaluate_spectrum", failing_at({2}, evaluate_spectrum)
     )  # the 2nd, looked back at
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
     assert tap.flags == (HitFlags.OK, HitFlags.NOT_EVALUATED, *[HitFlags.OK] * 9)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition import STANDARD_GRAVITY, HammeredStructure, Hammering, MeasuredRate, Structure
 from acquisition.emulation import SignalFunction
-from acquisition.text_boards import TextBoardEmulator
+from acquisition.text_boards.source import TextBoardEmulator
 from lobewatch.cli import main
 from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder

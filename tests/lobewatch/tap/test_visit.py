@@ -136,7 +136,7 @@ def test_a_tap_across_is_offered_where_it_would_settle_something(
     visit: Callable[..., Visit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def asks(*about: Any) -> Outcome:
-        return replace(build_outcome(*about), needs_cross_tap=True)
+        return build_outcome(*about)._replace(needs_cross_tap=True)
 
     monkeypatch.setattr(session, "build_outcome", asks)
     person = visit()

@@ -17,7 +17,7 @@ from lobewatch.monitoring.change_detection import SeriesChange
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, TapValue, Trend, days_since_epoch, fit_trend
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.demo import PlannedTap, plan_taps
-from lobewatch.tap.wear_scenarios import MountingVariation, SpindleWear, WearScenario, build_mounted_spindle
+from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario, build_mounted_spindle
 
 MONTHS = 24
 NOW = datetime(2025, 12, 20, tzinfo=UTC)
@@ -27,7 +27,8 @@ def planned(
     folder: MachineFolder, story: WearScenario, seed: int = 1, scatter: float = 0.001, **more: Any
 ) -> list[PlannedTap]:
     """Return the tests in x."""
-    taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, MountingVariation(**more), NOW)
+    wear, mounting = SpindleWear.of(folder, MONTHS, story), MountingVariation(scatter, **more)
+    taps = plan_taps(folder, wear, np.random.default_rng(seed), mounting, NOW)
     return [tap for tap in taps if tap.direction == "x"]
 
 

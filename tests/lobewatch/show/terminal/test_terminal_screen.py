@@ -84,7 +84,7 @@ def test_what_was_wrong_and_how_far_the_mean_has_come() -> None:
     assert "2     310 N  ✗ DOUBLE HIT  Second peak" in text
     assert "1     231 N  ✓ GOOD" in text
     assert "force 0.1 N rms, response 2 m/s^2 rms   the last good hit moved the mean by 1.2 %; it has settled" in text
-    undone = plain(replace(STATE, hits=(replace(GOOD, flags=HitFlags.UNDONE, undone=True),)))
+    undone = plain(replace(STATE, hits=(GOOD._replace(flags=HitFlags.UNDONE, undone=True),)))
     assert "↶ UNDONE" in undone
 
 
@@ -202,7 +202,7 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     session = Session(replace(STATE, hits=(), device=""))
     console = Console(file=io.StringIO(), width=200)
     printer = TapPrinter(session, console)
-    earlier = replace(GOOD, earlier=True)
+    earlier = GOOD._replace(earlier=True)
     away = "the DAQ was unplugged; the test goes on at this hit"
     checks = (Check("hum", False, "1 N rms at 50 Hz"), Check("disk", True, "full of room"))
     states = (

@@ -85,8 +85,8 @@ def tap(
             if screen:
                 from lobewatch.screen import ScreenServer  # imports aiohttp
 
-                server = ScreenServer(visit, listen=listen, token=token, watch_token=watch_token)
-                screens.enter_context(server)
+                tokens = {"token": token, "watch_token": watch_token}
+                server = screens.enter_context(ScreenServer(visit, listen=listen, **tokens))
                 show_address(server.url, server.watch_url)
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()

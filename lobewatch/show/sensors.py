@@ -162,7 +162,8 @@ def skew_check_texts(check: SkewCheck) -> list[str]:
 
 def findings_json(findings: Sequence[Finding]) -> JsonObject:
     """Return all findings on the computer, and how many prevent a tap test."""
-    return {"findings": findings, "hinder": Counter(finding.state for finding in findings)["hinders"]}
+    states = Counter(finding.state for finding in findings)
+    return {"findings": [finding._asdict() for finding in findings], "hinder": states["hinders"]}
 
 
 def findings_texts(findings: Sequence[Finding]) -> Texts:

@@ -133,5 +133,5 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
     wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
     text = f"the hits reach {percent:g} % of the range of {full:.3g} {unit}"
     cure = f"choose a range or a sensor of about {wanted:.2g} {unit}"
-    code, alternative = ("range-too-large", "") if too_large else ("range-too-small", ", or hit softer")
-    return Remark(code, name, text, cure + alternative)
+    alternative = "" if too_large else ", or hit softer"
+    return Remark("range-too-large" if too_large else "range-too-small", name, text, cure + alternative)

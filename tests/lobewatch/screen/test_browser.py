@@ -185,6 +185,7 @@ def test_between_two_tests_the_buttons_say_what_can_come_next(
     session.finish()
     session.pause(TapStep.DONE, ("x", "tap x"), ("y", "tap y"), ("tool", "next tool"), ("done", "done"))
     browser.see("programs", "bracket, slot (8000 rpm, 2 mm): stable")
+    browser.wait(lambda: browser.ask("document.querySelectorAll('#choices button').length") == 4)
     browser.ask("document.querySelectorAll('#choices button')[2].click()")
     browser.wait(lambda: browser.part("tool-form").is_displayed())
     browser.press(*"drill y", Keys.ENTER)

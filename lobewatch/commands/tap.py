@@ -85,8 +85,7 @@ def tap(
             if screen:
                 from lobewatch.screen import ScreenServer  # imports aiohttp
 
-                tokens = {"token": token, "watch_token": watch_token}
-                server = screens.enter_context(ScreenServer(visit, listen=listen, **tokens))
+                server = screens.enter_context(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
                 show_address(server.url, server.watch_url)
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()

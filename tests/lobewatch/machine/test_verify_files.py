@@ -25,6 +25,7 @@ from lobewatch.machine.folder_updates import add_event, exclude_entry
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.row_file import read_rows, write_rows
 from lobewatch.machine.verify_files import Verification, verify
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.spool import write_setup
 from lobewatch.tap.tap_in_progress import begin_tap
 
@@ -271,18 +272,19 @@ def moved_somewhere(folder: MachineFolder, chance: random.Random) -> str:
 
 
 def mend(folder: Path, remark: Remark) -> None:
-    """Follow the advice."""
-    if "move it away" in remark.cure:
+    """Follow the advice that a person reads."""
+    cure = with_option_names(remark.cure)
+    if "move it away" in cure:
         (folder / "machine.toml").rename(folder / "machine.toml.old")
-    if "delete this file" in remark.cure + remark.text:
+    if "delete this file" in cure + remark.text:
         (folder / remark.about).unlink()
-    elif "lobewatch rebuild" in remark.cure:
+    elif "lobewatch rebuild" in cure:
         rebuild_files(folder)
         (folder / "history.rows").unlink(missing_ok=True)
-    elif "lobewatch tap" in remark.cure:
+    elif "lobewatch tap" in cure:
         tap = begin_tap(MachineFolder(folder), Circumstances("m", datetime.now(UTC), "reference"))
         assert tap.hits == []
-        old = re.findall(r"hours ago is not gone on with: delete (\S+) where", remark.cure)
+        old = re.findall(r"hours ago is not gone on with: delete (\S+) where", cure)
         shutil.rmtree(*old)
 
 

@@ -71,6 +71,8 @@ class FolderLock:
         with contextlib.ExitStack() as stack:
             self._acquire(patience, stack)
             with contextlib.suppress(OSError):  # the lock holds without it
+                for left_over in self._folder.glob(f".{LOCK_HOLDER_NAME}.*.tmp"):  # by a power cut
+                    left_over.unlink()
                 atomic_write(self._holder, msgspec.json.encode(LockHolder.current()), lasting=False)
             self._thread.holds = True
             try:

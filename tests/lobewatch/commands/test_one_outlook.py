@@ -148,6 +148,9 @@ def check_report(plant: Path, row: dict[str, Any]) -> None:
         }
         assert all(alarm["id"] in page for alarm in row["alarms"])
         return
+    if "<h2>Until when</h2>" not in page:
+        assert "first test, nothing to compare it with yet" in page  # the series of the newest test has one test
+        return
     table = page.partition("<h2>Until when</h2>")[2].partition("</table>")[0]
     cells = [
         [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<td.*?</td>", line, re.DOTALL)]

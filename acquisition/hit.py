@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,7 +76,14 @@ class Hit:
 
     @classmethod
     def from_codes(
-        cls, codes: ArrayLike, channels: tuple[Channel, ...], sample_rate: float, pre_trigger: int = 0, **fields: Any
+        cls,
+        codes: ArrayLike,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        pre_trigger: int = 0,
+        lost_scans: int = 0,
+        overload: int = 0,
+        cross_hit: Hit | None = None,
     ) -> Hit:
         """Return a hit from ADC codes, scaled by the sensitivities of its channels.
 
@@ -90,13 +97,17 @@ class Hit:
             Sample rate (Hz).
         pre_trigger
             Number of samples before the trigger.
-        fields
-            Other fields of the hit: `lost_scans`, `overload`, `cross_hit`.
+        lost_scans
+            Number of scans missing inside the record.
+        overload
+            Overloads that the device reports, a bit per row.
+        cross_hit
+            Same impact as a second sensor measured it.
         """
         raw = np.asarray(codes, dtype=np.int32)
         force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
         response = raw[-1] * channels[-1].scale
-        return cls(force, response, sample_rate, pre_trigger, channels=channels, codes=raw, **fields)
+        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload, cross_hit)
 
     @property
     def has_force(self) -> bool:
@@ -188,8 +199,7 @@ class TapInputs:
             rows = [0, response] if len(self.rows) > 1 else [response]
             mask = (overload >> response & 1) << 1 | (overload & 1 if len(rows) > 1 else 0)
             sensors = tuple(self.channels[row] for row in rows)
-            more = {"lost_scans": lost_scans, "overload": mask, "cross_hit": cross_hit}
-            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, **more)
+            return Hit.from_codes(codes[rows], sensors, sample_rate, pre_trigger, lost_scans, mask, cross_hit)
 
         last = len(self.rows) - 1
         return make_of(last, make_of(1) if last > 1 else None)

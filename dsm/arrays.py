@@ -32,7 +32,7 @@ def require_numbers(where: str, part: object, units: Mapping[str, str], **rule: 
     """Check the numbers of a part named in `units` with require_number; `where` begins the message."""
     for name, unit in units.items():
         value = getattr(part, name)
-        if value is not None and not 0 < value < math.inf:  # a few only, as texts cost time
+        if not 0 < value < math.inf:  # a few only, as texts cost time
             require_number(where + name, value, "", f" ({unit})", **rule)
 
 

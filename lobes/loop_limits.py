@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -125,7 +124,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         kind=np.where(limited, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
-        curves=lambda: chain.from_iterable(_lobes_of_loop(*loop, cut, speed_rpm) for loop in loops),
+        curves=partial(_lobes_of_loops, loops, cut, speed_rpm),
         remarks=_band_remarks(grid, weakest.real) or _mean_force_remarks(method, cut, lowest, speed_rpm),
     )
 
@@ -244,6 +243,10 @@ def _refine_crossing(branch: TipResponse, step: Indices, missing: Floats, tooth_
         at_low, at_high = np.where(before, value, weight * at_low), np.where(before, weight * at_high, value)
         was_before = before
     return middle
+
+
+def _lobes_of_loops(loops: Sequence[tuple[Floats, Complexes, Integers]], cut: Cut, speed_rpm: Floats) -> list[Lobe]:
+    return [lobe for loop in loops for lobe in _lobes_of_loop(*loop, cut, speed_rpm)]
 
 
 def _lobes_of_loop(grid: Floats, response: Complexes, numbers: Integers, cut: Cut, speed_rpm: Floats) -> Iterator[Lobe]:

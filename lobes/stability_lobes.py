@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -228,9 +229,13 @@ def lower_envelope(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
         first,
         **{name: np.stack([getattr(diagram, name) for diagram in diagrams])[lowest, speed] for name in columns},
         crossings=np.stack(crossings)[lowest, speed],
-        curves=lambda: [lobe for diagram in diagrams for lobe in diagram.lobes],
+        curves=partial(_lobes_of_all, diagrams),
         remarks=tuple(dict.fromkeys(remark for diagram in diagrams for remark in diagram.remarks)),
     )
+
+
+def _lobes_of_all(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
+    return [lobe for diagram in diagrams for lobe in diagram.lobes]
 
 
 def pad_columns(tables: Sequence[Floats]) -> list[Floats]:

@@ -17,7 +17,7 @@ from acquisition.channel import Channel, SensorInput
 from acquisition.errors import DeviceError
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers import library_device
-from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
+from acquisition.vendor_drivers.library_device import LibraryDevice, StreamReader, VoltageBlock
 
 _MODEL = r"(?P<model>(?:485B|333D|633A|SDC0)\w\w)"
 _DATA = r".(?P<format>[123])(?P<serial>\w{6})(?P<counts>\d{14}|\d{10})(?P<date>\d{6})"
@@ -131,7 +131,7 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
 
 
-class AudioReader(LibraryReader):
+class AudioReader(StreamReader):
     """Reader of the blocks that PortAudio delivers in a thread of its own."""
 
     def __init__(

@@ -71,12 +71,9 @@ class LibraryReader:
 
     errors: tuple[type[Exception], ...]
     """Exceptions that the library raises."""
-    _stream: Any
-    """Stream or task of the library, unless start, stop and close are overridden."""
 
     def start(self) -> None:
         """Start sampling."""
-        self._stream.start()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         """Return the scans that have arrived, None if none has arrived in time.
@@ -90,15 +87,28 @@ class LibraryReader:
 
     def stop(self) -> None:
         """End sampling. Harmless if it has ended."""
-        self._stream.stop()
 
     def close(self) -> None:
         """Release the device."""
-        self._stream.close()
 
     def fault(self) -> str:
         """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""
         return ""
+
+
+class StreamReader(LibraryReader):
+    """Reader of a library whose stream or task is started, stopped and closed."""
+
+    _stream: Any
+
+    def start(self) -> None:
+        self._stream.start()
+
+    def stop(self) -> None:
+        self._stream.stop()
+
+    def close(self) -> None:
+        self._stream.close()
 
 
 @dataclass

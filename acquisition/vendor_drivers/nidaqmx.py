@@ -10,7 +10,7 @@ import numpy as np
 from acquisition.channel import Channel, SensorInput
 from acquisition.source import DeviceAddress, DeviceIdentity
 from acquisition.vendor_drivers import library_device
-from acquisition.vendor_drivers.library_device import LibraryDevice, LibraryReader, VoltageBlock
+from acquisition.vendor_drivers.library_device import LibraryDevice, StreamReader, VoltageBlock
 
 NIDAQMX_BUFFER_TIME = 10.0
 """Length of the NI-DAQmx buffer (s). A late reader gets an error there, never a gap."""
@@ -84,7 +84,7 @@ def open_nidaqmx(port: str, inputs: Sequence[SensorInput], sample_rate: float | 
         return LibraryDevice(port, reader, _read_identity(device), channels, rate, "buffer overrun")
 
 
-class NidaqmxReader(LibraryReader):
+class NidaqmxReader(StreamReader):
     """Reader of a task that samples continuously."""
 
     def __init__(self, task: Any, n_channels: int, rate: float) -> None:

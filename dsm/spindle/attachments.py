@@ -54,12 +54,13 @@ class Bearing:
         where : str
             Beginning of the message.
         """
-        springs, others = ("stiffness", "housing_stiffness"), {"damping": "N s/m", "rotational_stiffness": "N m/rad"}
-        require_numbers(where, self, dict.fromkeys(springs, "N/m"), positive=True, infinite=True)
-        require_numbers(where, self, others)
+        require_numbers(where, self, {"stiffness": "N/m"}, positive=True, infinite=True)
+        require_numbers(where, self, {"damping": "N s/m"})
         if self.rolling_elements not in get_args(RollingElements):
             known = ", ".join(get_args(RollingElements))
             raise ValueError(f"{where}rolling_elements={self.rolling_elements!r} is none of {known}")
+        require_numbers(where, self, {"rotational_stiffness": "N m/rad"})
+        require_numbers(where, self, {"housing_stiffness": "N/m"}, positive=True, infinite=True)
 
 
 @dataclass(frozen=True)

@@ -178,8 +178,10 @@ class Segment:
         where : str
             Beginning of the message.
         """
-        require_numbers(where, self, {"length": "m", "outer_diameter": "m", "end_outer_diameter": "m"}, positive=True)
+        require_numbers(where, self, {"length": "m", "outer_diameter": "m"}, positive=True)
         _check_bore(where, "", self.bore_diameter, self.outer_diameter)
+        if self.end_outer_diameter is not None:
+            require_numbers(where, self, {"end_outer_diameter": "m"}, positive=True)
         if self.is_cone:
             outer, bore = self.diameters_at(1.0)
             _check_bore(where, "end_", bore, outer)

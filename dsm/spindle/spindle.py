@@ -10,7 +10,7 @@ import numpy as np
 
 from dsm.arrays import require_numbers
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.segment import MATERIAL_UNITS, SAME_PLACE, STEEL, Material, Segment, nearest_index, ring_area
+from dsm.spindle.segment import SAME_PLACE, STEEL, Material, Segment, nearest_index, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
@@ -67,7 +67,9 @@ class Spindle:
             raise ValueError(f"theory={self.theory!r} is none of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
             raise ValueError(f"{len(self.segments)} segments were given; a spindle has 1 to {MAX_SEGMENTS} of them")
-        require_numbers("", self, MATERIAL_UNITS, positive=True)
+        require_numbers("", self, {"youngs_modulus": "Pa", "density": "kg/m^3"}, positive=True)
+        if self.shear_modulus is not None:
+            require_numbers("", self, {"shear_modulus": "Pa"}, positive=True)
         for number, segment in enumerate(self.segments, 1):
             segment.check(f"segment {number}: ")
         for kind, parts in (("bearing", self.bearings), ("mass", self.masses), ("joint", self.joints)):

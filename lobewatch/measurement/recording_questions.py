@@ -214,6 +214,9 @@ def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable
     if now is None:
         return ()
     newest = max((tap.created for tap in taps if not tap.excluded), default=None)
-    is_behind = newest is not None and (now < newest or created < newest - MAX_RESUME_AGE)
-    asked = is_behind, created < clock.FIRST_RELEASE, clock.is_in_future(created, now)
-    return tuple(code for code, is_asked in zip(clock.CLOCK_QUESTIONS, asked, strict=True) if is_asked)
+    is_asked = {
+        "clock-behind": newest is not None and (now < newest or created < newest - MAX_RESUME_AGE),
+        "clock-before-release": created < clock.FIRST_RELEASE,
+        "clock-ahead": clock.is_in_future(created, now),
+    }
+    return tuple(code for code in clock.CLOCK_QUESTIONS if is_asked[code])

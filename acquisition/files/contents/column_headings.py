@@ -4,10 +4,10 @@ import re
 import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import cast, get_args
+from typing import get_args
 
 from acquisition.files.contents.contents import FrfRole, ImportReport, Role, Signal
-from acquisition.files.contents.units import VOLTAGE_UNITS, get_motion, parse_unit
+from acquisition.files.contents.units import VOLTAGE_UNITS, parse_unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _PART_OF_FRF = re.compile(
@@ -39,13 +39,27 @@ _ROLE_PATTERNS: tuple[tuple[str, Role], ...] = (
     (r"tacho", "tacho"),
 )
 """Role of a column by the beginning of its name in lower case and without accents, in seven languages."""
-_MOTIONS, _FORMS = ("acceleration", "velocity", "displacement"), ("receptance", "mobility", "accelerance")
-_OTHER_ROLES = {"db": "magnitude", "-": "ignored"} | dict.fromkeys(_MOTIONS, "response") | dict.fromkeys(_FORMS, "frf")
-_QUANTITY_WORDS = ("time", "frequency", "force", "response", *_MOTIONS, "frf", *_FORMS)
-_PART_WORDS = ("real", "imag", "magnitude", "db", "phase", "coherence", "speed", "tacho", "-")
-COLUMN_ROLES = {
-    word: (cast(Role, _OTHER_ROLES.get(word, word)), get_motion(word) if word in ("force", *_MOTIONS, *_FORMS) else "")
-    for word in (*_QUANTITY_WORDS, *_PART_WORDS)
+COLUMN_ROLES: dict[str, tuple[Role, str]] = {
+    "time": ("time", ""),
+    "frequency": ("frequency", ""),
+    "force": ("force", "force"),
+    "response": ("response", ""),
+    "acceleration": ("response", "acceleration"),
+    "velocity": ("response", "velocity"),
+    "displacement": ("response", "displacement"),
+    "frf": ("frf", ""),
+    "receptance": ("frf", "displacement"),
+    "mobility": ("frf", "velocity"),
+    "accelerance": ("frf", "acceleration"),
+    "real": ("real", ""),
+    "imag": ("imag", ""),
+    "magnitude": ("magnitude", ""),
+    "db": ("magnitude", ""),
+    "phase": ("phase", ""),
+    "coherence": ("coherence", ""),
+    "speed": ("speed", ""),
+    "tacho": ("tacho", ""),
+    "-": ("ignored", ""),
 }
 """Role and quantity of a column, by its word in `Description.columns`."""
 

@@ -3,7 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from acquisition.frf import FrfQuantity
 
@@ -22,14 +22,19 @@ MOTION_QUANTITIES = ("displacement", "velocity", "acceleration")
 VOLTAGE_UNITS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
 """Volts per unit of a voltage in lower case; no part of other units."""
 
-_LENGTH, _VELOCITY, _ACCELERATION, _DIMENSIONLESS = (1, 0, 0), (1, -1, 0), (1, -2, 0), (0, 0, 0)
-_TIME, _FREQUENCY, _FORCE = (0, 1, 0), (0, -1, 0), (0, 0, 1)
-_FRF_DIMENSIONS = (1, 0, -1), (1, -1, -1), (1, -2, -1)
-_DIMENSIONS = (_TIME, _FREQUENCY, _FORCE, _LENGTH, _VELOCITY, _ACCELERATION, *_FRF_DIMENSIONS)
-QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = dict(
-    zip(_DIMENSIONS, get_args(MeasuredQuantity)[:-1], strict=True)
-)
+QUANTITY_BY_DIMENSION: dict[Dimension, MeasuredQuantity] = {
+    (0, 1, 0): "time",
+    (0, -1, 0): "frequency",
+    (0, 0, 1): "force",
+    (1, 0, 0): "displacement",
+    (1, -1, 0): "velocity",
+    (1, -2, 0): "acceleration",
+    (1, 0, -1): "receptance",
+    (1, -1, -1): "mobility",
+    (1, -2, -1): "accelerance",
+}
 """Quantity by the exponents of length, time and force."""
+_LENGTH, _TIME, _FREQUENCY, _FORCE, _DIMENSIONLESS = (1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, 0)
 _UNIT_GROUPS: tuple[tuple[Dimension, dict[str, float]], ...] = (
     (_LENGTH, {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9}),
     (_LENGTH, {"in": 0.0254, "inch": 0.0254, "mil": 2.54e-5, "ft": 0.3048}),
@@ -39,7 +44,7 @@ _UNIT_GROUPS: tuple[tuple[Dimension, dict[str, float]], ...] = (
     (_FORCE, {"N": 1.0, "newton": 1.0, "newtons": 1.0, "daN": 10.0, "kN": 1e3, "mN": 1e-3}),
     (_FORCE, {"lbf": POUND_FORCE, "lb": POUND_FORCE, "kgf": STANDARD_GRAVITY}),
     ((-1, 2, 1), {"kg": 1.0}),
-    (_ACCELERATION, {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
+    ((1, -2, 0), {"g": STANDARD_GRAVITY, "gal": 1e-2, "gn": STANDARD_GRAVITY}),
 )
 _UNITS_BY_NAME = {name: (factor, group) for group, units in _UNIT_GROUPS for name, factor in units.items()}
 _UNITS = _UNITS_BY_NAME | {name.lower(): value for name, value in _UNITS_BY_NAME.items() if name != "mN"}

@@ -1,6 +1,6 @@
 """Tables of machine.toml on the machine, its tap test, its sensors and its DAQ."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from math import hypot, isfinite
 from typing import Annotated, Literal, Self
@@ -192,11 +192,19 @@ class ChannelTable(TomlTable, frozen=True):
 
     def build(self) -> SensorInput:
         """Build the sensor input in SI units: volts per N or per m/s^2."""
-        per_newton, per_g = self.sensitivity_mv_per_n, self.sensitivity_mv_per_g or 0.0
-        sensitivity = per_g / 1e3 / acquisition.STANDARD_GRAVITY if per_newton is None else per_newton / 1e3
-        date = self.calibration_date.isoformat() if self.calibration_date else ""
-        channel = Channel(self.quantity, sensitivity * self.gain, self.range_v, skew=self.skew_us / 1e6)
-        channel = replace(channel, direction=self.direction, serial_number=self.serial_number, calibration_date=date)
+        if self.sensitivity_mv_per_n is not None:
+            sensitivity = self.sensitivity_mv_per_n / 1e3
+        else:
+            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / acquisition.STANDARD_GRAVITY
+        channel = Channel(
+            self.quantity,
+            sensitivity * self.gain,
+            self.range_v,
+            direction=self.direction,
+            serial_number=self.serial_number,
+            calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
+            skew=self.skew_us / 1e6,
+        )
         return SensorInput(self.input, channel, self.iepe)
 
 

@@ -45,11 +45,19 @@ class SegmentTable(TomlTable, frozen=True):
 
     def build(self) -> Segment:
         """Build the segment in SI units."""
-        material = MATERIALS[self.material] if self.material else None
-        segment = Segment(self.length_mm / 1e3, self.outer_mm / 1e3, self.bore_mm / 1e3, material=material)
-        diameters = self.end_outer_mm, self.end_bore_mm, self.mass_outer_mm
-        outer, bore, mass = (None if diameter is None else diameter / 1e3 for diameter in diameters)
-        return replace(segment, end_outer_diameter=outer, end_bore_diameter=bore, mass_diameter=mass)
+        return Segment(
+            self.length_mm / 1e3,
+            self.outer_mm / 1e3,
+            self.bore_mm / 1e3,
+            material=MATERIALS[self.material] if self.material else None,
+            end_outer_diameter=_to_metres(self.end_outer_mm),
+            end_bore_diameter=_to_metres(self.end_bore_mm),
+            mass_diameter=_to_metres(self.mass_outer_mm),
+        )
+
+
+def _to_metres(millimetres: float | None) -> float | None:
+    return None if millimetres is None else millimetres / 1e3
 
 
 class BearingTable(TomlTable, frozen=True):
@@ -66,10 +74,15 @@ class BearingTable(TomlTable, frozen=True):
     def build(self, stiffness_n_per_um: float) -> Bearing:
         """Build the bearing in SI units, with a default stiffness."""
         stiffness = stiffness_n_per_um if self.stiffness_n_per_um is None else self.stiffness_n_per_um
-        housing, tilting = self.housing_stiffness_n_per_um * 1e6, self.rotational_stiffness_n_m_per_rad
-        bearing = Bearing(self.position_mm / 1e3, stiffness * 1e6, damping=self.damping_n_s_per_m, group=self.group)
-        bearing = replace(bearing, rotational_stiffness=tilting, housing_stiffness=housing)
-        return replace(bearing, rolling_elements=self.rolling_elements)
+        return Bearing(
+            self.position_mm / 1e3,
+            stiffness * 1e6,
+            damping=self.damping_n_s_per_m,
+            rotational_stiffness=self.rotational_stiffness_n_m_per_rad,
+            housing_stiffness=self.housing_stiffness_n_per_um * 1e6,
+            group=self.group,
+            rolling_elements=self.rolling_elements,
+        )
 
 
 class MassTable(TomlTable, frozen=True):
@@ -136,12 +149,16 @@ class SpindleTable(TomlTable, frozen=True):
 
     def build(self) -> Spindle:
         """Build the spindle in SI units."""
-        segments = [segment.build() for segment in self.segments]
-        bearings = [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings]
-        masses, joints = [mass.build() for mass in self.masses], [joint.build() for joint in self.joints]
-        shear = None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9
-        steel = self.youngs_modulus_gpa * 1e9, self.density_kg_per_m3, self.theory, shear
-        return Spindle(segments, bearings, *steel, masses, joints)
+        return Spindle(
+            [segment.build() for segment in self.segments],
+            [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings],
+            youngs_modulus=self.youngs_modulus_gpa * 1e9,
+            density=self.density_kg_per_m3,
+            theory=self.theory,
+            shear_modulus=None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9,
+            masses=[mass.build() for mass in self.masses],
+            joints=[joint.build() for joint in self.joints],
+        )
 
 
 def _check_wall(bore: float, outer: float, bore_key: str, outer_key: str) -> None:

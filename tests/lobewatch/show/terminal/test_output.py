@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 from rich.text import Text
 
+from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import SafeConsole, emit, make_printable, new_table
 
 HARM = "\x1b]0;owned\x07\x1b[2J\x9b31m\r\x00\x7f\u2028"
@@ -70,3 +71,8 @@ def test_json_on_a_terminal_is_coloured_as_rich_does_it() -> None:
         emit(payload, True)
     Console(file=theirs, force_terminal=True, width=80).print_json(json.dumps(payload))
     assert ours.getvalue() == theirs.getvalue()
+
+
+def test_fields_become_options_and_file_names_stay() -> None:
+    shown = with_option_names("Conditions.csv, my-Window.txt: give Description.force_unit or Workers.jobs")
+    assert shown == "Conditions.csv, my-Window.txt: give --force-unit or --jobs"

@@ -18,8 +18,12 @@ def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], repor
     """Return all tap tests of the demo, and the forecast with the true dates."""
     levels = {item.level: {**item.reached.to_row(), "truth": _date_text(item.truth)} for item in forecasts}
     rows = [
-        {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
-        | {"truth": _state_json(tap.plan.truth), "found": _state_json(tap.result)}
+        {
+            "date": tap.plan.date.isoformat(),
+            "direction": tap.plan.direction,
+            "truth": _state_json(tap.plan.truth),
+            "found": _state_json(tap.result),
+        }
         for tap in taps
     ]
     return {"taps": rows, "forecast": levels, "report": str(report)}

@@ -48,13 +48,20 @@ def _utc_text(time: datetime | str) -> str:
 
 def cut_json(cut: CutEntry) -> JsonObject:
     """Return one test cut as a JSON object."""
-    return (
-        {"id": cut.id, "time": _utc_text(cut.at), **pick(cut, "program", "tool", "feed", "speed_rpm", "commanded_rpm")}
-        | {"depth_mm": cut.depth * 1e3, "word": cut.word, "chatter_frequency_hz": cut.chatter_frequency_hz}
-        | {"chatter_frequency_hz_std": cut.chatter_frequency_std_hz, "by": cut.by}
-        | power_json(cut.power)
-        | {"reason": cut.reason, "recording": cut.recording and cut.recording.file, "excluded": cut.excluded}
-    )
+    return {
+        "id": cut.id,
+        "time": _utc_text(cut.at),
+        **pick(cut, "program", "tool", "feed", "speed_rpm", "commanded_rpm"),
+        "depth_mm": cut.depth * 1e3,
+        "word": cut.word,
+        "chatter_frequency_hz": cut.chatter_frequency_hz,
+        "chatter_frequency_hz_std": cut.chatter_frequency_std_hz,
+        "by": cut.by,
+        **power_json(cut.power),
+        "reason": cut.reason,
+        "recording": cut.recording and cut.recording.file,
+        "excluded": cut.excluded,
+    }
 
 
 def event_json(event: MaintenanceEvent) -> JsonObject:
@@ -197,16 +204,24 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
 def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
     verdicts = row.verdicts or {}
     names = [program.name for program in logbook.machine.program if program.name in verdicts]
-    return (
-        {"id": row.tap_id, "time": _utc_text(row.time), "tool": row.tool, "direction": row.direction}
-        | {"frequency_hz": row.frequency.value, "frequency_hz_std": row.frequency.std}
-        | {"damping_ratio": row.damping_ratio.value, "damping_ratio_std": row.damping_ratio.std}
-        | {"stiffness_n_per_m": row.stiffness.value, "stiffness_n_per_m_std": row.stiffness.std}
-        | {"baseline": row.baseline and _utc_text(row.baseline), "series": row.series}
-        | {"conditions": row.conditions.specified, "software": row.software or logbook.history.software}
-        | {"questions": [question.code for question in row.questions]}
-        | {"verdicts": {name: verdicts[name].stability.value for name in names}}
-    )
+    return {
+        "id": row.tap_id,
+        "time": _utc_text(row.time),
+        "tool": row.tool,
+        "direction": row.direction,
+        "frequency_hz": row.frequency.value,
+        "frequency_hz_std": row.frequency.std,
+        "damping_ratio": row.damping_ratio.value,
+        "damping_ratio_std": row.damping_ratio.std,
+        "stiffness_n_per_m": row.stiffness.value,
+        "stiffness_n_per_m_std": row.stiffness.std,
+        "baseline": row.baseline and _utc_text(row.baseline),
+        "series": row.series,
+        "conditions": row.conditions.specified,
+        "software": row.software or logbook.history.software,
+        "questions": [question.code for question in row.questions],
+        "verdicts": {name: verdicts[name].stability.value for name in names},
+    }
 
 
 def _excluded_json(tap: TapEntry) -> JsonObject:

@@ -26,14 +26,18 @@ def measurement_json(measurement: Measurement, logbook: Logbook) -> JsonObject:
     assembly = logbook.assembly(until=measurement.tap_id)
     lobes = compute_lobes(assembly, logbook.machine)
     followed, calibration = measurement.followed, measurement.calibration
-    return (
-        {"tap_id": measurement.tap_id, "time": measurement.time.isoformat(), **pick(measurement, "tool", "direction")}
-        | {"conditions": _tap_conditions(measurement, logbook).specified}
-        | {"modes": list(map(mode_json, measurement.modes)), "followed": followed and mode_json(followed)}
-        | {"calibration": calibration and calibration_json(calibration)}
-        | {"preload_left": _remaining_preload(measurement, logbook)}
-        | {"lobes": list(starmap(lobes_json, lobes.items())), "remarks": assembly.remarks}
-    )
+    return {
+        "tap_id": measurement.tap_id,
+        "time": measurement.time.isoformat(),
+        **pick(measurement, "tool", "direction"),
+        "conditions": _tap_conditions(measurement, logbook).specified,
+        "modes": list(map(mode_json, measurement.modes)),
+        "followed": followed and mode_json(followed),
+        "calibration": calibration and calibration_json(calibration),
+        "preload_left": _remaining_preload(measurement, logbook),
+        "lobes": list(starmap(lobes_json, lobes.items())),
+        "remarks": assembly.remarks,
+    }
 
 
 def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:

@@ -15,34 +15,46 @@ NODE_STIFFNESS_RATIO = 1e4
 
 def calibration_json(calibration: Calibration) -> JsonObject:
     """Return a bearing stiffness calibrated to one mode, and the stiffness at the tool tip before and after."""
-    return (
-        {"frequency_hz": calibration.frequency, "mode": calibration.mode, "theory": calibration.spindle.theory}
-        | {"bearing_stiffness_n_per_m": calibration.bearing_stiffness}
-        | {"bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std}
-        | {"bearing_stiffness_n_per_m_interval": calibration.bearing_stiffness_interval}
-        | {"residual_hz": calibration.residual, **pick(calibration, "factor", "sensitivity", "remarks", "energy_share")}
-        | {"static_tip_stiffness_n_per_m": calibration.static_stiffness_after}
-        | {"static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before}
-        | {"modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after}
-        | {"modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before}
-    )
+    return {
+        "frequency_hz": calibration.frequency,
+        "mode": calibration.mode,
+        "theory": calibration.spindle.theory,
+        "bearing_stiffness_n_per_m": calibration.bearing_stiffness,
+        "bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std,
+        "bearing_stiffness_n_per_m_interval": calibration.bearing_stiffness_interval,
+        "residual_hz": calibration.residual,
+        **pick(calibration, "factor", "sensitivity", "remarks", "energy_share"),
+        "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
+        "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,
+        "modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after,
+        "modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before,
+    }
 
 
 def model_json(model: ModelSummary) -> JsonObject:
     """Return a spindle model with its modes."""
     spindle = model.state.spindle
     modes = [
-        {"frequency_hz": mode.frequency, "modal_tip_stiffness_n_per_m": mode.tip_stiffness}
-        | {"bearing_energy_share": mode.bearing_share, "segment_energy_share": mode.segment_share}
-        | {"joint_energy_share": mode.joint_share}
+        {
+            "frequency_hz": mode.frequency,
+            "modal_tip_stiffness_n_per_m": mode.tip_stiffness,
+            "bearing_energy_share": mode.bearing_share,
+            "segment_energy_share": mode.segment_share,
+            "joint_energy_share": mode.joint_share,
+        }
         for mode in model.modes
     ]
-    return (
-        {"tool": model.state.tool, "bearings_from": model.state.origin, "theory": spindle.theory}
-        | {"length_mm": spindle.length * 1e3, "mass_kg": spindle.mass, "modes": modes}
-        | {"static_tip_stiffness_n_per_m": model.static_stiffness, "critical_speed_rpm": model.critical_speed}
-        | {"first_frequency_with_rigid_bearings_hz": model.rigid_frequency}
-    )
+    return {
+        "tool": model.state.tool,
+        "bearings_from": model.state.origin,
+        "theory": spindle.theory,
+        "length_mm": spindle.length * 1e3,
+        "mass_kg": spindle.mass,
+        "modes": modes,
+        "static_tip_stiffness_n_per_m": model.static_stiffness,
+        "critical_speed_rpm": model.critical_speed,
+        "first_frequency_with_rigid_bearings_hz": model.rigid_frequency,
+    }
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
@@ -50,12 +62,16 @@ def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
     errors = None if std is None else np.where(is_fitted, std, np.nan)
     values = np.where(is_fitted, fit.stiffness, np.nan)
-    return (
-        pick(fit, "groups", "factor", "factor_std")
-        | {"stiffness_n_per_m": values, "stiffness_n_per_m_std": errors, "correlation": fit.correlation}
-        | {"mode": fit.mode, "frequency_hz": fit.frequency, "residual_hz": fit.residual}
-        | pick(fit, "energy_share", "condition", "remarks")
-    )
+    return {
+        **pick(fit, "groups", "factor", "factor_std"),
+        "stiffness_n_per_m": values,
+        "stiffness_n_per_m_std": errors,
+        "correlation": fit.correlation,
+        "mode": fit.mode,
+        "frequency_hz": fit.frequency,
+        "residual_hz": fit.residual,
+        **pick(fit, "energy_share", "condition", "remarks"),
+    }
 
 
 def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
@@ -101,14 +117,16 @@ def model_texts(model: ModelSummary) -> Texts:
 def tools_json(calibration: JointCalibration) -> JsonObject:
     """Return the fit to several tools, what it rests on, and tools that it predicts."""
     fit = calibration.fit
-    return (
-        stiffness_fit_json(fit)
-        | {"taps": {tap.tool: tap.tap_id for tap in calibration.taps}}
-        | {"tool": [calibration.taps[i].tool for i in fit.shaft], "fits_one_spindle": not fit.has_misfit}
-        | {"not_counted_hz": calibration.unmatched, "machine_toml": _joint_lines(calibration.joints)}
-        | {"predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()}}
-        | {"remarks": [*fit.remarks, *calibration.remarks]}
-    )
+    return {
+        **stiffness_fit_json(fit),
+        "taps": {tap.tool: tap.tap_id for tap in calibration.taps},
+        "tool": [calibration.taps[i].tool for i in fit.shaft],
+        "fits_one_spindle": not fit.has_misfit,
+        "not_counted_hz": calibration.unmatched,
+        "machine_toml": _joint_lines(calibration.joints),
+        "predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()},
+        "remarks": [*fit.remarks, *calibration.remarks],
+    }
 
 
 def tools_texts(calibration: JointCalibration) -> Texts:

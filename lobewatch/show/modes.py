@@ -29,17 +29,27 @@ NON_FILE_ORIGINS = "option", "default"
 def mode_json(mode: Mode) -> JsonObject:
     """Return one mode with its standard errors over the hits and of the fit."""
     std, of_fit = mode.standard_error, mode.fit_error
-    return (
-        {"frequency_hz": mode.frequency, "frequency_hz_std": std[0], "frequency_hz_std_of_fit": of_fit[0]}
-        | {"damping_ratio": mode.damping_ratio, "damping_ratio_std": std[1], "damping_ratio_std_of_fit": of_fit[1]}
-        | {"stiffness_n_per_m": mode.stiffness, "stiffness_n_per_m_std": std[2]}
-        | {"stiffness_n_per_m_std_of_fit": of_fit[2]}
-        | {"interval_95": mode.interval(), "correlation": mode.correlation, "hits": mode.n_hits}
-        | {"driving_point": mode.is_driving_point}
-        | pick(mode, "phase_deg", "phase_deg_std", "coherence", "misfit", "misfit_share")
-        | {"trust": assess_trust(mode), "found_again": mode.match_count}
-        | {"half_power_damping_ratio": mode.half_power_damping, "remarks": mode.remarks, "method": mode.method}
-    )
+    return {
+        "frequency_hz": mode.frequency,
+        "frequency_hz_std": std[0],
+        "frequency_hz_std_of_fit": of_fit[0],
+        "damping_ratio": mode.damping_ratio,
+        "damping_ratio_std": std[1],
+        "damping_ratio_std_of_fit": of_fit[1],
+        "stiffness_n_per_m": mode.stiffness,
+        "stiffness_n_per_m_std": std[2],
+        "stiffness_n_per_m_std_of_fit": of_fit[2],
+        "interval_95": mode.interval(),
+        "correlation": mode.correlation,
+        "hits": mode.n_hits,
+        "driving_point": mode.is_driving_point,
+        **pick(mode, "phase_deg", "phase_deg_std", "coherence", "misfit", "misfit_share"),
+        "trust": assess_trust(mode),
+        "found_again": mode.match_count,
+        "half_power_damping_ratio": mode.half_power_damping,
+        "remarks": mode.remarks,
+        "method": mode.method,
+    }
 
 
 def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
@@ -143,12 +153,16 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
 def file_modes_json(file_modes: FileModes) -> JsonObject:
     """Return the modes of one file, fitted and by peak picking."""
     frf = file_modes.frf
-    return (
-        {"file": str(file_modes.path), "n_averages": frf and frf.n_averages, "usable_band_hz": frf and frf.usable_band}
-        | {"facts": file_modes.facts, "by_hand": file_modes.by_hand}
-        | {"modes": list(map(mode_json, file_modes.fitted)), "peak_picking": list(map(mode_json, file_modes.picked))}
-        | {"remarks": file_modes.remarks}
-    )
+    return {
+        "file": str(file_modes.path),
+        "n_averages": frf and frf.n_averages,
+        "usable_band_hz": frf and frf.usable_band,
+        "facts": file_modes.facts,
+        "by_hand": file_modes.by_hand,
+        "modes": list(map(mode_json, file_modes.fitted)),
+        "peak_picking": list(map(mode_json, file_modes.picked)),
+        "remarks": file_modes.remarks,
+    }
 
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Texts:

@@ -71,14 +71,20 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
     if measurement is None or tap is None or recording is None:
         return status
     followed, asked = measurement.followed, find_open_questions(measurement.remarks)
-    return (
-        status
-        | {"format": recording.title, "facts": recording.facts, "time": measurement.time.isoformat()}
-        | {"tool": measurement.tool, "direction": measurement.direction, "hits": [flags.words for flags in tap.flags]}
-        | {"lines": tap.frf and tap.frf.frequency.size, "averages": tap.frf and tap.frf.n_averages}
-        | {"modes": list(map(mode_json, measurement.modes)), "followed": followed and mode_json(followed)}
-        | {"questions": [{"code": question.code, "text": question.text} for question in asked]}
-    )
+    return {
+        **status,
+        "format": recording.title,
+        "facts": recording.facts,
+        "time": measurement.time.isoformat(),
+        "tool": measurement.tool,
+        "direction": measurement.direction,
+        "hits": [flags.words for flags in tap.flags],
+        "lines": tap.frf and tap.frf.frequency.size,
+        "averages": tap.frf and tap.frf.n_averages,
+        "modes": list(map(mode_json, measurement.modes)),
+        "followed": followed and mode_json(followed),
+        "questions": [{"code": question.code, "text": question.text} for question in asked],
+    }
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:

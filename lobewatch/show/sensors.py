@@ -74,32 +74,46 @@ def _ports_summary(ports: tuple[ScannedPort, ...]) -> str:
 def sensors_json(sensors: SensorList) -> JsonObject:
     """Return the device, its channels and its sample rate."""
     measured = sensors.measured_rate
-    return (
-        pick(sensors.identity, "model", "serial")
-        | {"channels": list(map(_channel_json, sensors.channels)), "sample_rate_hz": sensors.nominal_rate}
-        | {"measured_rate_hz": measured and measured.rate, "measured_rate_hz_std": measured and measured.std}
-        | {"remarks": sensors.remarks, "errors": sensors.errors}
-    )
+    return {
+        **pick(sensors.identity, "model", "serial"),
+        "channels": list(map(_channel_json, sensors.channels)),
+        "sample_rate_hz": sensors.nominal_rate,
+        "measured_rate_hz": measured and measured.rate,
+        "measured_rate_hz_std": measured and measured.std,
+        "remarks": sensors.remarks,
+        "errors": sensors.errors,
+    }
 
 
 def _channel_json(channel: Channel) -> JsonObject:
-    return (
-        {"quantity": channel.quantity, "direction": channel.direction, "sensitivity_v_per_si": channel.sensitivity}
-        | {"full_scale_v": channel.full_scale, "full_scale_si": channel.full_scale / abs(channel.sensitivity)}
-        | pick(channel, "adc_bits", "serial_number", "calibration_date")
-        | {"skew_us": channel.skew * 1e6}
-    )
+    return {
+        "quantity": channel.quantity,
+        "direction": channel.direction,
+        "sensitivity_v_per_si": channel.sensitivity,
+        "full_scale_v": channel.full_scale,
+        "full_scale_si": channel.full_scale / abs(channel.sensitivity),
+        **pick(channel, "adc_bits", "serial_number", "calibration_date"),
+        "skew_us": channel.skew * 1e6,
+    }
 
 
 def mass_check_json(check: MassCheck) -> JsonObject:
     """Return the ratio F/(m a) of a hung mass, and the sensitivities that follow from it."""
     result = check.calibration
-    return (
-        {"mass_kg": result.mass, "ratio": result.ratio, "ratio_std": result.ratio_std, "phase_deg": result.phase}
-        | {"inverted": result.inverted, "flatness": result.flatness, "band_hz": result.band, "hits": result.n_hits}
-        | {"agrees": result.agrees, "force_sensitivity_v_per_n": result.force_sensitivity}
-        | {"acceleration_sensitivity_v_per_m_s2": result.acceleration_sensitivity, "remarks": result.remarks}
-    )
+    return {
+        "mass_kg": result.mass,
+        "ratio": result.ratio,
+        "ratio_std": result.ratio_std,
+        "phase_deg": result.phase,
+        "inverted": result.inverted,
+        "flatness": result.flatness,
+        "band_hz": result.band,
+        "hits": result.n_hits,
+        "agrees": result.agrees,
+        "force_sensitivity_v_per_n": result.force_sensitivity,
+        "acceleration_sensitivity_v_per_m_s2": result.acceleration_sensitivity,
+        "remarks": result.remarks,
+    }
 
 
 def skew_check_json(check: SkewCheck) -> JsonObject:

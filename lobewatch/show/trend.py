@@ -31,14 +31,20 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
     status, trend = outlook.status, series.trend
     points, rate = trend.points if trend else (), trend and trend.rate
     used = [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in points]
-    return (
-        {"tool": series.tool, "direction": series.direction, "points": used}
-        | {"score": trend and trend.detection.scores[-1], "alarm": trend and _drop_json(trend)}
-        | {"alarms": [alarm.to_row(status.time) for alarm in status.alarms], "light": status.status}
-        | {"fall_percent": series.drop.value, "fall_std_percent": series.drop.std, "preload_left": preload}
-        | {"rate_percent_per_month": rate and rate._asdict()}
-        | {"forecast": build_forecast_rows(outlook.programs, outlook.limits)}
-    )
+    return {
+        "tool": series.tool,
+        "direction": series.direction,
+        "points": used,
+        "score": trend and trend.detection.scores[-1],
+        "alarm": trend and _drop_json(trend),
+        "alarms": [alarm.to_row(status.time) for alarm in status.alarms],
+        "light": status.status,
+        "fall_percent": series.drop.value,
+        "fall_std_percent": series.drop.std,
+        "preload_left": preload,
+        "rate_percent_per_month": rate and rate._asdict(),
+        "forecast": build_forecast_rows(outlook.programs, outlook.limits),
+    }
 
 
 def _drop_json(trend: Trend) -> JsonObject | None:

@@ -153,21 +153,34 @@ def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] =
 def recorded_cut_json(comparison: CutComparison) -> JsonObject:
     """Return a recorded cut with all that was detected in it."""
     heard, chatter, expected = comparison.detected, comparison.detected.chatter, comparison.predicted
-    return (
-        {"word": heard.verdict, "reason": heard.reason, "chatter_frequency_hz": chatter and chatter.frequency}
-        | {"chatter_frequency_hz_std": chatter and chatter.error, "elsewhere_rpm": heard.distant_rpm}
-        | {"unexplained_tone_hz": heard.tone, "sensor": comparison.sensor, "speed_rpm": heard.speed_rpm}
-        | {"speed_rpm_std": heard.spindle_speed and heard.spindle_speed.error * 60}
-        | {"commanded_rpm": comparison.setting.speed_rpm, "measured_rpm": heard.measured_rpm}
-        | {"depth_mm": comparison.setting.depth * 1e3, "tooth_frequency_hz": comparison.tooth_passing_frequency}
-        | {"energy_ratio": heard.energy_ratio, "lobe": comparison.lobe_number}
-        | {"side_bands_hz": sorted(chatter.peaks.frequency.tolist()) if chatter else []}
-        | power_json(comparison.power)
-        | {"predicted": expected and ("stable" if expected.stable else "chatter")}
-        | {"predicted_frequency_hz": expected and expected.frequency}
-        | {"predicted_apart_hz": comparison.frequency_difference}
-        | {f"{name}_s": time for name, time in pick(heard.parts, "begin", "end", "steady_begin", "steady_end").items()}
-    )
+    return {
+        "word": heard.verdict,
+        "reason": heard.reason,
+        "chatter_frequency_hz": chatter and chatter.frequency,
+        "chatter_frequency_hz_std": chatter and chatter.error,
+        "elsewhere_rpm": heard.distant_rpm,
+        "unexplained_tone_hz": heard.tone,
+        "sensor": comparison.sensor,
+        "speed_rpm": heard.speed_rpm,
+        "speed_rpm_std": heard.spindle_speed and heard.spindle_speed.error * 60,
+        "commanded_rpm": comparison.setting.speed_rpm,
+        "measured_rpm": heard.measured_rpm,
+        "depth_mm": comparison.setting.depth * 1e3,
+        "tooth_frequency_hz": comparison.tooth_passing_frequency,
+        "energy_ratio": heard.energy_ratio,
+        "lobe": comparison.lobe_number,
+        "side_bands_hz": sorted(chatter.peaks.frequency.tolist()) if chatter else [],
+        **power_json(comparison.power),
+        "predicted": expected and ("stable" if expected.stable else "chatter"),
+        "predicted_frequency_hz": expected and expected.frequency,
+        "predicted_apart_hz": comparison.frequency_difference,
+        **(
+            {
+                f"{name}_s": time
+                for name, time in pick(heard.parts, "begin", "end", "steady_begin", "steady_end").items()
+            }
+        ),
+    }
 
 
 def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:
@@ -219,9 +232,13 @@ def tried_depths_json(table: ProgramTable, depths: Sequence[PocketDepth], first:
         "program": table.name,
         "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
         "pockets": [
-            speed_pocket_json(tried.pocket)
-            | {"cut_at_rpm": tried.speed_rpm, "cuts": [cut.id for cut in tried.cuts]}
-            | {"heard_stable_mm": _known_mm(tried.stable_depth), "heard_chatter_mm": _known_mm(tried.chatter_depth)}
+            {
+                **speed_pocket_json(tried.pocket),
+                "cut_at_rpm": tried.speed_rpm,
+                "cuts": [cut.id for cut in tried.cuts],
+                "heard_stable_mm": _known_mm(tried.stable_depth),
+                "heard_chatter_mm": _known_mm(tried.chatter_depth),
+            }
             for tried in depths
         ],
     }
@@ -258,16 +275,22 @@ def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, flo
 def suggestion_json(next_cut: NextCut) -> JsonObject:
     """Return the next test cut, and what it rests on."""
     learning, best, cut = next_cut.learning, _best_stable_cut(next_cut.learning), next_cut.suggestion
-    suggested = cut and (
-        {"speed_rpm": cut.speed_rpm, "depth_mm": round(1e3 * cut.depth, 6)}
-        | {"chance_of_chatter": cut.chatter_probability, "expected_gain": cut.gain, "settles": cut.most_informative}
-        | {"repeats": cut.repeats or None}
-    )
-    return (
-        {"program": learning.program.name, "suggested": suggested}
-        | {"cuts_made": len(learning.own_cuts), "cuts_left": next_cut.cuts_left}
-        | {"best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]}, "learnt": learned_json(learning)}
-    )
+    suggested = cut and {
+        "speed_rpm": cut.speed_rpm,
+        "depth_mm": round(1e3 * cut.depth, 6),
+        "chance_of_chatter": cut.chatter_probability,
+        "expected_gain": cut.gain,
+        "settles": cut.most_informative,
+        "repeats": cut.repeats or None,
+    }
+    return {
+        "program": learning.program.name,
+        "suggested": suggested,
+        "cuts_made": len(learning.own_cuts),
+        "cuts_left": next_cut.cuts_left,
+        "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
+        "learnt": learned_json(learning),
+    }
 
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
@@ -318,11 +341,13 @@ def learned_json(learning: LearningResult) -> JsonObject:
     """Return factors on what was measured at rest (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
     before, posterior = learning.prior.intervals, learning.posterior
     factors = {name: {**now._asdict(), "before": before[name]._asdict()} for name, now in posterior.intervals.items()}
-    return (
-        {"cuts": [cut.id for cut in learning.accepted_cuts], "chatter_frequencies": posterior.n_frequencies}
-        | {"frequency_learnt": bool(posterior.n_frequencies), "effective_sample_size": posterior.effective_size}
-        | {"factors": factors}
-    )
+    return {
+        "cuts": [cut.id for cut in learning.accepted_cuts],
+        "chatter_frequencies": posterior.n_frequencies,
+        "frequency_learnt": bool(posterior.n_frequencies),
+        "effective_sample_size": posterior.effective_size,
+        "factors": factors,
+    }
 
 
 def learned_texts(learning: LearningResult) -> Texts:

@@ -28,19 +28,31 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
     ahead, worst = threshold_dates.find_next_limit(summary.limits), next(iter(summary.series), None)
     remarks = merge_remarks(dated.remarks)
     reasons = [remark.finding for remark in remarks if remark.code not in SEPARATE_REASON_CODES]
-    return (
-        {"key": machine.key, "name": summary.name, "light": dated.status, "is_early": dated.is_early}
-        | {"word": status_label(dated.status, dated.is_early), "can_be_judged": dated.is_readable}
-        | {"fall": worst.drop if worst else None, "fall_std": worst.drop_std if worst else None}
-        | {"series": worst.name if worst else "", "last_tap": summary.last_tap, "days_left": dated.days_left}
-        | {"reasons": reasons, "note": "; ".join(reasons)}
-        | {"why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue")}
-        | {"next_step": dated.next_step, "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms]}
-        | {"next_limit": threshold_dates.build_limit_row(ahead), "limit": next_limit_text(ahead, dated.time)}
-        | {"forecast": threshold_dates.build_forecast_rows(summary.forecasts, summary.limits)}
-        | {"has_port": summary.has_port, "programs": summary.programs, "points": worst.points if worst else ()}
-        | {"limits": [percent for percent, _ in summary.limits]}
-    )
+    return {
+        "key": machine.key,
+        "name": summary.name,
+        "light": dated.status,
+        "is_early": dated.is_early,
+        "word": status_label(dated.status, dated.is_early),
+        "can_be_judged": dated.is_readable,
+        "fall": worst.drop if worst else None,
+        "fall_std": worst.drop_std if worst else None,
+        "series": worst.name if worst else "",
+        "last_tap": summary.last_tap,
+        "days_left": dated.days_left,
+        "reasons": reasons,
+        "note": "; ".join(reasons),
+        "why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue"),
+        "next_step": dated.next_step,
+        "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
+        "next_limit": threshold_dates.build_limit_row(ahead),
+        "limit": next_limit_text(ahead, dated.time),
+        "forecast": threshold_dates.build_forecast_rows(summary.forecasts, summary.limits),
+        "has_port": summary.has_port,
+        "programs": summary.programs,
+        "points": worst.points if worst else (),
+        "limits": [percent for percent, _ in summary.limits],
+    }
 
 
 def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:

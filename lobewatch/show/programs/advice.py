@@ -59,12 +59,15 @@ def setting_json(setting: Setting) -> JsonObject:
 
 def _advice_json(program: ProgramAdvice) -> JsonObject:
     best, here, first = program.advice.best, program.advice.deepest_here, program.first_verdict
-    return (
-        verdict_json(program.verdict)
-        | {"was_stable_at_first": first and first.is_stable, "verdict_at_first": first and first.stability}
-        | {"advice": best and setting_json(best), "advice_here": here and setting_json(here)}
-        | {"tolerable_decay": program.advice.tolerable_drop, "remarks": program.remarks}
-    )
+    return {
+        **verdict_json(program.verdict),
+        "was_stable_at_first": first and first.is_stable,
+        "verdict_at_first": first and first.stability,
+        "advice": best and setting_json(best),
+        "advice_here": here and setting_json(here),
+        "tolerable_decay": program.advice.tolerable_drop,
+        "remarks": program.remarks,
+    }
 
 
 def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> JsonObject:
@@ -192,14 +195,19 @@ def lobes_json(name: str, lobes: StabilityLobes) -> JsonObject:
 def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> JsonObject:
     """Return the newest diagram, its pockets, and the verdicts on the programs with this cut."""
     now, lobes = comparison.now, comparison.now.lobes
-    return (
-        lobes_json(now.name, lobes)
-        | {"tap_id": now.assembly.tap_id, "source": now.source, "speed_rpm": lobes.speed_rpm}
-        | {"depth_mm": lobes.depth * 1e3, "chatter_frequencies_hz": lobes.chatter_frequency, "kind": lobes.kind}
-        | {"pockets": list(map(setting_json, comparison.pockets))}
-        | {"pocket_shifts": list(map(_shift_json, comparison.shifts))}
-        | {"programs": list(map(verdict_json, comparison.verdicts)), "remarks": merge_remarks(remarks)}
-    )
+    return {
+        **lobes_json(now.name, lobes),
+        "tap_id": now.assembly.tap_id,
+        "source": now.source,
+        "speed_rpm": lobes.speed_rpm,
+        "depth_mm": lobes.depth * 1e3,
+        "chatter_frequencies_hz": lobes.chatter_frequency,
+        "kind": lobes.kind,
+        "pockets": list(map(setting_json, comparison.pockets)),
+        "pocket_shifts": list(map(_shift_json, comparison.shifts)),
+        "programs": list(map(verdict_json, comparison.verdicts)),
+        "remarks": merge_remarks(remarks),
+    }
 
 
 def _shift_json(shift: PocketShift) -> JsonObject:

@@ -21,15 +21,20 @@ def material_json(material: CuttingCoefficients) -> JsonObject:
     forces = [
         {"kc1_1_n_per_mm2": kc.at_1_mm / 1e6, "mc": kc.exponent, "source": kc.source} for kc in material.specific_forces
     ]
-    return (
-        {"name": material.material, **pick(material, "iso_group", "equivalents")}
-        | {"kt_n_per_mm2": material.tangential / 1e6, "kt_range_n_per_mm2": spread and [kt / 1e6 for kt in spread]}
-        | {"kr_n_per_mm2": material.radial / 1e6, "kr_over_kt": material.radial / material.tangential}
-        | {"kr_over_kt_range": material.ratio_range, "kte_n_per_mm": material.tangential_edge / 1e3}
-        | {"kre_n_per_mm": material.radial_edge / 1e3}
-        | {"chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None, "specific_forces": forces}
-        | pick(material, "note", "source")
-    )
+    return {
+        "name": material.material,
+        **pick(material, "iso_group", "equivalents"),
+        "kt_n_per_mm2": material.tangential / 1e6,
+        "kt_range_n_per_mm2": spread and [kt / 1e6 for kt in spread],
+        "kr_n_per_mm2": material.radial / 1e6,
+        "kr_over_kt": material.radial / material.tangential,
+        "kr_over_kt_range": material.ratio_range,
+        "kte_n_per_mm": material.tangential_edge / 1e3,
+        "kre_n_per_mm": material.radial_edge / 1e3,
+        "chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None,
+        "specific_forces": forces,
+        **pick(material, "note", "source"),
+    }
 
 
 def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:

@@ -23,25 +23,31 @@ UNIT_FEED_MM = 0.1
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
     """Return the recommended setting or the reason why there is none; remarks: on the files."""
     others = [{"what": label, **_setting_with_feed_json(setting, answer)} for label, setting in answer.alternatives]
-    return (
-        pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm")
-        | {"recommended": _recommended_json(answer.setting, answer.verdict, answer), "reason": answer.reason or None}
-        | {"what_would_change_it": answer.remedies, "alternatives": others}
-        | {"remarks": [*remarks, *_other_remarks(answer)]}
-    )
+    return {
+        **pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm"),
+        "recommended": _recommended_json(answer.setting, answer.verdict, answer),
+        "reason": answer.reason or None,
+        "what_would_change_it": answer.remedies,
+        "alternatives": others,
+        "remarks": [*remarks, *_other_remarks(answer)],
+    }
 
 
 def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: Recommendation) -> JsonObject | None:
     if setting is None or verdict is None:
         return None
     direction = answer.program.direction
-    return (
-        _setting_with_feed_json(setting, answer)
-        | {"direction": "either" if answer.any_direction else direction, "worse_direction": direction}
-        | {"feed": answer.program.feed, "worst_feed_deg": math.degrees(verdict.feed_angle)}
-        | {"verdict": verdict.stability, "measured": verdict.is_measured}
-        | {"cuts": verdict.n_cuts, "chance_turning": verdict.chatter_risk}
-    )
+    return {
+        **_setting_with_feed_json(setting, answer),
+        "direction": "either" if answer.any_direction else direction,
+        "worse_direction": direction,
+        "feed": answer.program.feed,
+        "worst_feed_deg": math.degrees(verdict.feed_angle),
+        "verdict": verdict.stability,
+        "measured": verdict.is_measured,
+        "cuts": verdict.n_cuts,
+        "chance_turning": verdict.chatter_risk,
+    }
 
 
 def _setting_with_feed_json(setting: Setting, answer: Recommendation) -> JsonObject:
@@ -115,25 +121,33 @@ def _other_remarks(answer: Recommendation) -> list[Remark]:
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
     """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
     proposed, verdict = proposal.proposed, proposal.verdict
-    return (
-        pick(verdict.program, "tool", "teeth", "speed_rpm")
-        | {"depth_mm": depth_mm, "equal_is_as_good": proposed is None}
-        | {"proposed_deg": proposed and proposed.pattern.pitch_deg, "half_wave_deg": proposal.half_wave_deg}
-        | {"chatter_frequency_hz": verdict.chatter_frequency, "equal": _pitch_json(proposal.equal, depth_mm)}
-        | {"unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal]}
-        | {"remarks": _pitch_remarks(proposal, remarks)}
-    )
+    return {
+        **pick(verdict.program, "tool", "teeth", "speed_rpm"),
+        "depth_mm": depth_mm,
+        "equal_is_as_good": proposed is None,
+        "proposed_deg": proposed and proposed.pattern.pitch_deg,
+        "half_wave_deg": proposal.half_wave_deg,
+        "chatter_frequency_hz": verdict.chatter_frequency,
+        "equal": _pitch_json(proposal.equal, depth_mm),
+        "unequal": [_pitch_json(pitch, depth_mm) for pitch in proposal.unequal],
+        "remarks": _pitch_remarks(proposal, remarks),
+    }
 
 
 def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
     pattern, (least, largest) = pitch.pattern, pitch.pattern.feed_ratio_range
-    return (
-        {"pitch_deg": pattern.pitch_deg, "pattern": pattern.name, "limit_mm": pitch.limit * 1e3}
-        | {"limit_low_mm": pitch.low * 1e3, "limit_high_mm": pitch.high * 1e3}
-        | pick(pitch, "gain", "gain_low", "gain_high", "share_worse")
-        | {"least_chip": least, "largest_chip": largest}
-        | {"verdict": None if depth_mm is None else pitch.stability, "off_centre": pattern.imbalance}
-    )
+    return {
+        "pitch_deg": pattern.pitch_deg,
+        "pattern": pattern.name,
+        "limit_mm": pitch.limit * 1e3,
+        "limit_low_mm": pitch.low * 1e3,
+        "limit_high_mm": pitch.high * 1e3,
+        **pick(pitch, "gain", "gain_low", "gain_high", "share_worse"),
+        "least_chip": least,
+        "largest_chip": largest,
+        "verdict": None if depth_mm is None else pitch.stability,
+        "off_centre": pattern.imbalance,
+    }
 
 
 def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:

@@ -167,17 +167,30 @@ VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..
 def verdict_json(verdict: Verdict) -> JsonObject:
     """Return one verdict as a JSON object; unknown numbers are NaN or None."""
     program, samples, assembly = verdict.program, verdict.samples, verdict.assembly
-    return (
-        {"name": program.name, "speed_rpm": program.speed_rpm, "depth_mm": program.depth_mm, "feed": program.feed}
-        | {"tap_id": assembly.tap_id if assembly else "", "stable": verdict.is_stable, "verdict": verdict.stability}
-        | {"measured": verdict.is_measured, "limit_mm": verdict.limit * 1e3, "limit_low_mm": verdict.limit_low * 1e3}
-        | {"limit_high_mm": verdict.limit_high * 1e3, "depth_margin": verdict.depth_margin}
-        | {"chance_turning": verdict.chatter_risk, "decided_by": verdict.decisive_cause or None}
-        | {"cuts": verdict.n_cuts, "chatter_frequency_hz": verdict.chatter_frequency, "kind": verdict.kind}
-        | {"worst_feed_deg": math.degrees(verdict.feed_angle), "drive_limit_mm": verdict.drive_limit * 1e3}
-        | {"doubt": None if samples is None else uncertainty_json(samples.uncertainty)}
-        | {"method": verdict.method, "method_detail": verdict.detail}
-    )
+    return {
+        "name": program.name,
+        "speed_rpm": program.speed_rpm,
+        "depth_mm": program.depth_mm,
+        "feed": program.feed,
+        "tap_id": assembly.tap_id if assembly else "",
+        "stable": verdict.is_stable,
+        "verdict": verdict.stability,
+        "measured": verdict.is_measured,
+        "limit_mm": verdict.limit * 1e3,
+        "limit_low_mm": verdict.limit_low * 1e3,
+        "limit_high_mm": verdict.limit_high * 1e3,
+        "depth_margin": verdict.depth_margin,
+        "chance_turning": verdict.chatter_risk,
+        "decided_by": verdict.decisive_cause or None,
+        "cuts": verdict.n_cuts,
+        "chatter_frequency_hz": verdict.chatter_frequency,
+        "kind": verdict.kind,
+        "worst_feed_deg": math.degrees(verdict.feed_angle),
+        "drive_limit_mm": verdict.drive_limit * 1e3,
+        "doubt": None if samples is None else uncertainty_json(samples.uncertainty),
+        "method": verdict.method,
+        "method_detail": verdict.detail,
+    }
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:

@@ -45,14 +45,16 @@ def make_summary(data: ReportData) -> dict[str, Any]:
     standing, limits = data.outlook.status, data.machine.limits
     worst, levels = standing.series[0], (limits.frequency_warn_percent, limits.frequency_alarm_percent)
     has_changed = worst.drop.is_known and not worst.is_baseline
-    return (
-        _status_content(standing)
-        | {"gauge": make_gauge(worst.drop.value, *levels) if has_changed else None}
-        | {"series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]]}
-        | {"more_series": len(standing.series[MAX_SUMMARY_REASONS:]), "tap": _next_tap_text(standing, data.machine)}
-        | {"programs": [_program_content(program, data) for program in data.programs]}
-        | {"no_dates": no_dates_text(data.outlook), "pictures": list(draw_summary_figures(data))}
-    )
+    return {
+        **_status_content(standing),
+        "gauge": make_gauge(worst.drop.value, *levels) if has_changed else None,
+        "series": [_series_content(series) for series in standing.series[:MAX_SUMMARY_REASONS]],
+        "more_series": len(standing.series[MAX_SUMMARY_REASONS:]),
+        "tap": _next_tap_text(standing, data.machine),
+        "programs": [_program_content(program, data) for program in data.programs],
+        "no_dates": no_dates_text(data.outlook),
+        "pictures": list(draw_summary_figures(data)),
+    }
 
 
 def _status_content(standing: MachineStatus) -> dict[str, Any]:
@@ -200,14 +202,16 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     left, last, fall, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
     due = "never tapped" if left is None else due_text(left)
     is_good, has_changed = row["light"] is StatusLevel.GOOD, fall is not None and std != 0
-    return (
-        {**row, "kind": status_css_class(row["light"], row["is_early"])}
-        | {"reasons": row["reasons"] or [row["why"] or ("all is well" if is_good else "-")]}
-        | {"fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with"}
-        | {"gauge": make_gauge(fall, *row["limits"]) if has_changed else None, "spark": spark_points(row["points"])}
-        | {"programs": programs_text(row["programs"])}
-        | {"due": f"{due}, last {last.partition('T')[0]}" if last else due}
-    )
+    return {
+        **row,
+        "kind": status_css_class(row["light"], row["is_early"]),
+        "reasons": row["reasons"] or [row["why"] or ("all is well" if is_good else "-")],
+        "fallen": f"{format_with_error(-fall, std)} %" if has_changed else "nothing to compare with",
+        "gauge": make_gauge(fall, *row["limits"]) if has_changed else None,
+        "spark": spark_points(row["points"]),
+        "programs": programs_text(row["programs"]),
+        "due": f"{due}, last {last.partition('T')[0]}" if last else due,
+    }
 
 
 def programs_text(words: Mapping[str, str]) -> str:

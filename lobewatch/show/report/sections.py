@@ -144,14 +144,16 @@ def make_programs(data: ReportData) -> list[Section]:
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
     """Return a row of the table of programs, with the same words as `lobewatch check`."""
     verdict, at_first = program.verdict, program.first_verdict
-    return (
-        pick(verdict.program, "name", "speed_rpm", "depth_mm")
-        | {"limit": verdicts.limit_text(verdict), "band": verdicts.band_text(verdict).replace("..", " to ")}
-        | {"margin": verdicts.margin_text(verdict), "turning": verdicts.chatter_risk_text(verdict)}
-        | {"left": frequency_margin_text(program.advice)}
-        | {"at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value)}
-        | {"now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict))}
-    )
+    return {
+        **pick(verdict.program, "name", "speed_rpm", "depth_mm"),
+        "limit": verdicts.limit_text(verdict),
+        "band": verdicts.band_text(verdict).replace("..", " to "),
+        "margin": verdicts.margin_text(verdict),
+        "turning": verdicts.chatter_risk_text(verdict),
+        "left": frequency_margin_text(program.advice),
+        "at_first": "-" if at_first is None else _verdict_cell(at_first.stability, at_first.stability.value),
+        "now": _verdict_cell(verdict.stability, verdicts.verdict_text(verdict)),
+    }
 
 
 def _verdict_cell(word: Stability, text: str) -> TableCell:

@@ -174,12 +174,10 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
         "predicted": expected and ("stable" if expected.stable else "chatter"),
         "predicted_frequency_hz": expected and expected.frequency,
         "predicted_apart_hz": comparison.frequency_difference,
-        **(
-            {
-                f"{name}_s": time
-                for name, time in pick(heard.parts, "begin", "end", "steady_begin", "steady_end").items()
-            }
-        ),
+        "begin_s": heard.parts.begin,
+        "end_s": heard.parts.end,
+        "steady_begin_s": heard.parts.steady_begin,
+        "steady_end_s": heard.parts.steady_end,
     }
 
 

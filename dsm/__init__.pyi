@@ -7,10 +7,10 @@ Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and V
 from .calibration.calibrate import calibrate, stiffness_curve
 from .calibration.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
 from .calibration.calibration import Calibration, RemainingPreload, UnreachableFrequencyError, remaining_preload
+from .calibration.fit_result import PredictedMode, StiffnessFit, StiffnessFitError, predict_mode
 from .calibration.fit_stiffness import fit_stiffness
 from .calibration.receptance_map import receptance_map
 from .calibration.report_text import format_rounded, format_with_error
-from .calibration.stiffness_fit import PredictedMode, StiffnessFit, StiffnessFitError, predict_mode
 from .modes.damped_modes import DampedModes, damped_modes
 from .modes.energy_shares import EnergyShares, energy_shares
 from .modes.modes import Modes

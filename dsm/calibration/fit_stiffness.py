@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from dsm.arrays import Floats
 from dsm.calibration.calibration import UnreachableFrequencyError
+from dsm.calibration.fit_result import StiffnessFit, StiffnessFitError
 from dsm.calibration.identifiability import IDENTIFIABILITY_REMEDY, ProfileScan, identifiability_remarks, scan_rivals
 from dsm.calibration.least_squares import MAX_LOG_FACTOR, Iterate, StiffnessProblem, check_measured_modes, minimize
 from dsm.calibration.report_text import FitRemark
-from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support

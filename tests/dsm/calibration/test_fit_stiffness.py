@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from dsm import Bearing, Joint, Segment, Spindle, UnreachableFrequencyError, calibrate, natural_frequencies
+from dsm.calibration.fit_result import StiffnessFit, StiffnessFitError
 from dsm.calibration.fit_stiffness import fit_stiffness
-from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import scale_groups
 
 FloatArray = NDArray[np.float64]

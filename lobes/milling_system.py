@@ -74,7 +74,7 @@ def build_milling_system(x: TipModes, y: TipModes, vectors: ArrayLike | None = N
         Modes of each direction; None for a rigid or unknown direction.
     vectors : array_like, shape (n, 2), optional
         Parts in x and y of the direction of each mode of x, then of y; a unit vector if the stiffness is that along its
-        own axis. Default: each mode lies in its direction.
+        own axis. Default: each mode is along its direction.
 
     Returns
     -------

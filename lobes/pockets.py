@@ -162,7 +162,7 @@ def rank_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> 
 def match_pockets(then: StabilityLobes, now: StabilityLobes, deepest: float) -> list[PocketShift]:
     """Match the pockets of two diagrams of one cut: a pair is nearest to each other.
 
-    Pocket k stands at about 60 f / (N k): all move by one ratio, that of the median chatter frequencies.
+    Pocket k is at about 60 f / (N k): all move by one ratio, that of the median chatter frequencies.
     Pockets at an end of the speed range are left out, as their deepest points lie outside.
 
     Parameters

@@ -37,7 +37,7 @@ def mean_regeneration(cut: Cut, waves: Floats) -> Complexes:
 
 
 def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
-    """Return the force matrix per depth in the frame of the feed, for Kt = 1 alone and for Kr = 1 alone.
+    """Return the force matrix per depth in the frame of the feed, for Kt = 1 only and for Kr = 1 only.
 
     Separately for the teeth of each delay. angle: of the first tooth since its entry at the tip (rad), shape
     (..., s); depth (...) in m matters for helical teeth, whose force is the mean along the axis. Returns shape

@@ -143,7 +143,7 @@ def average_angle_lobes(x: TipData | None, y: TipData | None, cut: Cut, speed_rp
         Ks Nt* b G_or (1 - exp(-2 pi i f_c / f_t)) = -1,     tooth frequency f_t = N speed / 60:
 
     b = -1 / (2 Ks Nt* Re G_or) for Re G_or < 0, and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ...,
-    eps / 2 = atan2(-Re G_or, Im G_or). The limit is the lowest b over all lobes j; `crossings` holds it alone.
+    eps / 2 = atan2(-Re G_or, Im G_or). The limit is the lowest b over all lobes j; `crossings` holds only it.
     A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower.
 
     Parameters

@@ -247,7 +247,7 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
     """Return the spectra of free decays, each as the FRF of a force of 1 N s at its first sample.
 
     The spectrum of a decay that begins at once and has ended with the record is the sum of r / (i w - lambda): the
-    poles are those of the structure. Hammer and hit time affect r alone, which differs from decay to decay. So the
+    poles are those of the structure. Hammer and hit time affect only r, which differs from decay to decay. So the
     spectra are fitted together with common poles and never averaged. A force that lasts beyond the first sample is
     smooth over the lines of a mode and does not move its pole either.
 

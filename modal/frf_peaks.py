@@ -198,7 +198,7 @@ def find_peaks_above_band(frf: Frf) -> list[float]:
     Returns
     -------
     list of float
-        Frequencies (Hz); empty if the band is unknown or no line lies above it.
+        Frequencies (Hz); empty if the band is unknown or no line is above it.
 
     Examples
     --------

@@ -115,7 +115,7 @@ class DataqSource(ClosedOnExit):
     def blocks(self) -> Iterator[Block]:
         """Yield blocks with the scans lost before each. DeviceError if the device falls silent or is unplugged.
 
-        After an overflow of the device's buffer, or of ours because nobody read the blocks in time, scanning is
+        After an overflow of the device's buffer, or of ours because the blocks were not read in time, scanning is
         restarted. The clock gives the length of the gap.
         """
         last_progress = time.monotonic()

@@ -105,7 +105,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
 
 
 def check_hit(hit: Hit) -> HitFlags:
-    """Return the faults of a hit, from its time signals alone.
+    """Return the faults of a hit, from its time signals only.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def estimate_decay_time(hit: Hit) -> float:
     Returns
     -------
     float
-        Time constant (s); inf where nothing decays, 0 where nothing rings.
+        Time constant (s); inf without decay, 0 without vibration.
 
     Raises
     ------

@@ -34,7 +34,7 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
     """
     decoder = FrameDecoder()
     hello = protocol.encode_frame(Frame(MessageType.HELLO))
-    link.write(b"\x00" + hello)  # the zero ends what another program has left half said
+    link.write(b"\x00" + hello)  # the zero ends a partial command of another program
     deadline = time.monotonic() + TAPS_PROBE_TIMEOUT
     while (remaining := deadline - time.monotonic()) > 0:
         for frame in decoder.feed(link.read(remaining)):

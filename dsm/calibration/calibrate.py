@@ -189,7 +189,7 @@ def calibrate(
     Raises
     ------
     UnreachableFrequencyError
-        If the frequency lies outside the range of the springs.
+        If the frequency is outside the range of the springs.
     ValueError
         For a frequency not > 0, an unsupported shaft, and a group with no bearing or a rigid one.
 

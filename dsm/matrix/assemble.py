@@ -94,7 +94,7 @@ def assemble_request(shaft: ShaftRequest, top_frequency: float) -> DynamicStiffn
 def _assemble_shaft(
     alone: _ShaftAlone, wanted: tuple[float, ...], top_frequency: float, fastest: float | None, links: bool
 ) -> DynamicStiffness:
-    """Assemble the shaft and its joints alone, common to spindles that differ in bearings and masses.
+    """Assemble the shaft with its joints only, common to spindles that differ in bearings and masses.
 
     fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
     """

@@ -154,7 +154,7 @@ class Supports(NamedTuple):
     """Radial springs with dampers, each in series with its housing; n frequencies, m bearings."""
 
     spring: Complexes
-    """Stiffness of the bearings alone, dampers included (N/m), shape (n, m)."""
+    """Stiffness of the bearings only, dampers included (N/m), shape (n, m)."""
     housing_compliance: Complexes
     """Compliance of the housings (m/N), shape (m,)."""
 

@@ -251,7 +251,7 @@ class Analysis:
         return None if tap_id is None else self.stored_verdicts(tap_id)[now.program.name]
 
     def _first_tap_id(self, now: Assembly) -> str | None:
-        """Find the tap test of `first_assembly`, from the history alone where a row holds both directions."""
+        """Find the tap test of `first_assembly`, from one row of the history if it holds both directions."""
         if len(now.directions) < 2:
             then = self.first_assembly(now)
             return None if then is None else then.tap_id

@@ -134,7 +134,7 @@ def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
     except FileNotFoundError:
         return "named in the journal but missing"
     except OSError as error:
-        if error.errno in (errno.EMFILE, errno.ENFILE):  # nothing is said of this file
+        if error.errno in (errno.EMFILE, errno.ENFILE):  # not a fault of this file
             raise
         return f"cannot be read ({error.strerror})"
     return ""

@@ -13,7 +13,7 @@ TYPICAL_SENSOR_MASS = 0.010
 MAX_FIRST_ORDER_DROP = 0.1
 """Frequency drop up to which the first order predicts the change of stiffness; chosen."""
 MOUNTING_RESONANCES = {"magnet": 7000.0, "hand": 2000.0}
-"""Resonance of an accelerometer (Hz) that is fixed so, about; with stud, glue or wax it lies beyond 20 kHz.
+"""Resonance of an accelerometer (Hz) for this mounting; above 20 kHz with stud, glue or wax.
 
 Source: Bruel & Kjaer, Measuring Vibration (1982), mounting the accelerometer."""
 MIN_REPORTED_BIAS = 0.01

@@ -1,15 +1,13 @@
 """Detect drops and rises in a series with a change-point model.
 
 Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality Technology
-35(4), with hinges beside the steps, one-sided.
+35(4), one-sided, with changes of slope in addition to steps.
 
-again.
-
-Two points running that are sure of a drop trigger an alarm; four running that are not close it. Nothing else does:
-no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure of it,
-for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance rises
-would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on to be
-evaluated by its own monitor.
+Two consecutive points that are sure of a drop trigger an alarm; four consecutive unsure points close it. Nothing else
+does: no rise, and nothing that was done to the machine. A sure rise restarts the monitor at the point that was sure
+of it, for among the lower points before no drop would be seen any more. (From where it seems to have risen, chance
+rises would begin it at their highest points, and a third of them would end as a drop.) An alarm that is open goes on
+to be evaluated by its own monitor.
 """
 
 from collections.abc import Iterator
@@ -121,7 +119,7 @@ def monitor_drops(readings: Readings) -> ChangeMonitor:
 def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMonitor]:
     """Monitor a series for drops, and its mirror image for rises.
 
-    What the mean of both directions did is checked beside what the one did alone.
+    Check the mean of both directions as well as the single direction.
     """
     base, shared = build_level_model(readings), readings.shared_points
     common = build_level_model(readings.mean_of_directions)
@@ -147,7 +145,7 @@ def _merge_directions(
 ) -> LikeliestChange:
     """Merge the change of one direction with that of the mean of both, whichever is surer.
 
-    shared: points of the series that the mean has. Who looks twice is told of chance twice as often.
+    shared: points of the series that the mean has. Two checks double the chance of a false alarm.
     """
     n = np.flatnonzero(np.isfinite(together.score)) + 1
     last, fell, middle = shared[n - 1], together.is_step[n - 1], together.point[n - 1]

@@ -169,7 +169,7 @@ def assess_status(
     """Assess the status of a machine at a time; the last row has the verdict on every program.
 
     path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first;
-    scatter: what other machines told of it.
+    scatter: that of other machines.
     """
     rows = history.current
     if not rows and files:

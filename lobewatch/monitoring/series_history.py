@@ -61,7 +61,7 @@ class ValueHistory:
     def tap_values(self) -> list[TapValue]:
         """Reference rows as points of a trend.
 
-        Temperature and operator count for the frequency alone: of the others nothing is known beforehand.
+        Temperature and operator count for the frequency only: their effect on other values is unknown.
         """
         rows, numbers = self.trend_values
         errors = np.where(np.isfinite(numbers[:, 1]), 100 * numbers[:, 1] / numbers[:, 0], math.nan).tolist()

@@ -10,7 +10,7 @@ class Comparison:
     quantity: str
     """Name of the quantity."""
     where: str
-    """Number of an equation or a figure in the paper; empty for numbers in the text, or ours alone."""
+    """Number of an equation or a figure in the paper; empty for numbers in the text, or for our own."""
     printed: float | None
     """Value in the paper, in `unit`; None if none is printed."""
     ours: float
@@ -20,7 +20,7 @@ class Comparison:
     digits: int
     """Number of significant digits shown of ours."""
     reason: str
-    """Reason of the difference; for a number of ours alone, its meaning."""
+    """Reason of the difference; for our own number, its meaning."""
 
     @property
     def difference(self) -> float | None:

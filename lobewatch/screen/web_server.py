@@ -22,7 +22,7 @@ from lobewatch.tap.state import StatePublisher, TapState
 STATIC_CONTENT_TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
 """Content types of static files, by extension."""
 HTTP_LOG = logging.getLogger("lobewatch.screen.http")
-"""Log of requests that are not HTTP. It goes nowhere, so that nobody can fill the terminal."""
+"""Log of requests that are not HTTP. It is discarded, so that a client cannot fill the terminal."""
 HTTP_LOG.addHandler(logging.NullHandler())
 HTTP_LOG.propagate = False
 WILDCARD_ADDRESSES = {

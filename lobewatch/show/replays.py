@@ -88,7 +88,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
 
 
 def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
-    """Return a few files in full, many in a table with what is asked and refused below it."""
+    """Return a few files in full, many in a table with questions and rejections below it."""
     rejected = ((str(item.file), f"cannot be used: {item.rejection}") for item in previews if item.rejection)
     refused = group_by_message(rejected)
     if len(previews) <= MAX_PREVIEWS_IN_FULL:

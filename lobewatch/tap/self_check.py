@@ -61,7 +61,7 @@ def find_quiet_part(record: Hit) -> Hit:
 def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
     """Check samples, sensors, noise, hum, spindle and disk, one line each.
 
-    baseline: a record of a DAQ while nobody taps. level: trigger level (N), None if trial hits choose it.
+    baseline: a record of a DAQ without hits. level: trigger level (N), None if trial hits choose it.
     """
     if baseline.codes is None or baseline.channels is None:
         raise ValueError("the self-check needs a record with converter codes and channels")

@@ -91,7 +91,7 @@ def read_spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
 def clean_spool(folder: MachineFolder) -> None:
     """Remove half-written files and empty folders of an ended program, under the lock.
 
-    Half-written files that programs without the lock may be writing are left alone.
+    Half-written files that programs without the lock may be writing stay.
     """
     for path in [path for names in TEMPORARY_FILE_PATTERNS for path in folder.path.glob(names)]:
         path.unlink(missing_ok=True)

@@ -2,7 +2,7 @@
 
 The closed form of the best difference between neighbours says which patterns are checked; zero-order approximation
 after Altintas, Engin & Budak, over few samples, says how deep they may go; the multipliers of the same samples say
-which of each kind is best; and what is said of that is the evaluation's, sample by sample beside equal pitch.
+which of each kind is best. The best is then evaluated sample by sample and compared with equal pitch.
 """
 
 import itertools

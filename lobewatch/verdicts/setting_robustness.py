@@ -1,7 +1,7 @@
 """Frequency drops before a program chatters, and robustness of a setting against changes of speed, depth and frequency.
 
-The depth that only just is safe is so at one speed alone: the tip of a pocket has no width. A setting is recommended
-where there is room on all sides, and no nearer to an edge.
+The largest safe depth is safe at a single speed only, the tip of a pocket. A recommended setting keeps a margin on all
+sides.
 """
 
 import math

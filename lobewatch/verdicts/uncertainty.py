@@ -100,7 +100,7 @@ class Uncertainty:
     """Posterior samples of test cuts, used instead of the half-widths; None if nothing was learned."""
 
     def __post_init__(self) -> None:
-        """Refuse causes without a record in `UNCERTAINTY_CAUSES`."""
+        """Reject causes without a record in `UNCERTAINTY_CAUSES`."""
         if unknown := self.modes.keys() - causes.UNCERTAINTY_CAUSES.keys():
             raise ValueError(f"unknown causes of uncertainty: {', '.join(sorted(unknown))}")
 

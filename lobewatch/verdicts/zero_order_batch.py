@@ -209,7 +209,7 @@ class ZeroOrderBatch:
 def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
     """Find the lowest limit (m) and its frequency (Hz) of loops (r, k), at tooth frequencies (r, s).
 
-    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
+    A crossing is where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
     angle = np.angle(loop)
     angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(np.diff(angle, axis=1) / (2 * np.pi)), axis=1)

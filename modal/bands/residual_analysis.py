@@ -57,7 +57,7 @@ White noise reaches it once in 700 cases.
 HIDDEN_ERROR_FACTOR = 4.0
 """Standard error of a mode over the non-noise part of its residual, as a share of its peak."""
 MAX_UNEVEN_NOISE_RATIO = 2.0
-"""Residual over noise near a mode that uneven noise alone may cause."""
+"""Residual over noise near a mode that uneven noise may cause by itself."""
 RESIDUAL_ROUNDING_SHARE = 1e-7
 """Share of the measured values below which a residual is rounding."""
 REDUCED_RESIDUAL_TERMS = 2

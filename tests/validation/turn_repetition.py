@@ -1,4 +1,4 @@
-"""How much of a simulated cut does not repeat from turn to turn."""
+"""Share of a simulated cut that does not repeat from turn to turn."""
 
 from __future__ import annotations
 

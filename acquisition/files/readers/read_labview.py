@@ -32,7 +32,7 @@ def read_lvm(path: Path) -> Contents:
     ends = [i for i, line in enumerate(lines) if line.startswith(_LVM_HEADER_END)]
     if len(ends) < 2:
         raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
-    pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator stands in one of them
+    pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator is in one of them
     head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
     starts = [*ends[1:], len(lines)]
     signals = list[Signal]()

@@ -82,8 +82,8 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
 
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; turn: of the spindle (s).
 
-    A cut is louder than halfway, in log, between what is quiet and what is loud. What is too short to be told, or a
-    sixth of the longest, is none of its own: a chip, an edge that rubs on its way out. Reasons: "too-short", "no-cut",
+    A cut is louder than the log mean of quiet and loud pieces. A part that is too short to evaluate, or shorter than a
+    sixth of the longest, is not a cut of its own, but a chip or a rubbing edge. Reasons: "too-short", "no-cut",
     "no-air", "knock".
 
     Example: a second of noise that gets 20 times as loud for a second.

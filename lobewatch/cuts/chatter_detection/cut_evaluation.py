@@ -1,6 +1,6 @@
 """Evaluate recorded cuts: stable, chatter, flip, or a reason for no verdict.
 
-The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
+The thresholds of this folder were chosen on simulated cuts, with other random numbers than those of the long tests
 (docs/cuts.md, How often it is right).
 """
 
@@ -88,7 +88,7 @@ def evaluate_cut(
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
     ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
-    of the axis with the loudest chatter, else of that with the loudest cut. Reasons why it cannot be told:
+    of the axis with the loudest chatter, else of that with the loudest cut. Reasons without a verdict:
     "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
     "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
     "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
@@ -256,7 +256,7 @@ class CutRecording(NamedTuple):
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     """Evaluate each cut in a recording; without a cut the only entry gives the reason.
 
-    Reasons why one cannot be told are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
+    Reasons without a verdict are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
     cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
     return [_evaluate_parts(recording, parts) for parts in cuts]

@@ -98,8 +98,8 @@ def is_in_air(peaks: SpectralPeaks, air: Spectrum) -> Flags:
 def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     """Add intermittent tones of the air near frequencies (Hz) to its spectrum.
 
-    signal: of the air, shape (n,). What stands clear of what is beside it in its piece counts: a knock does not, nor
-    does what passes by 40 Hz in a piece or faster, as a harmonic of a spindle that is slowing down.
+    signal: of the air, shape (n,). A tone counts if it exceeds its neighbours within a piece. A knock does not,
+    nor does a tone that moves 40 Hz or more in a piece, such as a harmonic of a spindle that slows down.
     """
     size = round(AIR_PIECE_LENGTH * air.sample_rate)
     step, level = air.sample_rate / size, np.zeros(frequency.size)

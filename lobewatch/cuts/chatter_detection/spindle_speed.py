@@ -154,8 +154,8 @@ def check_tachometer_speed(
 ) -> tuple[SpindleSpeed | None, float]:
     """Check a tachometer: return the spindle frequency (Hz), and one that contradicts it, else NaN.
 
-    commanded: as it was set, measured: by the tachometer (Hz). Where it is more than 5 % off what was set, it is
-    followed if the peaks fit it alone and it is no harmonic of that. Where no peaks say a speed near it, it is the
+    commanded: as it was set, measured: by the tachometer (Hz). If it is more than 5 % off what was set, it is
+    used if the peaks fit only it and it is no harmonic of that. Where no peaks say a speed near it, it is the
     speed by itself, if three of them are its harmonics.
     """
     is_near = abs(measured / commanded - 1) < COMB_SPEED_TOLERANCE

@@ -1,4 +1,4 @@
-"""Fit spindle harmonics to spectral peaks: a grid with sidebands, or the comb alone, also by a harmonic sum."""
+"""Fit spindle harmonics to spectral peaks: a grid with sidebands, or only the comb, also by a harmonic sum."""
 
 from typing import NamedTuple
 
@@ -227,7 +227,7 @@ def _peak_error(peaks: SpectralPeaks, bin_width: float) -> Floats:
 def _comb_chance(comb: Comb, peaks: SpectralPeaks, images: Floats, width: float, teeth: int, tolerance: float) -> float:
     """Return how many of all combs tried would have as many harmonics among random peaks.
 
-    Harmonics of tooth passing alone are this much rarer.
+    Harmonics of tooth passing only are this much rarer.
     """
     orders = np.unique(comb.order[comb.is_member])
     if orders.size < MIN_COMB_HARMONICS:

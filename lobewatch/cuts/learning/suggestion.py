@@ -246,7 +246,7 @@ def suggest_cut(
     """Suggest the next test cut, or None if nothing more can be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts
-    that are not believed. One of those that lies within the grid is made again, once, but for a stable one with the
+    that are not believed. One of those within the grid is made again, once, but for a stable one with the
     last cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut
     is worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its
     chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by

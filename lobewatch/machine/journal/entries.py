@@ -78,7 +78,7 @@ class CutEntry:
     recording: RecordingFile | None = None
     """Recording of the cut; None without one."""
     power: CutPower | None = None
-    """Power of the cut; None if nobody has read it."""
+    """Power of the cut; None if it was not read."""
     excluded: str = ""
     """Reason of its exclusion, from other lines; empty if included."""
 

@@ -178,7 +178,7 @@ class Journal:
     def append(self, *entries: JournalEntry, reading: JournalReading | None = None) -> None:
         """Append entries with one write and one fsync; they are committed on return.
 
-        reading: fresh reading if nobody else can have written since. Raises DataError, and writes nothing, for a
+        reading: fresh reading if no other program can have written since. Raises DataError, and writes nothing, for a
         damaged journal.
         """
         reading = reading or self.read()

@@ -195,7 +195,7 @@ class Machine(toml.TomlTable, frozen=True):
         return next((tool for tool in self.tool if tool.name == name), None)
 
     def _check_tool_of(self, place: str, program: ProgramTable) -> None:
-        """Refuse a [[tool]] whose pitches or flutes do not fit its program."""
+        """Reject a [[tool]] whose pitches or flutes do not fit its program."""
         tool = self.find_tool(program)
         if tool is None:
             return

@@ -45,7 +45,7 @@ class CutSetting:
     depth: float
     """Axial depth of cut (m)."""
     power: PowerReading | None = None
-    """Power shown by the drive; None if nobody has read it."""
+    """Power shown by the drive; None if it was not read."""
 
     @property
     def tooth_frequency(self) -> float:

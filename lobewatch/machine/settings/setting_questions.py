@@ -56,7 +56,7 @@ class SettingFault(StrEnum):
     CONTRADICTION = "settings-contradict"
     """Number that contradicts another one."""
     TEMPLATE_VALUE = "setting-guessed"
-    """Number of the template that nobody has replaced."""
+    """Number of the template that was not replaced."""
 
 
 class ImplausibleSetting(NamedTuple):
@@ -71,7 +71,7 @@ class ImplausibleSetting(NamedTuple):
     value: str
     """Value of the key."""
     reason: str
-    """Reason to doubt it."""
+    """Reason of the question."""
 
     @property
     def statement(self) -> str:

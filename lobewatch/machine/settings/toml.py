@@ -26,8 +26,8 @@ PositiveOrInfinite = Annotated[float, Meta(gt=0)]
 class Plausible(NamedTuple):
     """Plausible range of a number in the unit of its key; 0 and infinity stand for "none" and are not asked about.
 
-    All ranges are chosen: what shops have, with room beside it, and where that can be had less than a factor of 1000
-    wide, so that a slip of 1000 leaves them. docs/plausible.md says which slips are not seen.
+    All ranges are chosen: what shops have, with a margin, and where possible less than a factor of 1000
+    wide, so that a value wrong by 1000 is outside. docs/plausible.md says which slips are not seen.
     """
 
     low: float
@@ -37,7 +37,7 @@ class Plausible(NamedTuple):
 
 
 class TomlTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Table of machine.toml that refuses unknown keys."""
+    """Table of machine.toml that rejects unknown keys."""
 
 
 def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
@@ -242,7 +242,7 @@ def _edit_line(lines: list[str], start: int, end: int, key: str, value: TomlValu
     """Set a key within a range of lines, and return the number of added lines."""
     key_line = re.compile(rf"(# ?)?{re.escape(key)}[ \t]*=[ \t]*({TOML_VALUE_PATTERN})([ \t]*#.*)?$")
     places = [(i, match) for i in range(start, end) if (match := key_line.match(lines[i]))]
-    places.sort(key=lambda entry: entry[1][1] is not None)  # a comment counts where the key stands nowhere
+    places.sort(key=lambda entry: entry[1][1] is not None)  # a comment counts if the key is nowhere else
     if value is None:
         if places and places[0][1][1] is None:
             lines[places[0][0]] = f"# {lines[places[0][0]]}"

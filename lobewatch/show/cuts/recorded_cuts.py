@@ -41,7 +41,7 @@ FAULT_TEXTS: Mapping[str, str] = {
     "a cut gives to chatter; cut a little deeper, and listen for it without the cut",
     "slow-sampling": "fewer than three multiples of tooth passing are heard at this sample rate; take a higher one",
 }
-"""Fault and remedy for each reason why chatter cannot be told from a stable cut."""
+"""Fault and remedy for each reason without a verdict."""
 
 
 MICROPHONE_NOTE = (

@@ -43,7 +43,7 @@ VERDICT_MARKS = {
 POCKET_GREEN = "#00664A"
 LEARNED_PURPLE = "#8A3D78"
 LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (5.6, 2.3)
-"""Size of a diagram that stands alone, and of one that accompanies text (inches)."""
+"""Size of a separate diagram, and of one that accompanies text (inches)."""
 MAP_LEVELS = 12
 """Number of levels of a map."""
 DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"

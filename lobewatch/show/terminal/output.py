@@ -143,7 +143,7 @@ def remark_lines(remarks: Sequence[Remark]) -> list[str]:
 
 
 def print_remarks(remarks: Iterable[Remark]) -> None:
-    """Print remarks beside the results, a line each."""
+    """Print remarks to stderr, a line each."""
     for remark in remarks:
         notes.print(f"note: {remark}", markup=False)
 

@@ -22,7 +22,7 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
 
 
 def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
-    """Ask a person the questions that `answers` of options do not cover; raise EOFError where nobody answers."""
+    """Ask a person the questions that `answers` of options do not cover; raise EOFError without an answer."""
     if questions == SETUP_QUESTIONS:
         keys = "Enter takes what stands in [brackets], - leaves something open"
         _print_notes(f"{keys}; nothing is written before the end.")

@@ -254,7 +254,7 @@ class TerminalScreen:
             self._session.choose(key, tool)
 
     def _ask_tool(self) -> str:
-        """Read a line while the screen stands still."""
+        """Read a line while the screen is paused."""
         self._live.stop()
         self._keys.__exit__()
         self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")

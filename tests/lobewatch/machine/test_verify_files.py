@@ -333,7 +333,7 @@ def one_round(
 
 @pytest.fixture
 def full(folder: MachineFolder, make_tap: MakeTap) -> Path:
-    """With all that can stand in a folder."""
+    """Return a folder with every kind of file."""
     device = StoredDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
     device = msgspec.structs.replace(device, crc=device.computed_crc)
     (folder.path / "daq.json").write_bytes(msgspec.json.format(msgspec.json.encode([device]), indent=2))

@@ -92,7 +92,7 @@ def test_what_is_too_short_next_to_a_cut_is_none() -> None:
 
 
 def test_air_that_gets_a_little_louder_is_no_cut_next_to_one_that_is_far_louder() -> None:
-    """As on machines: 4 dB from fans and pumps that start and stop, and a cut of 30 dB."""
+    """Fans and pumps add 4 dB when they start and stop; the cut is 30 dB louder."""
     signal = recording(8.0, (3.0, 5.0), power=1000.0)
     signal[round(6.0 * RATE) :] *= np.sqrt(2.5)
     parts = parts_of(signal)
@@ -152,7 +152,7 @@ def test_a_piece_with_four_times_the_peak_of_those_around_is_a_knock(peak: float
 
 
 def test_a_cut_of_one_loud_tone_in_air_that_rushes_louder_than_it_is_found_by_its_power() -> None:
-    """As with a microphone: by broadband loudness, air would be the cut."""
+    """Simulate a microphone: broadband loudness would take air for the cut."""
     random, time = np.random.default_rng(0), np.arange(round(5 * RATE)) / RATE
     inside = (time >= 1.0) & (time < 4.0)
     signal = random.normal(size=time.size) * np.where(inside, 0.3, 1.0) + inside * 12 * np.sin(2 * np.pi * 900 * time)

@@ -153,7 +153,7 @@ class Tally:
     """Counts of right verdicts."""
 
     words: Counter[str] = field(default_factory=Counter)
-    """By what the tip does: right, wrong, not told, near the limit."""
+    """Count by the motion of the tip: right, wrong, unclassified, near the limit."""
     by_limit: Counter[str] = field(default_factory=Counter)
     """By the limit of semi-discretisation; flips of even numbers of teeth apart."""
     speeds: list[float] = field(default_factory=list)

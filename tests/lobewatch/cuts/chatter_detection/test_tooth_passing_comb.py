@@ -82,7 +82,7 @@ def swelling(random: np.random.Generator, rate: float, turn: float) -> Floats:
 
 
 def test_the_slopes_of_two_strong_lines_are_no_spindle() -> None:
-    """As on machines; by the distances of all peaks only, 8 of 30 are not found."""
+    """Distances of all peaks would miss 8 of 30 cuts."""
     rate, turn = 1650.0, 66.65
     speeds = []
     for seed in range(30):

@@ -94,7 +94,7 @@ def test_before_another_cut_it_is_worth_what_the_next_one_gains_besides() -> Non
 
 
 def test_chatter_teaches_by_its_frequency_within_1_5_percent_of_a_natural_one() -> None:
-    """Of four chattering spindles, two at 80 and two at 80 + off Hz, the latter allow more depth at another speed."""
+    """Four spindles chatter, two at 80 Hz, two at 80 + off Hz; the second pair allows more depth at another speed."""
     limits = np.vstack([np.tile([9.0, 1.0], (6, 1)), np.tile([1.0, 4.0], (2, 1)), np.tile([1.0, 8.0], (2, 1))])
     for off in (0.0, 15.0, 200.0):
         heard = np.zeros(limits.shape)

@@ -178,7 +178,8 @@ class Segment:
         where : str
             Beginning of the message.
         """
-        require_numbers(where, self, {"length": "m", "outer_diameter": "m"}, positive=True)
+        if not (0 < self.length < math.inf and 0 < self.outer_diameter < math.inf):  # spindles are made often
+            require_numbers(where, self, {"length": "m", "outer_diameter": "m"}, positive=True)
         _check_bore(where, "", self.bore_diameter, self.outer_diameter)
         if self.end_outer_diameter is not None:
             require_numbers(where, self, {"end_outer_diameter": "m"}, positive=True)

@@ -14,12 +14,24 @@ from dataclasses import dataclass, replace
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
 """Error numbers of a place without write permission or without any."""
 REMEDY_BY_ERRNO = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "make room on that disk"),
-    **dict.fromkeys((errno.EMFILE, errno.ENFILE), "close other programs, too many files are open"),
-    errno.ESTALE: "the network drive has lost it: mount it anew, then give the same command again",
-    errno.EIO: "the disk fails: copy the folder to another one",
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "Make room on that disk"),
+    **dict.fromkeys((errno.EMFILE, errno.ENFILE), "Close other programs: too many files are open"),
+    errno.ESTALE: "The network drive was lost: mount it again, then repeat the command",
+    errno.EIO: "The disk is failing: copy the folder to another disk",
 }
 """Remedy for errors of the operating system, by error number."""
+
+
+def join_sentences(*parts: str) -> str:
+    """Join a finding and its remedies, each as a sentence with its full stop; a single part stays as it is.
+
+    >>> join_sentences("The port is in use", "Close the other program"), join_sentences("no such file", "")
+    ('The port is in use. Close the other program.', 'no such file')
+    """
+    present = [part for part in parts if part]
+    if len(present) < 2:
+        return "".join(present)
+    return " ".join(part if part[-1] in ".!?" else f"{part}." for part in present)
 
 
 class DeviceError(OSError):
@@ -35,7 +47,7 @@ class DeviceError(OSError):
         cure
             Remedy; empty where unknown.
         """
-        super().__init__(f"{text}; {cure}" if cure else text)
+        super().__init__(join_sentences(text, cure))
         self.text = text
         """Problem, without a full stop."""
         self.cure = cure
@@ -59,7 +71,7 @@ def format_os_error(error: OSError) -> str:
     """Return an error of the operating system as a sentence: place, reason and remedy."""
     failure = f"{error.filename or 'the disk'}: {error.strerror or error}"
     cure = REMEDY_BY_ERRNO.get(error.errno or 0, "")
-    return f"{failure}; {cure}" if cure else failure
+    return join_sentences(failure, cure)
 
 
 CONTROL_CHARACTERS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
@@ -83,8 +95,8 @@ def check_name(name: str, what: str) -> None:
     """
     found = CONTROL_CHARACTERS.search(name)
     if found is not None:
-        cure = "leave it out: a name is made of letters, digits, signs and spaces"
-        raise ValueError(f"{what}={name!r} holds the control character {found[0]!r}; {cure}")
+        cure = "Use letters, digits, signs and spaces only."
+        raise ValueError(f"{what}={name!r} contains the control character {found[0]!r}. {cure}")
 
 
 @dataclass(frozen=True)
@@ -108,7 +120,7 @@ class Remark:
     """Remedy; empty where none is needed or possible."""
 
     def __str__(self) -> str:
-        return self.finding + (f"; {self.cure}" if self.cure else "")
+        return join_sentences(self.finding, self.cure)
 
     @property
     def finding(self) -> str:

@@ -54,7 +54,7 @@ TAIL = """
 Peers are told what they cannot find: sdypy-EMA the frequencies, finite elements how coarse they may be; none gives
 errors. What else was measured, and why it takes what it takes: [spindle model](performance-dsm.md),
 [lobes](performance-lobes.md), [modes](performance-modal.md), [acquisition](performance-acquisition.md),
-[replay and archive](performance-replay.md), [cuts](performance-listen.md), [a plant](plant.md).
+[replay and archive](performance-replay.md), [cuts](performance-listen.md), [a plant](fleet.md).
 """
 
 

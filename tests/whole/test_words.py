@@ -13,12 +13,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch", "sim_data")
+CONTRIBUTOR_PAGES = ("CONTRIBUTING.md", "architecture.md")
 STUDIES = ("decisions", "studies", "api")
 MIN_WORDS = 3
 """Fewest words of a string that is read as a text; shorter ones are keys, units and labels."""
 WORD = re.compile(r"[A-Za-z0-9][\w'.,%/+-]*")
 CODE = re.compile(
-    r"`[^`]*`|https?://\S+|(?<![\w`])--?[a-z][\w-]*|\b\w+(?:[._/]\w+)*_\w+\b|\b[\w/]+\.(?:toml|csv|h5|md|py|html)\b"
+    r"`[^`]*`|https?://\S+|(?<![\w`])--?[a-z][\w-]*|\b\w+(?:[._/]\w+)*_\w+\b|\b[\w/]+\.(?:toml|csv|h5|md|py|html|jsonl?|rows)\b"
 )
 """Code, addresses, options, keys with an underscore and names of files."""
 PHRASES = [
@@ -52,6 +53,7 @@ def split_sentences(place: str, text: str) -> Iterator[Sentence]:
 def page_sentences(page: Path) -> Iterator[Sentence]:
     """Yield the sentences of a Markdown page; a table cell, list item or heading ends one."""
     text = re.sub(r"^ *(```|~~~).*?^ *\1", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"(?<=\n\n)(?: {4}.*\n)+", "", text)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = re.sub(r"^\$\$.*?\$\$|\$[^$\n]+\$", "CODE", text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
@@ -159,6 +161,11 @@ def user_pages() -> list[Path]:
     return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(pages)]
 
 
+def count_words(page: Path) -> int:
+    """Return the number of words of a page, with code and tables."""
+    return sum(any(letter.isalnum() for letter in word) for word in page.read_text("utf-8").split())
+
+
 def sentences_of(kind: str) -> list[Sentence]:
     """Return all sentences of the user pages, or of the program."""
     if kind == "pages":
@@ -184,9 +191,9 @@ def test_sentences_are_short_and_plain(kind: str) -> None:
 
 
 def test_user_pages_are_few_words() -> None:
-    assert sum(len(page.read_text("utf-8").split()) for page in user_pages()) <= 45_000
+    assert sum(count_words(page) for page in user_pages() if page.name not in CONTRIBUTOR_PAGES) <= 45_000
     for name in ("cuts", "modal", "decay", "lobes"):
-        assert len((ROOT / "docs" / f"{name}.md").read_text("utf-8").split()) <= 1800
+        assert count_words(ROOT / "docs" / f"{name}.md") <= 1800
 
 
 @pytest.mark.parametrize(

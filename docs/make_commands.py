@@ -1,4 +1,4 @@
-"""docs/commands.md from the commands themselves: `.venv/bin/python docs/make_commands.py`."""
+"""Write docs/commands.md from the help of the commands: `.venv/bin/python docs/make_commands.py`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 
 from lobewatch.commands import GROUPS
 
-INTRODUCTION = """For whoever looks an option up: what `--help` says of each command, made from the code by
-`docs/make_commands.py`. The ten that a shop needs stand in the [README](../README.md#ten-commands)."""
+INTRODUCTION = """Every command with its options, made from `--help` by `docs/make_commands.py`. The ten commands that a shop needs
+are in the [README](../README.md#ten-commands)."""
 
 
 def page() -> str:

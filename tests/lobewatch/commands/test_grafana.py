@@ -28,16 +28,16 @@ Shop = Any
 BOARD = json.loads((Path(__file__).parents[3] / "docs" / "grafana.json").read_text("utf-8"))
 COLUMNS = {
     "Natural frequency": ["time", "metric", "frequency_hz"],
-    "Frequency against the first tap test of its series": ["time", "metric", "fall_percent"],
+    "Frequency relative to the first tap test of its series": ["time", "metric", "fall_percent"],
     "Damping ratio": ["time", "metric", "damping_ratio"],
     "Bearing stiffness": ["time", "metric", "bearing_stiffness_n_per_m"],
-    "Tap tests a month": ["time", "tap_tests"],
+    "Tap tests per month": ["time", "tap_tests"],
     "Last tap test of each series": [
         *("folder", "machine", "tool", "direction", "last_tap", "frequency_hz"),
         *("damping_ratio", "stiffness_n_per_m", "remarks"),
     ],
     "Natural frequency (Parquet)": ["time", "metric", "frequency_hz"],
-    "Tap tests a month (Parquet)": ["month", "tap_tests"],
+    "Tap tests per month (Parquet)": ["month", "tap_tests"],
 }
 """Columns that each panel draws, by its title."""
 PROMTOOL = shutil.which("promtool")
@@ -100,7 +100,7 @@ def test_each_query_of_postgresql_gives_what_its_panel_draws(
     with psycopg.connect(server.address(plant)) as connection:
         cursor = connection.execute(filled(POSTGRES[title]))
         check(POSTGRES[title], [column.name for column in cursor.description or ()], rows := cursor.fetchall())
-        if title.startswith("Frequency against"):
+        if title.startswith("Frequency relative"):
             assert {round(row[2], 1) for row in rows} == {1.0, 2.0}
         (machine,) = (one for one in BOARD["templating"]["list"] if one["name"] == "machine")
         assert connection.execute(machine["query"]).fetchall() == [("a",), ("b",), ("c",)]

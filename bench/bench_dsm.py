@@ -158,7 +158,7 @@ def bench_calibration(bench: Bench, given: Spindle) -> None:
         return
     k = exact.bearing_stiffness
     coarse, (fine, parts) = FiniteElements(given), refine(given, MEASURED, k, REFINED)
-    for elements, name in ((coarse, "1 finite element"), (fine, f"{parts} finite elements")):
+    for elements, name in ((coarse, "1 element"), (fine, f"{parts} elements")):
         size = f"{name} a segment, {elements.mass.shape[0]} dof"
         rivals = {"eigh + brentq": elements.calibrate, "1 eigenproblem": elements.calibrate_by_eigenproblem}
         if elements is fine:
@@ -180,7 +180,7 @@ def bench_modes(bench: Bench, given: Spindle, ross: RossRotor | None) -> None:
         table.row("1 element a segment, 54 dof", seconds, difference(elements.frequencies(STIFFNESS, MODES), exact))
     if ross is not None:
         found = nearest(ross.frequencies(), exact)
-        table.row("ROSS", bench.seconds(ross.frequencies, 3), difference(found, exact))
+        table.row("ROSS, 1 element a segment", bench.seconds(ross.frequencies, 3), difference(found, exact))
 
 
 def bench_receptance(bench: Bench, given: Spindle, ross: RossRotor | None) -> None:

@@ -46,8 +46,8 @@ HEAD = """# Speed
 lobewatch is faster than packages that solve the same task. Programs that solve only a part of it can be faster. You can
 repeat this comparison: `python3 run.py bench` writes this page.
 
-Times are median CPU times with one BLAS thread, measured in turns. The ratio is the time of the other package divided by
-that of lobewatch, with its range.
+Times are median CPU times with one BLAS thread, measured in turns. The ratio is the time of the other package divided
+by that of lobewatch, with its range.
 
 {about}
 

@@ -3,6 +3,7 @@
 
     python3 run.py               the demo
     python3 run.py test [...]    the tests (--long: the long ones too); the rest goes to pytest
+    python3 run.py docs          build the documentation site in build/docs and open it
     python3 run.py bench         the benchmarks, in an environment with their peers (.venv-bench)
     python3 run.py ARGS          lobewatch ARGS
 
@@ -97,17 +98,19 @@ def main():
     if sys.version_info < NEEDED:
         sys.exit("lobewatch needs Python %d.%d or newer; this is %s." % (NEEDED + (sys.version.split()[0],)))
     arguments = sys.argv[1:] or ["demo"]
-    extras = {"test": "[dev]", "bench": "[bench]"}.get(arguments[0], "")
+    extras = {"test": "[dev]", "docs": "[dev]", "bench": "[bench]"}.get(arguments[0], "")
     make_environment(extras)
     if extras:
         os.chdir(ROOT)
-    commands = {
-        "": [python(extras), "-m", "lobewatch.cli"] + arguments,
-        "[dev]": tests(arguments[1:]),
-        "[bench]": [python(extras), os.path.join("bench", "performance.py")] + arguments[1:],
-    }
+    script = {"docs": os.path.join("docs", "make_site.py"), "bench": os.path.join("bench", "performance.py")}
+    if arguments[0] == "test":
+        command = tests(arguments[1:])
+    elif extras:
+        command = [python(extras), script[arguments[0]]] + arguments[1:]
+    else:
+        command = [python(extras), "-m", "lobewatch.cli"] + arguments
     try:
-        sys.exit(subprocess.call(commands[extras]))
+        sys.exit(subprocess.call(command))
     except KeyboardInterrupt:
         sys.exit(130)
 

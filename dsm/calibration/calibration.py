@@ -134,7 +134,7 @@ class Calibration:
     given: Spindle
     """Spindle as given."""
     parts: tuple[int, ...]
-    """Indices of the calibrated parts in (*bearings, *joints)."""
+    """Indices of the calibrated parts in `(*bearings, *joints)`."""
 
     @cached_property
     def spindle(self) -> Spindle:

@@ -289,7 +289,7 @@ def speed_grid(machine: Machine) -> Floats:
 
     Returns
     -------
-    ndarray, shape ([speed] steps,)
+    ndarray, shape (n,)
         Spindle speeds (rpm).
 
     Examples

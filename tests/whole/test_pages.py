@@ -47,12 +47,6 @@ def test_commands_on_the_page_exist_with_their_options(page: Path) -> None:
         assert given <= options | {"--help", "--debug", "--version"}, (name, line)
 
 
-def test_no_page_is_an_orphan() -> None:
-    index = DOCS / "README.md"
-    linked = {(index.parent / link).resolve() for link in re.findall(r"\]\(([^)#]+)", index.read_text("utf-8"))}
-    assert {page for page in PAGES if page != index} <= linked
-
-
 @pytest.mark.parametrize("page", ["modal", "tutorials/researcher"])
 def test_python_on_the_page_runs(
     page: str, beam: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

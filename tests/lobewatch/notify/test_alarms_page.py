@@ -35,7 +35,7 @@ def test_each_command_is_understood(line: str) -> None:
 
 
 def test_there_is_a_line_for_cron_and_one_for_systemd() -> None:
-    assert [kind for kind, _ in BLOCKS] == ["cron", "ini", "ini", "toml", "sh", "yaml", "yaml", "yaml"]
+    assert [kind for kind, _ in BLOCKS] == ["text", "ini", "ini", "toml", "sh", "yaml", "yaml", "yaml"]
     assert all("lobewatch status" in BLOCKS[number][1] for number in (0, 1))
 
 

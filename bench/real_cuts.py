@@ -3,8 +3,8 @@
     python bench/real_cuts.py FOLDER
 
 FOLDER holds copies of the public repositories, each as FOLDER/OWNER/NAME. Missing ones are skipped. The command prints
-the tables of docs/studies/cuts.md. The cuts have no labels. The true speed is that of a clear comb of multiples. All axes
-of a sensor have one speed. Chatter on a multiple of the speed and any verdict in air are false.
+the tables of docs/studies/cuts.md. The cuts have no labels. The true speed is that of a clear comb of multiples. All
+axes of a sensor have one speed. Chatter on a multiple of the speed and any verdict in air are false.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def test_rows_of_the_files_that_are_there(
 
 
 def test_the_table_in_the_docs_has_these_files() -> None:
-    docs = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    docs = (Path(__file__).parents[2] / "docs" / "studies" / "public-files.md").read_text(encoding="utf-8")
     for entry in public_files.FILES:
         assert f"| `{entry.pattern}` | " in docs
         assert all(

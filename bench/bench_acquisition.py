@@ -209,18 +209,18 @@ def ten_records() -> list[NDArray[np.float64]]:
 
 def races() -> Iterator[Race]:
     """Compare with pyFRF and with the bare transforms."""
-    records, size = ten_records(), f"{AVERAGED} hits x 2 x {TRIGGER.n_samples}"
+    records, size = ten_records(), f"{AVERAGED} hits"
     hits, batch = [Hit(f, a, RATE, TRIGGER.pre_trigger) for f, a in records], np.stack(records)
 
     def bare() -> object:
         return np.fft.rfft(batch)
 
-    yield Race(f"H1 and coherence of {size}", lambda: estimate_frf(hits), "numpy's rfft alone", bare)
+    yield Race(f"H1 and coherence, {size}", lambda: estimate_frf(hits), "numpy rfft only", bare)
 
     def judged() -> object:
         return [check_hit(Hit(f, a, RATE)) for f, a in records]
 
-    yield Race(f"verdicts on {size} of a file", judged, "numpy's rfft alone", bare)
+    yield Race(f"hit verdicts, {size}", judged, "numpy rfft only", bare)
     import pyFRF
 
     whole = pyFRF.FRF(int(RATE), exc_type="f", resp_type="a", fft_len=TRIGGER.n_samples)
@@ -229,12 +229,12 @@ def races() -> Iterator[Race]:
         frf = pyFRF.FRF(int(RATE), batch[:, 0], batch[:, 1], exc_type="f", resp_type="a", frf_estimator="H1")
         return frf.get_H1(), frf.get_coherence()
 
-    yield Race(f"H1 and coherence of {size}", lambda: estimate_frf(hits), "pyFRF", theirs)
+    yield Race(f"H1 and coherence, {size}", lambda: estimate_frf(hits), "pyFRF", theirs)
 
     def checked() -> object:
         return [whole.is_data_ok(f, a) for f, a in records]
 
-    yield Race(f"verdicts on {size} of a file", judged, "pyFRF's two checks", checked)
+    yield Race(f"hit verdicts, {size}", judged, "pyFRF, two checks", checked)
 
 
 def average() -> None:

@@ -63,9 +63,9 @@ def races() -> Iterator[Race]:
         make_machine_folder(Path(scratch, "m"), "new_machine.toml")
         folder, tap, file, numbers = MachineFolder(Path(scratch, "m")), tap_test(), Path(scratch, "plain.h5"), count()
         yield Race(
-            f"a tap test of {HITS} hits x 2 x {SCANS} stored for good",
+            f"tap test stored, {HITS} hits",
             lambda: folder.commit(replace(tap, id=f"tap_{next(numbers)}")),
-            "h5py, the same codes and FRF packed alike",
+            "h5py, same data",
             lambda: plain(file, tap, **PACKED),
         )
 

@@ -1,7 +1,7 @@
 """Cost of wrong assumptions: true limit over stated limit, both by semi-discretization.
 
-`python bench/bench_assumptions.py` prints a line each for docs/lobes.md. The spindle is that of the simulation in time
-which these figures stand beside: x 1500 Hz, 3 %, 20 N/um; y 1575 Hz, 2.8 %, 22 N/um; four teeth, Kt 800, Kr 240 N/mm2.
+`python bench/bench_assumptions.py` prints a line each for docs/studies/lobes.md. The spindle is that of the simulation
+in the time domain: x 1500 Hz, 3 %, 20 N/um; y 1575 Hz, 2.8 %, 22 N/um; four teeth, Kt 800, Kr 240 N/mm2.
 """
 
 from __future__ import annotations

@@ -42,9 +42,9 @@ def races() -> Iterator[Race]:
         logbook = Logbook(MachineFolder(Path(scratch, "m")))
         _ours(logbook, hits, "y")
         yield Race(
-            "ten hits judged, averaged, stored, fitted; bearings calibrated, 3 programs judged with their doubt",
+            "ten hits to three verdicts",
             lambda: _ours(logbook, hits, "x"),
-            "pyFRF, h5py, sdypy-EMA, finite elements, textbook loop at 20 depths a program",
+            "pyFRF, h5py, sdypy-EMA, finite elements, textbook loop",
             lambda: _theirs(hits, Path(scratch, "plain.h5")),
             rounds=5,
         )

@@ -255,14 +255,14 @@ def races() -> Iterator[Race]:
         refine(given, MEASURED, calibrate(given, MEASURED).bearing_stiffness, REFINED),
     )
     question, ours = f"bearings calibrated to {MEASURED:g} Hz", partial(calibrate, given, MEASURED)
-    for elements, name in ((coarse, "1 element"), (fine, f"{parts} elements")):
-        peer = f"{name} a segment, eigh and brentq"
+    for elements, name in ((coarse, "1 finite element"), (fine, f"{parts} finite elements")):
+        peer = f"{name} per segment"
         yield Race(question, ours, peer, partial(elements.calibrate, MEASURED))
     factors = np.geomspace(0.1, 10.0, 1000)
     yield Race(
-        f"tip receptance, {factors.size} bearings x 200 frequencies",
+        f"{factors.size * 200} tip receptances",
         lambda: receptance_map(given, f[::5], factors, loss_factor=LOSS_FACTOR),
-        "its own receptance, one after the other",
+        "lobewatch, one by one",
         lambda: [receptance(scaled(given, factor), f[::5], loss_factor=LOSS_FACTOR) for factor in factors[::20]],
         part=1 / 20,
     )
@@ -271,9 +271,9 @@ def races() -> Iterator[Race]:
     ross = RossRotor(package, given)
     yield Race(f"{MODES} natural frequencies", lambda: natural_frequencies(given, MODES), "ROSS", ross.frequencies)
     yield Race(
-        f"tip receptance at {f.size} frequencies",
+        f"{f.size} tip receptances",
         lambda: receptance(given, f, loss_factor=LOSS_FACTOR),
-        "ROSS, 1 element a segment",
+        "ROSS",
         lambda: ross.tip_receptance(f[::40]),
         part=1 / 40,
     )

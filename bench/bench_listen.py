@@ -68,9 +68,9 @@ def races() -> Iterator[Race]:
     for name, axes, speed in recordings():
         if name in ("one cut, chatter, three axes", "seven cuts"):
             yield Race(
-                f"{SECONDS:g} s at {RATE / 1e3:g} kHz told: {name}",
+                f"chatter detection, {SECONDS:g} s: {name}",
                 partial(evaluate_recording, CutRecording(axes, RATE, TEETH, 0.5, speed)),
-                "Welch's spectrum by scipy, which tells nothing",
+                "scipy, Welch spectrum only",
                 partial(welch, axes, RATE, nperseg=SAMPLES),
             )
 

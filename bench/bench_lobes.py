@@ -261,15 +261,15 @@ def races() -> Iterator[Race]:
     """Compare with first-order semi-discretization."""
     some = SPEEDS[::SPARSE], DEPTHS[::20]
     part = some[0].size * some[1].size / (SPEEDS.size * DEPTHS.size)
-    for x, y, name in ((X, None, "one mode"), (*FOUR, "two modes each in x and y")):
-        question = f"a chart of {SPEEDS.size} x {DEPTHS.size} points, {name}"
+    for x, y, name in ((X, None, "one mode"), (*FOUR, "four modes")):
+        question = f"chart, {SPEEDS.size * DEPTHS.size} points, {name}"
         ours = partial(spectral_radius, x, y, CUT, SPEEDS, DEPTHS)
         for count, text in ((3, "three expm"), (1, "one expm")):
-            peer = f"textbook loop, m = {M}, {text} an interval"
+            peer = f"textbook loop, {text} per interval"
             yield Race(question, ours, peer, partial(textbook, x, y, *some, count), part=part)
-    peer = f"numpy, a thousand points at once, m = {M}"
+    peer = "vectorised numpy"
     yield Race(
-        f"a chart of {SPEEDS.size} x {DEPTHS.size} points, one mode",
+        f"chart, {SPEEDS.size * DEPTHS.size} points, one mode",
         partial(spectral_radius, X, None, CUT, SPEEDS, DEPTHS),
         peer,
         partial(batched, SPEEDS[::20], DEPTHS, M),

@@ -121,13 +121,13 @@ def five_points() -> list[Frf]:
 
 def races() -> Iterator[Race]:
     """Compare with sdypy-EMA."""
-    peer, true = "sdypy-EMA of order 60", [mode.frequency for mode in TRUE]
+    peer, true = "sdypy-EMA", [mode.frequency for mode in TRUE]
     frf, beam, points = measured(0), estimate_frf(read_hits(BEAM)), five_points()
     seen = [mode.frequency for mode in fit_modes(beam)]
     size = f"{LINES.size} lines, {len(TRUE)} modes"
-    yield Race(f"an FRF of {size}", lambda: ours(frf), peer, lambda: theirs([frf], true))
+    yield Race(f"FRF, {size}", lambda: ours(frf), peer, lambda: theirs([frf], true))
     yield Race(
-        f"a measured beam, {beam.frequency.size} lines, {len(seen)} modes",
+        f"measured beam, {beam.frequency.size} lines, {len(seen)} modes",
         lambda: ours(beam),
         peer,
         lambda: theirs([beam], seen),

@@ -255,9 +255,9 @@ def races() -> Iterator[Race]:
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
         yield Race(
-            f"{PEERS} recorded FRFs of {LONG.size} lines: `replay`, its start included",
+            f"`lobewatch replay`, {PEERS} FRFs, {LONG.size} lines",
             ours,
-            "numpy's loadtxt and sdypy-EMA of order 60; nothing kept or judged",
+            "loadtxt and sdypy-EMA",
             lambda: _modes(EMA, files),
             rounds=3,
         )

@@ -49,7 +49,7 @@ def races() -> Iterator[Race]:
     yield Race(
         "`lobewatch --help`",
         lambda: start([*lobewatch, "--help"]),
-        "typer, a program of one command",
+        "typer with one command",
         lambda: start([sys.executable, "-c", GREETING, "--help"]),
     )
     with tempfile.TemporaryDirectory() as scratch:
@@ -58,7 +58,7 @@ def races() -> Iterator[Race]:
         start([*lobewatch, "check", str(machine)])
         for command in ("history", "trend", "check"):
             yield Race(
-                f"`lobewatch {command}`, 24 tap tests and 3 programs, all worked out",
+                f"`lobewatch {command}`, 24 tap tests",
                 partial(start, [*lobewatch, command, str(machine)]),
                 f"`{IMPORTS}`",
                 lambda: start([sys.executable, "-c", IMPORTS]),

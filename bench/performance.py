@@ -1,9 +1,9 @@
-"""All benchmarks that have a peer: writes docs/performance.md and reports slowdowns.
+"""Run all benchmarks against other packages, write docs/performance.md and report slowdowns.
 
     python3 run.py bench [--quick]         (in an environment with the peers; a quarter of an hour)
 
-CPU time, one BLAS thread, lobewatch and its peer in turns. What a race needs and is not installed is said, and the race
-is left out. --quick: a round each, nothing is written.
+CPU time, one BLAS thread, lobewatch and the other package in turns. A race whose package is not installed is reported
+and left out. --quick: one round each, nothing is written.
 """
 
 from __future__ import annotations
@@ -41,20 +41,23 @@ PACKAGES = ("numpy", "scipy", "h5py", "typer", "pyFRF", "sdypy-EMA", "ross-rotor
 """Packages whose versions are stated."""
 WORSE = 0.75
 """Ratio over the stated one below which it is worse: from run to run ratios move by a quarter."""
-HEAD = """# How fast lobewatch is
+HEAD = """# Speed
 
-Written by `python3 run.py bench`: CPU time of lobewatch and of what else answers the question, in turns in one run, one
-BLAS thread; medians, and the ratio (theirs over ours: above 1 lobewatch is the faster one) with the smallest and the
-largest of all rounds.
+lobewatch is faster than packages that solve the same task. Programs that solve only a part of it can be faster. You can
+repeat this comparison: `python3 run.py bench` writes this page.
+
+Times are median CPU times with one BLAS thread, measured in turns. The ratio is the time of the other package divided
+by that of lobewatch, with its range.
 
 {about}
 
+| task | lobewatch | compared with | ratio |
+|---|---|---|---|
 """
 TAIL = """
-Peers are told what they cannot find: sdypy-EMA the frequencies, finite elements how coarse they may be; none gives
-errors. What else was measured, and why it takes what it takes: [spindle model](performance-dsm.md),
-[lobes](performance-lobes.md), [modes](performance-modal.md), [acquisition](performance-acquisition.md),
-[replay and archive](performance-replay.md), [cuts](performance-listen.md), [a plant](fleet.md).
+The other packages get the true frequencies and a suitable mesh, and none of them computes errors. A hit has 2 x 65536
+samples. sdypy-EMA has order 60, the semi-discretisation 40 intervals. Commands include the start of Python.
+[The studies](studies/README.md) have more figures.
 """
 
 
@@ -85,24 +88,19 @@ def about() -> str:
             names.append(f"{name} {version(name)}")
         except PackageNotFoundError:
             continue
-    computer = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the beginning"
-    return f"Python {platform.python_version()}, {', '.join(names)}; {platform.system()}, {computer}."
+    computer = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the start"
+    return f"Python {platform.python_version()}, {', '.join(names)}. {platform.system()}, {computer}."
 
 
 def page(stated: Stated) -> str:
     """The page of a run."""
-    parts = [HEAD.format(about=stated.about)]
-    for heading, results in stated.results.items():
-        rows = "\n".join(_row(result) for result in results)
-        parts.append(
-            f"## {heading}\n\n| what | lobewatch | peer | its time | times |\n|---|---|---|---|---|\n{rows}\n\n"
-        )
-    return "".join(parts).rstrip("\n") + "\n" + TAIL
+    rows = [_row(result) for results in stated.results.values() for result in results]
+    return HEAD.format(about=stated.about) + "\n".join(rows) + "\n" + TAIL
 
 
 def _row(result: Result) -> str:
-    span = f" ({_times(result.least)} to {_times(result.most)})" if result.least < result.most else ""
-    cells = (result.question, _time(result.ours_s), result.peer, _time(result.theirs_s))
+    span = f" ({_times(result.least)}-{_times(result.most)})" if result.least < result.most else ""
+    cells = (result.question, _time(result.ours_s), result.peer)
     return f"| {' | '.join(cells)} | **{_times(result.times)}**{span} |"
 
 
@@ -139,7 +137,7 @@ def measured(headings: Sequence[str], quick: bool) -> dict[str, list[Result]]:
         for race in races(heading):
             result = run(race, quick)
             results.setdefault(heading, []).append(result)
-            print(f"{_times(result.times):>6} x  {result.question}, beside {result.peer}", flush=True)
+            print(f"{_times(result.times):>6} x  {result.question}, compared with {result.peer}", flush=True)
     return results
 
 

@@ -2,9 +2,9 @@
 
     python bench/real_cuts.py FOLDER
 
-Nothing is fetched: FOLDER holds copies of the public repositories, each as FOLDER/OWNER/NAME; what is not there is
-skipped. Prints the tables of docs/cuts.md. Nobody has labelled these cuts: the speed is that of a plain comb where one
-stands clear of noise, axes of one sensor hear one spindle, a word on a harmonic is false, and so is any word on air.
+FOLDER holds copies of the public repositories, each as FOLDER/OWNER/NAME. Missing ones are skipped. The command prints
+the tables of docs/studies/cuts.md. The cuts have no labels. The true speed is that of a clear comb of multiples. All
+axes of a sensor have one speed. Chatter on a multiple of the speed and any verdict in air are false.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     python bench/repeating_modes.py FOLDER
 
-FOLDER as for public_files.py. A mode repeats where half of the FRFs of its structure have it within 0.5 %. Each file is
-read by itself, and then beside the others that are read with the same options. Prints the table of docs/modal.md; what
-is not in FOLDER is skipped.
+FOLDER as for public_files.py. A mode repeats if half of the FRFs of its structure contain it within 0.5 %. Each file is
+read by itself, and then next to the others that are read with the same options. Prints the table of
+docs/studies/modal.md. Files that are not in FOLDER are skipped.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
     python bench/trusted_modes.py FOLDER [START [STEP [COUNT]]]
 
-Nothing is fetched: FOLDER holds MAT files as SignalCalc writes them (H1_2, H1_3, ... in g/N of the same hits), e.g.
-data/sec_lab of Renkinios/MECA0062-1_vibration_testing. Of its files, sorted, COUNT from START on by STEP are taken (0,
-4 and 20: those that the rules were chosen on). Prints rows of the tables of docs/modal.md: each FRF by itself, then
-with the other sensors of the same hits beside it; and whether what is trusted by that alone is found at other points.
+FOLDER holds MAT files of SignalCalc (H1_2, H1_3, ... in g/N of the same hits), e.g. data/sec_lab of
+Renkinios/MECA0062-1_vibration_testing. COUNT of its sorted files are read, from START on by STEP (0, 4 and 20: those
+that the rules were chosen on). Prints rows of the tables of docs/studies/modal.md: each FRF by itself, then with the
+other sensors of the same hits, and whether modes trusted only by these repeat at other points.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def scheduler_remarks(address: str) -> list[Remark]:
     if scheme in ENCRYPTED_SCHEMES or _is_local_host(host):
         return []
     text = "unencrypted, and whoever can reach it can run programs on all its computers and on this one"
-    return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "use tls:// (docs/performance-replay.md)")]
+    return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "use tls:// (docs/several-computers.md)")]
 
 
 def _parse_scheduler_address(address: str) -> tuple[str, str]:
@@ -102,7 +102,7 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
             thread.submit(asyncio.run, _probe_scheduler(address)).result()
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as error:
-        cure = "start one with: dask scheduler (tls:// and certificates: docs/performance-replay.md)"
+        cure = "start one with: dask scheduler (tls:// and certificates: docs/several-computers.md)"
         raise DataError(f"{option}: no Dask scheduler answers there ({error}); {cure}") from error
     with client:
         _wait_for_workers(client, address)

@@ -52,7 +52,7 @@ class Trust(enum.StrEnum):
 
 
 def assess_trust(mode: Mode) -> Trust:
-    """Return the worst verdict of all trust rules. The table in docs/modal.md gives the reasons.
+    """Return the worst verdict of all trust rules. The table in docs/studies/modal.md gives the reasons.
 
     Parameters
     ----------

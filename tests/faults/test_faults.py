@@ -1,4 +1,4 @@
-"""No loss of announced data after a failed file call, a killed program or a power cut: docs/reliability.md."""
+"""No loss of announced data after a failed file call, a killed program or a power cut: docs/studies/reliability.md."""
 
 from __future__ import annotations
 

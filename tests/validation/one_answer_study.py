@@ -164,7 +164,7 @@ def _about(milling: RandomMilling) -> str:
 
 
 def summary(counts: Answers) -> str:
-    """One line for docs/long-tests.md."""
+    """One line for docs/studies/long-tests.md."""
     shares = np.array(counts.shares or [np.nan])
     return (
         f"{counts.cuts} cuts, {counts.settings} settings, {len(counts.contradictions)} contradictions, "

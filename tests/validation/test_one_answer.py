@@ -1,4 +1,4 @@
-"""Consistency of `check`, `lobes` and `recommend`; docs/long-tests.md has the last figures."""
+"""Consistency of `check`, `lobes` and `recommend`; docs/studies/long-tests.md has the last figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Truth and sharpness of the verdict `stable`; docs/long-tests.md has the last figures."""
+"""Truth and sharpness of the verdict `stable`; docs/studies/long-tests.md has the last figures."""
 
 from __future__ import annotations
 

@@ -95,7 +95,9 @@ def test_the_modes_of_the_beam_are_what_the_command_prints(
         main()
     printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
     page = (ROOT / "docs" / "modal.md").read_text(encoding="utf-8")
-    assert printed == shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm", page).splitlines()
+    *wanted, more = shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm", page).splitlines()
+    assert more == "..."
+    assert printed[: len(wanted)] == wanted
 
 
 @pytest.mark.timeout(300)

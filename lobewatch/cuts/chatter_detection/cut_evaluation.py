@@ -1,7 +1,7 @@
 """Evaluate recorded cuts: stable, chatter, flip, or a reason for no verdict.
 
 The thresholds of this folder were chosen on simulated cuts, with other random numbers than those of the long tests
-(docs/cuts.md, How often it is right).
+(docs/studies/cuts.md, How often it is right).
 """
 
 from typing import NamedTuple

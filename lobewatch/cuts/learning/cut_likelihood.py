@@ -41,7 +41,7 @@ POWER_READING_SPREAD = 0.05
 CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD = 0.89, 0.08
 """Power of a chattering cut over that of a stable one, and its scatter between cuts, from time-domain simulations.
 
-Edges that leave the cut do not rub, and thick chips between thin ones take less power. See docs/cuts.md."""
+Edges that leave the cut do not rub, and thick chips between thin ones take less power. See docs/studies/cuts.md."""
 
 
 @dataclass(frozen=True)
@@ -162,9 +162,9 @@ MISLABELED_SHARE = 0.03
 UNPITCHED_MISLABELED_SHARE = 0.06
 """Share of wrong labels among chatter without a frequency, for which only the verdict is evidence; chosen."""
 CHATTER_FREQUENCY_SPREAD = 0.01
-"""Relative standard deviation of a chatter frequency around its prediction; chosen, see docs/cuts.md."""
+"""Relative standard deviation of a chatter frequency around its prediction; chosen, see docs/studies/cuts.md."""
 FOREIGN_FREQUENCY_SHARE = 0.05
-"""Share of chatter frequencies without information; chosen, see docs/cuts.md, How good it is."""
+"""Share of chatter frequencies without information; chosen, see docs/studies/cuts.md, How good it is."""
 WRONG_KIND_SHARE = 0.1
 """Share of chatter that is recorded as the other kind (Hopf or flip); chosen."""
 MULTIPLIER_ACCURACY = 1e-3

@@ -58,7 +58,7 @@ def test_ten_minutes_of_faults(tmp_path: Path) -> None:
             found["unpluggings"] += 1
             memory = memory or resident_megabytes()
             found["growth MB"] = max(found["growth MB"], resident_megabytes() - memory)
-    print(found)  # noqa: T201  (for docs/long-tests.md)
+    print(found)  # noqa: T201  (for docs/studies/long-tests.md)
     assert found["scans"] + found["lost"] > 0.8 * 60 * MINUTES * RATE
     assert found["growth MB"] < 30
     assert 0 < found["lost"] < 0.2 * found["scans"]

@@ -217,7 +217,7 @@ def test_simulated_cuts_are_reported_right() -> None:
     words, speeds, frequencies = tally.words, np.array(tally.speeds), np.array(tally.frequencies)
     quantiles = np.quantile(speeds, [0.5, 0.95, 1.0])
     shares = np.mean(speeds < 5e-4), np.mean(frequencies < 3e-3)
-    print(dict(words), dict(tally.by_limit), "speed", quantiles, shares[0], "frequency", frequencies.size, shares[1])  # noqa: T201  (for docs/long-tests.md)
+    print(dict(words), dict(tally.by_limit), "speed", quantiles, shares[0], "frequency", frequencies.size, shares[1])  # noqa: T201  (for docs/studies/long-tests.md)
     assert share_right(words) >= RIGHT
     assert words["not told"] <= NOT_TOLD * (sum(words.values()) - words["near"])
     assert share_right(tally.by_limit) >= RIGHT_BY_LIMIT

@@ -112,9 +112,9 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
     """
     c = np.asarray(coefficients, dtype=np.float64)
     if c.ndim == 0 or c.shape[-1] == 0:
-        raise ValueError(f"coefficients of shape {c.shape} have no last axis of powers of w^2")
+        raise ValueError(f"coefficients have shape {c.shape}. Give the powers of w^2 along the last axis.")
     if not np.all(np.isfinite(c)):
-        raise ValueError("coefficients hold a value that is not finite; look at the model they come from")
+        raise ValueError("coefficients have values that are not finite. Check the model.")
     if not (math.isfinite(wbar) and wbar >= 0):
         raise ValueError(f"wbar={wbar} is not a finite angular frequency >= 0 (rad/s)")
     order = np.arange(c.shape[-1])
@@ -230,7 +230,7 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
         require_support(rest)
     model = assemble(rest, float(np.max(f, initial=0.0)))
     if np.any(model.held[0]):
-        raise ValueError(f"position={position} m is held by a rigid bearing; cut the shaft elsewhere")
+        raise ValueError(f"position={position} m is at a rigid bearing. Cut the shaft elsewhere.")
     k = condense_damped(model, rest, f, loss_factor, node=0)
     stiffness = (k.uu, k.ut, k.tt)
     if joint is not None:

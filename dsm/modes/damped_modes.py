@@ -119,8 +119,8 @@ class DampedShaft(NamedTuple):
                 step /= 2
             else:
                 raise ArithmeticError(
-                    f"mode {number} is lost at a damping ratio of {mode.damping_ratio:.3g}: with more damping it stops "
-                    "oscillating or merges with another mode; give smaller dampers"
+                    f"mode {number} cannot be followed beyond a damping ratio of {mode.damping_ratio:.3g}. "
+                    "Give smaller dampers."
                 )
         return mode
 

@@ -49,7 +49,7 @@ def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, F
     basis, springs = _independent_motions(model)
     size = basis.shape[1]
     if size < count:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has {size}")
+        raise ArithmeticError(f"the shaft model has only {size} modes, not {count}")
     mass = -_reduced_term(model, basis, 1 if model.spin is None else 2)
     shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
     shifted = _reduced_term(model, basis, 0) + springs + shift * mass
@@ -66,7 +66,7 @@ def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: in
     LinAlgError if it is not.
     """
     if np.any(w2 <= 0):
-        raise np.linalg.LinAlgError("a shaft that nothing holds")
+        raise np.linalg.LinAlgError("the shaft has no support")
     gyroscopic = _reduced_term(model, shape.T, 1)
     n, still = w2.size, np.sqrt(w2)
     scaled = np.zeros((2 * n, 2 * n))

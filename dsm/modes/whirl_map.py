@@ -64,9 +64,7 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     while lead(high) > 0:
         low, high = high, 2 * high
         if high > MAX_CRITICAL_SPEED_RATIO * at_rest:
-            raise ArithmeticError(
-                f"mode {mode} has no critical speed up to {low * 30 / math.pi:.6g} rpm: its forward whirl stays ahead"
-            )
+            raise ArithmeticError(f"mode {mode} has no critical speed up to {low * 30 / math.pi:.6g} rpm")
     return float(scipy.optimize.brentq(lead, low, high, xtol=1e-12 * at_rest, rtol=1e-13)) * 30 / math.pi
 
 

@@ -21,7 +21,7 @@ def receptance(
     loss_factor: float = 0.0,
     force_position: float | None = None,
 ) -> Complexes:
-    """Compute the driving-point or transfer receptance of the shaft at rest, with all modes.
+    """Compute the driving-point or transfer receptance of the shaft without rotation, with all modes.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
     Examples
     --------
     >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 0.0)  # c_0 in N/m, c_1 in kg, c_2 in kg s^2
-    >>> float(k), float(m)  # N/m, kg: at rest c_0 and -c_1
+    >>> float(k), float(m)  # N/m, kg: without rotation c_0 and -c_1
     (30000000.0, 2.0)
     >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 4000.0)  # rad/s
     >>> round(float(k)), round(float(m), 3)  # c_0 - c_2 wbar^4 and -c_1 - 2 c_2 wbar^2
@@ -125,7 +125,7 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
 def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: float = 0.0) -> float:
     """Compute the static radial stiffness of a spindle at one place.
 
-    Term 0 of the dynamic stiffness, exact: at rest every element is a link, and nothing is lost even for soft bearings.
+    Term 0 of the dynamic stiffness, exact: every element is a link, and nothing is lost even for soft bearings.
 
     Parameters
     ----------

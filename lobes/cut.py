@@ -180,7 +180,7 @@ class Program:
     >>> Program(slot, speed_rpm=12000.0, depth=-0.002)
     Traceback (most recent call last):
         ...
-    ValueError: depth=-0.002 m is not a finite depth > 0; 1 mm is 1e-3
+    ValueError: depth=-0.002 m is not a finite depth > 0 (1 mm is 1e-3 m)
     """
 
     cut: Cut

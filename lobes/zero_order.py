@@ -14,7 +14,7 @@ from lobes.tooth_force import interval_forces, mean_force
 from modal.arrays import Complexes, Floats
 
 MIN_NET_FORCE_RATIO = 0.7
-"""Least mean force of one direction over the mean of its magnitude for which zero order is valid."""
+"""Least mean force of one direction over the mean of its magnitude for which the zero-order approximation is valid."""
 CANCELLATION_SAMPLES = 400
 """Intervals of a tooth period for that mean."""
 

@@ -133,7 +133,7 @@ MIN_INNER_PEAK_RATIO = 10 ** (1 / 20)
 MIN_REAL_PART_DROP = 0.7
 """Largest real part at the half-power point over that at the edge.
 
-|mobility| of a mode has fallen to 1/sqrt(2) there and its real part, as |mobility|^2, to 1/2; before an antiresonance
+|mobility| of a mode drops to 1/sqrt(2) there and its real part, as |mobility|^2, to 1/2; before an antiresonance
 the real part stays.
 """
 

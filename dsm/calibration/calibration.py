@@ -31,15 +31,15 @@ class RemainingPreload(NamedTuple):
         low, high = (f"{100 * end:.2g}" if end < 0.995 else f"{100 * end:.0f}" for end in self)
         steep, flat = (1 / exponent for exponent in PRELOAD_EXPONENTS)
         law = f"preload ~ stiffness^{flat:.1f} to ^{steep:.1f}"
-        return f"remaining preload: {low} to {high} % of the start (ball bearings assumed; {law})"
+        return f"remaining preload: {low} to {high} % of the start (ball bearings assumed, {law})"
 
 
 def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPreload | None:
     """Estimate the remaining preload of ball bearings from their stiffness.
 
-    The radial exponents of Jones's model at rest (T. A. Harris and M. N. Kotzalas, Rolling Bearing Analysis, 2007). Its
-    axial ones are those of makers' catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at 25, or between. A finer
-    estimate needs the geometry of the bearings.
+    The radial exponents follow from Jones's model without rotation (T. A. Harris and M. N. Kotzalas, Rolling Bearing
+    Analysis, 2007). Its axial exponents agree with bearing catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at
+    25, or are between them. A finer estimate needs the geometry of the bearings.
 
     Parameters
     ----------

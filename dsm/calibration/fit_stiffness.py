@@ -202,7 +202,7 @@ def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRe
         where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
         for low in range(1, frequency.size):
             if gap[low - 1] < CLOSE_MODE_SHARE and np.any((numbers == low) | (numbers == low + 1)):
-                text = f"only {100 * gap[low - 1]:.2g} % apart in the fitted model, where they exchange shapes, so "
+                text = f"only {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes, so "
                 text += "standard errors hold only for small changes"
                 pair, cure = f"modes {low} and {low + 1}{where}", "Check which of them was measured"
                 remarks.append(FitRemark("modes-exchange-shapes", pair, text, cure))

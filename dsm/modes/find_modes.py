@@ -30,7 +30,7 @@ MAX_MODES = 100
 """Most modes: the work grows with their third power."""
 
 EXTRA_WHIRL_MODES = 12
-"""Further modes at rest that the start values of whirl are made of."""
+"""Further modes without rotation that the start values of whirl are made of."""
 
 
 def find_modes(

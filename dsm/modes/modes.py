@@ -28,7 +28,7 @@ class StateVectors(NamedTuple):
 
 
 def evaluate_between_nodes(modes: Modes, places: Floats, left: Indices) -> StateVectors:
-    """Evaluate the modes of a shaft at rest inside its elements, exactly.
+    """Evaluate the modes of a shaft without rotation inside its elements, exactly.
 
     places (m), shape (n_places,), and the node left of each. The state (u, t, Q, M)' = T (u1, t1, Q1, M1)
     from the left node of the element must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).

@@ -39,7 +39,7 @@ class Spindle:
     >>> Spindle([Segment(0.1, 0.02)], [Bearing(0.15, 2e8)])
     Traceback (most recent call last):
         ...
-    ValueError: bearing 1: position=0.15 m is off the shaft, 0 to 0.1 m
+    ValueError: bearing 1: position=0.15 m is not on the shaft (0 to 0.1 m)
     """
 
     segments: Sequence[Segment]

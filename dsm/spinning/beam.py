@@ -263,7 +263,7 @@ def spinning_element(
 
     Examples
     --------
-    At rest, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
+    Without rotation, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
 
     >>> element = spinning_element(1e4, 1e4, mass_per_length=15.0, length=0.5, frequency=[0.0], speed_rpm=0.0)
     >>> element.shape

@@ -229,7 +229,7 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Fl
 
     Examples
     --------
-    A round pinned beam, of f_1 = 162.2 Hz at rest, seen from the shaft at 3000 rpm: f_1 -+ 50 Hz.
+    A round pinned beam, of f_1 = 162.2 Hz without rotation, seen from the shaft at 3000 rpm: f_1 -+ 50 Hz.
 
     >>> pins = [(place, dof) for place in (0.0, 0.5) for dof in ("u", "v")]
     >>> beam = SpinningBeam([SpinningSegment(0.5, 1e4, 1e4, 15.0)], held=pins)

@@ -76,7 +76,7 @@ def study_shaft(theory: Theory) -> ShaftStudy:
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
-    """Return the numbers at rest and of the spinning spindle; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Return the numbers without and with rotation; plain is Euler-Bernoulli, shear Timoshenko theory."""
     at_rest, spinning = tuple(_numbers_at_rest(plain, shear)), tuple(_spinning_numbers(plain, shear))
     return (
         NumberGroup("Model and bearings: Figs. 3 and 8", ("fig-3", "fig-8"), at_rest),

@@ -24,7 +24,7 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     time_constant : float
         Time constant of the window (s).
     delay : float
-        Time from the start of the window to the centre of the pulse (s). The window has fallen to
+        Time from the start of the window to the centre of the pulse (s). The window has dropped to
         exp(-delay/time_constant) by then, which makes K larger; this is removed, too. 0 if the window begins at the
         hit,
         or covers the force, too.

@@ -92,7 +92,7 @@ class Mode:
     relative_peak: float | None = None
     """Peak of receptance over the highest of the same free decays from one excitation; None if K is known."""
     remarks: tuple[Remark, ...] = ()
-    """Reasons why the mode may not be trusted. docs/remarks.md lists their codes."""
+    """Reasons for doubt about the mode. docs/remarks.md lists their codes."""
 
     def __post_init__(self) -> None:
         """Check values and covariances."""

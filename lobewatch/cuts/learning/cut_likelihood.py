@@ -138,7 +138,7 @@ def is_setting_taken(
 ) -> bool:
     """Return whether chatter was recorded at a setting (rpm, m) or hardly deeper, and no stable cut there since.
 
-    doubted: cuts that are not believed, which take more.
+    doubted: rejected cuts, which take more.
     """
     return any(
         cut.has_chatter

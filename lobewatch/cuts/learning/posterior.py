@@ -142,7 +142,7 @@ class NewEvidence(NamedTuple):
 def build_prior(rest: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
     """Build the posterior before the first cut.
 
-    rest: the spindle at rest in the median estimate (a row).
+    rest: the spindle without rotation in the median estimate (a row).
     """
     return Posterior(sample_prior(rest, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
@@ -177,7 +177,7 @@ def _refresh(posterior: Posterior) -> Posterior:
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     """Return the log of prior times likelihood of all cuts; -inf where that is not above the least (r,).
 
-    A sample that cannot come to more any more is not asked about further cuts.
+    A sample that cannot come to more any more is not evaluated for further cuts.
     """
     value: Floats = -np.sum(samples.normal**2, axis=1) / 2
     hope = [cut.weight * cut_likelihood.max_log_likelihood(cut) for cut in cuts]

@@ -29,7 +29,7 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
         return ()
     shown = f"pitch [{', '.join(f'{np.degrees(angle):g}' for angle in pitch)}]"
     if len(pitch) != teeth:
-        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} flutes. Give one angle per flute.")
+        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} flutes")
     if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
         raise ValueError(f"{shown} degrees has an angle that is not > 0")
     if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:

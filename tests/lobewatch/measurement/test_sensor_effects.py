@@ -111,7 +111,7 @@ def test_what_no_sensor_is_is_rejected(line: str, words: str) -> None:
 def test_grams_of_an_option_are_checked() -> None:
     assert SensorLoading.of(10.0, 4.0).mass == pytest.approx(0.012)
     for wrong in (-1.0, float("nan"), 3000.0):
-        with pytest.raises(ValueError, match=rf"{wrong} g.* 0 to 2000"):
+        with pytest.raises(ValueError, match=rf"{wrong:g} g.* 0 to 2000"):
             SensorLoading.of(wrong)
 
 

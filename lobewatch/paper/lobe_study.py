@@ -116,9 +116,9 @@ def _further_numbers(study: LobeStudy) -> list[Comparison]:
     rows = []
     for name, first, several in (("feed only", study.one_mode, study.six_modes), ("x and y", *study.by_zero_order)):
         lowest, median, worst = (100 * error for error in study.errors_of_one_mode(first, several))
-        beginning = f"1 mode instead of 6, {name}"
+        beginning = f"one mode, {name}"
         method = {"zero order": "ZOA"}.get(several.method, several.method)
-        claim = f"error of the lowest limit ({method}), a claim of its reference [18]"
+        claim = f"error of the lowest limit, 1 mode instead of 6 ({method}): a claim of its reference [18]"
         side = "on the side of a pocket, which other modes shift"
         rows += [
             Comparison(f"{beginning}: lowest", "", None, lowest, "%", 2, claim),

@@ -100,11 +100,11 @@ def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         Comparison("f1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
         Comparison("f1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
         Comparison("each bearing, for 1722 Hz", "Fig. 8", stiff, plain.new.bearing_stiffness, "N/m", 5, fitted),
-        Comparison("1722 Hz, with shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
+        Comparison("each bearing, 1722 Hz, shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
         Comparison("each bearing, for 1550 Hz", "Fig. 8", soft, plain.old.bearing_stiffness, "N/m", 5, fitted),
-        Comparison("1550 Hz, with shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
+        Comparison("each bearing, 1550 Hz, shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
         Comparison("remaining stiffness", "Fig. 8", round(soft / stiff, 3), plain.old.factor, "-", 3, left),
-        Comparison("remaining stiffness, with shear", "", None, shear.old.factor, "-", 3, theory),
+        Comparison("remaining stiffness, shear", "", None, shear.old.factor, "-", 3, theory),
     ]
 
 
@@ -121,7 +121,7 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         text = f"exact: 60 f1, {exact:.0f} rpm with the paper's f1. The paper is {off} off (read from its figure?)."
         rows += [
             Comparison(name, where, value, plain.critical_speeds[i], "rpm", 6, text),
-            Comparison(f"{name}, with shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
+            Comparison(f"{name}, shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
         ]
     seen = "fixed frame: speed changes f1 in the rotating frame only"
     parted = "fixed frame: effect of speed with rotary inertia"
@@ -129,8 +129,8 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     return [
         *rows,
         Comparison(f"f1 {turning}", "", None, plain.at_speed[1], "Hz", 6, seen),
-        Comparison("backward, with shear", "", None, shear.at_speed[0], "Hz", 6, parted),
-        Comparison("forward, with shear", "", None, shear.at_speed[1], "Hz", 6, parted),
+        Comparison("backward whirl, shear", "", None, shear.at_speed[0], "Hz", 6, parted),
+        Comparison("forward whirl, shear", "", None, shear.at_speed[1], "Hz", 6, parted),
     ]
 
 

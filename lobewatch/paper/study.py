@@ -13,7 +13,7 @@ from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
 def _validation_claim(meshes: FiniteElementStudy) -> Claim:
     softer = meshes.exact["timoshenko"] / meshes.exact["euler-bernoulli"] - 1
     return Claim(
-        "Finite elements with shear validate the model without it: 2367 against 2303 Hz, less than 3 % apart.",
+        "Finite elements with shear validate the model without it: 2367 compared with 2303 Hz, less than 3 % apart.",
         "fails",
         f"Shear lowers f1 of this shaft by {format_share(-softer)}, and {printed.FEM_ELEMENTS} elements are exact to "
         f"{format_share(meshes.error('linear'))}. A model with shear is always below one without, even if clamped in "
@@ -65,7 +65,7 @@ def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tu
         Claim(
             "A drop of f1 by 10 % shifts the stability lobes significantly.",
             "holds",
-            f"Pockets shift with f1 ({before:.0f} to {after:.0f} rpm). At the old pocket speed "
+            f"Pockets shift with f1 ({before:.0f} to {after:.0f} rpm). At the first speed "
             f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit remains. The lowest limit depends "
             f"on K: {format_share(lobes.share(lobes.by_model))} remains with the model's K, "
             f"{format_share(lobes.share(lobes.by_rule))} by the paper's rule.",

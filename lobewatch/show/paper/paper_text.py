@@ -30,7 +30,7 @@ def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
     yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, compared with a surrogate"
     yield "spindle fitted to the paper's frequencies (its drawing is not public)."
     for section in study.sections:
-        yield from ("", section.title, _table_line(("", "place", "paper", "ours", "unit", "change")))
+        yield from ("", section.title, _table_line(("", "source", "paper", "ours", "unit", "deviation")))
         for row in section.comparisons:
             yield _table_line(paper_cells(row))
             yield from _indent(row.reason, width)

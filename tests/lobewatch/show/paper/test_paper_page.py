@@ -87,4 +87,5 @@ def test_json_and_mistakes(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     (tmp_path / "file").touch()
     code, text, error = ask("--out", str(tmp_path / "file"))
     assert (code, text) == (2, "")
-    assert "is a file; name a folder with --out" in error
+    assert f"{tmp_path / 'file'}: " in error
+    assert "--out" in error

@@ -175,7 +175,7 @@ def accept_questions(
 
 def format_not_asked(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[str, Sequence[str]]) -> str:
     """Return the sentence on codes that tap tests do not ask, with their open questions."""
-    still_open = ", ".join(f"{tap_id} ({', '.join(open_codes)})" for tap_id, open_codes in asked.items())
+    still_open = ", ".join(f"{tap_id}: {' '.join(open_codes)}" for tap_id, open_codes in asked.items())
     text = f"accept_questions.codes {' '.join(codes)}: not an open question of {', '.join(tap_ids)} (stored)"
     return f"{text}. Open questions: {still_open or 'none'}."
 
@@ -199,8 +199,8 @@ def question_remarks(
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
         answer = shlex.join(["lobewatch", "replay", str(path), *map(str, files)])
         answer += f" accept_questions.codes {question.code}"
-        cure = f"Tap again, or confirm with {answer}"
-        yield Remark(question.code, about, f"{question.text} (not a reference until confirmed with {answer})", cure)
+        cure = f"Tap again, or run {answer} to confirm"
+        yield Remark(question.code, about, f"{question.text} ({answer} confirms it)", cure)
 
 
 def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ def check_numbers(
     """
     numbers = np.asarray(values, dtype=np.float64)
     if numbers.ndim != 1 or numbers.size < least:
-        raise ValueError(f"{name} has shape {numbers.shape}; a 1-D array{needed} is needed")
+        raise ValueError(f"{name} has shape {numbers.shape}. Give a 1-D array{needed}.")
     for bad in numbers[~(np.isfinite(numbers) & (numbers > 0 if positive else numbers >= 0))]:
         require_number(name, bad, unit, positive=positive)
     return numbers

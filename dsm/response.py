@@ -21,7 +21,7 @@ def receptance(
     loss_factor: float = 0.0,
     force_position: float | None = None,
 ) -> Complexes:
-    """Compute the driving-point or transfer receptance of the shaft at rest, with all modes.
+    """Compute the driving-point or transfer receptance of the shaft without rotation, with all modes.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
     Examples
     --------
     >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 0.0)  # c_0 in N/m, c_1 in kg, c_2 in kg s^2
-    >>> float(k), float(m)  # N/m, kg: at rest c_0 and -c_1
+    >>> float(k), float(m)  # N/m, kg: without rotation c_0 and -c_1
     (30000000.0, 2.0)
     >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 4000.0)  # rad/s
     >>> round(float(k)), round(float(m), 3)  # c_0 - c_2 wbar^4 and -c_1 - 2 c_2 wbar^2
@@ -112,9 +112,9 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
     """
     c = np.asarray(coefficients, dtype=np.float64)
     if c.ndim == 0 or c.shape[-1] == 0:
-        raise ValueError(f"coefficients of shape {c.shape} have no last axis of powers of w^2")
+        raise ValueError(f"coefficients have shape {c.shape}. Give the powers of w^2 along the last axis.")
     if not np.all(np.isfinite(c)):
-        raise ValueError("coefficients hold a value that is not finite; look at the model they come from")
+        raise ValueError("coefficients have values that are not finite. Check the model.")
     if not (math.isfinite(wbar) and wbar >= 0):
         raise ValueError(f"wbar={wbar} is not a finite angular frequency >= 0 (rad/s)")
     order = np.arange(c.shape[-1])
@@ -125,7 +125,7 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[Floats, 
 def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: float = 0.0) -> float:
     """Compute the static radial stiffness of a spindle at one place.
 
-    Term 0 of the dynamic stiffness, exact: at rest every element is a link, and nothing is lost even for soft bearings.
+    Term 0 of the dynamic stiffness, exact: every element is a link, and nothing is lost even for soft bearings.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
         require_support(rest)
     model = assemble(rest, float(np.max(f, initial=0.0)))
     if np.any(model.held[0]):
-        raise ValueError(f"position={position} m is held by a rigid bearing; cut the shaft elsewhere")
+        raise ValueError(f"position={position} m is at a rigid bearing. Cut the shaft elsewhere.")
     k = condense_damped(model, rest, f, loss_factor, node=0)
     stiffness = (k.uu, k.ut, k.tt)
     if joint is not None:

@@ -125,8 +125,8 @@ class CuttingCoefficients:
 
 def check_coefficients(tangential: float, radial: float) -> None:
     """Raise ValueError unless Ktc is > 0 and Krc >= 0, both finite (Pa)."""
-    check_number("tangential", tangential, "Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
-    check_number("radial", radial, "Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa", may_be_zero=True)
+    check_number("tangential", tangential, "Pa is not a finite number > 0 (1 N/mm^2 is 1e6 Pa)")
+    check_number("radial", radial, "Pa is not a finite number >= 0 (1 N/mm^2 is 1e6 Pa)", may_be_zero=True)
 
 
 def check_number(name: str, value: float, text: str, may_be_zero: bool = False) -> None:
@@ -163,7 +163,7 @@ def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[fl
     >>> round(float(ktc) / 1e6, 1), round(float(krc) / 1e6, 1)  # N/mm2
     (695.4, 281.0)
     """
-    check_number("specific_force", specific_force, "Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    check_number("specific_force", specific_force, "Pa is not a finite number > 0 (1 N/mm^2 is 1e6 Pa)")
     if not 0 < force_angle <= np.pi / 2:
-        raise ValueError(f"force_angle={force_angle} rad is not in (0, pi/2]; 68 degrees are 1.187 rad")
+        raise ValueError(f"force_angle={force_angle} rad is not in (0, pi/2] (68 degrees are 1.187 rad)")
     return specific_force * float(np.sin(force_angle)), max(specific_force * float(np.cos(force_angle)), 0.0)

@@ -29,11 +29,11 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
         return ()
     shown = f"pitch [{', '.join(f'{np.degrees(angle):g}' for angle in pitch)}]"
     if len(pitch) != teeth:
-        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
+        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} flutes")
     if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
-        raise ValueError(f"{shown} degrees holds an angle that is not > 0; each tooth follows the one before it")
+        raise ValueError(f"{shown} degrees has an angle that is not > 0")
     if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:
-        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
+        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees instead of 360. Measure it again.")
     alike = [next(other for other in pitch if abs(other - angle) < PITCH_TOLERANCE) for angle in pitch]
     return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
 
@@ -82,17 +82,17 @@ class Cut:
     def __post_init__(self) -> None:
         """Check the values."""
         if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
-            raise ValueError(f"teeth={self.teeth} is not a whole number >= 1; give the number of cutting edges")
+            raise ValueError(f"teeth={self.teeth} is not a whole number >= 1. Give the number of flutes.")
         if not 0 < self.immersion <= 1:
-            text = "is not in (0, 1]; give radial depth divided by cutter diameter"
-            raise ValueError(f"immersion={self.immersion} {text}")
+            text = "Give the radial depth divided by the cutter diameter."
+            raise ValueError(f"immersion={self.immersion} is not in (0, 1]. {text}")
         if self.direction not in get_args(Direction):
-            raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
+            raise ValueError(f'direction={self.direction!r} is neither "up" nor "down". For a slot, give either.')
         check_coefficients(self.tangential, self.radial)
-        text = "rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
+        text = "rad/m is not a finite number >= 0. Give 2 tan(helix angle) / diameter."
         check_number("helix_lag", self.helix_lag, text, may_be_zero=True)
         if not np.isfinite(self.feed_angle):
-            raise ValueError(f"feed_angle={self.feed_angle} rad is not finite; 0 feeds along x, pi/2 along y")
+            raise ValueError(f"feed_angle={self.feed_angle} rad is not finite. Give 0 for feed along x, pi/2 along y.")
         object.__setattr__(self, "pitch", normalize_pitch(self.pitch, self.teeth))
 
     @property
@@ -180,7 +180,7 @@ class Program:
     >>> Program(slot, speed_rpm=12000.0, depth=-0.002)
     Traceback (most recent call last):
         ...
-    ValueError: depth=-0.002 m is not a finite depth > 0; 1 mm is 1e-3
+    ValueError: depth=-0.002 m is not a finite depth > 0 (1 mm is 1e-3 m)
     """
 
     cut: Cut
@@ -192,8 +192,8 @@ class Program:
 
     def __post_init__(self) -> None:
         """Check speed and depth."""
-        check_number("speed_rpm", self.speed_rpm, "is not a finite speed > 0 rpm; give that of the program")
-        check_number("depth", self.depth, "m is not a finite depth > 0; 1 mm is 1e-3")
+        check_number("speed_rpm", self.speed_rpm, "is not a finite speed > 0 rpm")
+        check_number("depth", self.depth, "m is not a finite depth > 0 (1 mm is 1e-3 m)")
 
 
 def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: float, edge: float = 0.0) -> Floats:
@@ -240,8 +240,8 @@ def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: flo
     672
     """
     for name, value in (("diameter", diameter), ("feed_per_tooth", feed_per_tooth)):
-        check_number(name, value, "m is not a finite number > 0; 1 mm is 1e-3")
-    text = "N/m is not a finite number >= 0; 1 N/mm is 1e3, leave it out where not known"
+        check_number(name, value, "m is not a finite number > 0 (1 mm is 1e-3 m)")
+    text = "N/m is not a finite number >= 0 (1 N/mm is 1e3 N/m). Leave it out if unknown."
     check_number("edge", edge, text, may_be_zero=True)
     chip = feed_per_tooth * (np.cos(cut.entry_angle) - np.cos(cut.exit_angle))
     per_depth = cut.tangential * chip + edge * (cut.exit_angle - cut.entry_angle)
@@ -295,7 +295,7 @@ def max_depth_for_drive(
     """
     for name, value in (("power", power), ("torque", torque)):
         if not value > 0:
-            raise ValueError(f"{name}={value} is not > 0; leave it out where the drive has no such limit")
+            raise ValueError(f"{name}={value} is not > 0. Leave it out if the drive has no such limit.")
     turning = 2 * np.pi * np.asarray(speed_rpm, dtype=np.float64) / 60
     allowed = np.minimum(torque, power / turning)
     return np.asarray(allowed / mean_torque(cut, 1.0, diameter, feed_per_tooth, edge))

@@ -210,5 +210,5 @@ def find_materials(word: str) -> list[CuttingCoefficients]:
     matching = in_group or [m for m in known if any(folded in fold_material_name(name) for name in m.names)]
     if not matching:
         near = nearest_material_name(word, materials_by_name())
-        raise ValueError(f"no material has {word!r} in a name; is {near!r} meant? Without a word all are listed")
+        raise ValueError(f"no material name contains {word!r}. Did you mean {near!r}?")
     return matching

@@ -97,10 +97,10 @@ def build_milling_system(x: TipModes, y: TipModes, vectors: ArrayLike | None = N
     """
     given = [(axis, name, modes) for axis, name, modes in ((0, "x", x), (1, "y", y)) if modes is not None]
     if not given:
-        raise ValueError("x and y are both None; give the modes of one direction at least")
+        raise ValueError("x and y are both None. Give the modes of at least one direction.")
     for _, name, modes in given:
         if isinstance(modes, Frf):
-            raise ValueError(f"{name} is an FRF; semi-discretisation works on modes: find them with modal.fit_modes")
+            raise ValueError(f"{name} is an FRF, but semi-discretisation needs modes. Fit them with modal.fit_modes.")
         check_modes(modes, name)
     modes = [mode for _, _, group in given for mode in group]
     direction = np.repeat(np.arange(len(given)), [len(group) for _, _, group in given])
@@ -122,10 +122,10 @@ def check_directions(vectors: ArrayLike, number: int) -> Floats:
     """Return the directions of the modes, shape (n, 2); ValueError if shape or values are wrong."""
     vector = np.asarray(vectors, dtype=np.float64)
     if vector.shape != (number, 2):
-        needed = f"({number}, 2) is needed, the parts in x and y of each mode"
-        raise ValueError(f"vectors has shape {vector.shape}; {needed}")
+        needed = f"Give shape ({number}, 2), the x and y components of each mode."
+        raise ValueError(f"vectors has shape {vector.shape}. {needed}")
     if not np.all(np.isfinite(vector)):
-        raise ValueError("vectors holds a value that is not finite; give the parts in x and y of each mode")
+        raise ValueError("vectors has a value that is not finite. Give the x and y components of each mode.")
     return vector
 
 
@@ -218,13 +218,13 @@ def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio:
     """
     if rule not in get_args(StiffnessRule):
         known = ", ".join(get_args(StiffnessRule))
-        raise ValueError(f"rule={rule!r} is none of {known}; choose what K does when f_n falls")
+        raise ValueError(f"rule={rule!r} is not one of {known}. Choose how K changes with the natural frequency.")
     for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
-        check_number(name, value, "is not a finite number > 0; give new over old")
+        check_number(name, value, "is not a finite number > 0. Give new over old.")
     if rule == "measured" and stiffness_ratio is None:
-        raise ValueError('rule="measured" needs stiffness_ratio, K of the new tap test over K of the baseline')
+        raise ValueError('rule="measured" needs stiffness_ratio. Give K of the new tap test over K of the baseline.')
     if rule == "paper" and stiffness_ratio is not None:
-        raise ValueError(f'rule="paper" sets K itself; leave stiffness_ratio={stiffness_ratio} out')
+        raise ValueError(f'rule="paper" sets K itself. Leave stiffness_ratio={stiffness_ratio} out.')
     softer = ratio if rule == "paper" else 1.0 if stiffness_ratio is None else stiffness_ratio
     rule_text = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
     return baseline.scaled(ratio, softer, f"aged, {rule_text}")

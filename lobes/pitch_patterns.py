@@ -101,7 +101,7 @@ def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
     [('alternating', (85.0, 95.0, 85.0, 95.0)), ('linear', (75.0, 85.0, 95.0, 105.0))]
     """
     if teeth < 2:
-        raise ValueError(f"teeth={teeth}: a cutter of one tooth has no pitch to divide; pitches need two teeth or more")
+        raise ValueError(f"teeth={teeth} has no pitch to vary. Give a tool with at least 2 flutes.")
     is_coarse = half_wave >= PITCH_STEPS_PER_HALF_WAVE * COARSE_PITCH_STEP_DEG
     unit = COARSE_PITCH_STEP_DEG if is_coarse else FINE_PITCH_STEP_DEG
     wanted = half_wave * np.arange(1, PITCH_STEPS_PER_HALF_WAVE * MAX_HALF_WAVES + 1) / PITCH_STEPS_PER_HALF_WAVE

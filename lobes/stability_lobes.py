@@ -20,7 +20,7 @@ def check_vector(name: str, values: ArrayLike, item: str, text: str = "", may_be
     """
     vector = np.atleast_1d(np.asarray(values, dtype=np.float64))
     if vector.ndim != 1 or vector.size == 0:
-        raise ValueError(f"{name} has shape {vector.shape}; a 1-D array of at least one {item} is needed")
+        raise ValueError(f"{name} has shape {vector.shape}. Give a 1-D array of at least one {item}.")
     bad = np.flatnonzero(~(np.isfinite(vector) & ((vector >= 0) if may_be_zero else (vector > 0))))
     if text and bad.size:
         raise ValueError(f"{name}[{bad[0]}]={vector[bad[0]]} {text}")
@@ -29,7 +29,7 @@ def check_vector(name: str, values: ArrayLike, item: str, text: str = "", may_be
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:
     """Return spindle speeds (rpm) as a 1-D array; ValueError unless there is one and all are finite and > 0."""
-    text = "is not a finite speed > 0 rpm; leave such speeds out"
+    text = "is not a finite speed > 0 rpm. Leave such speeds out."
     return check_vector("speed_rpm", speed_rpm, "speed (rpm)", text)
 
 
@@ -108,13 +108,13 @@ class StabilityLobes:
         for name in ("depth", "chatter_frequency", "kind"):
             shape = np.shape(getattr(self, name))
             if shape != (n,):
-                raise ValueError(f"{name} has shape {shape}, speed_rpm ({n},); give one a speed")
+                raise ValueError(f"{name} has shape {shape}, speed_rpm ({n},). Give one value per speed.")
         if self.crossings.ndim != 2 or len(self.crossings) != n:
-            raise ValueError(f"crossings has shape {self.crossings.shape}; one row for each of {n} speeds is needed")
+            raise ValueError(f"crossings has shape {self.crossings.shape}. Give one row for each of {n} speeds.")
         bad = np.flatnonzero(~(self.depth > 0))
         if bad.size:
             wrong = f"depth[{bad[0]}]={self.depth[bad[0]]} m"
-            raise ValueError(f"{wrong} is not > 0; give inf where a cut is stable at any depth")
+            raise ValueError(f"{wrong} is not > 0. Give inf if a cut is stable at any depth.")
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
@@ -160,7 +160,7 @@ class StabilityLobes:
         outside = ~((wanted >= low) & (wanted <= high))
         if np.any(outside):
             chart = f"the chart ({low:g}..{high:g} rpm)"
-            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}; compute lobes there too")
+            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}. Compute lobes at that speed.")
         order = np.argsort(self.speed_rpm)
         speed, depth = self.speed_rpm[order], self.depth[order]
         right = np.searchsorted(speed, wanted)
@@ -193,7 +193,7 @@ class StabilityLobes:
         """
         wanted = np.asarray(depth, dtype=np.float64)
         if not np.all(wanted >= 0):
-            raise ValueError(f"depth={wanted} m is not >= 0; give the axial depth of cut in metres")
+            raise ValueError(f"depth={wanted} m is not >= 0. Give the axial depth ap in metres.")
         return np.asarray(wanted < self.depth_at(speed_rpm))
 
 

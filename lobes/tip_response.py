@@ -45,12 +45,12 @@ class TipResponse:
 def check_modes(modes: Sequence[Mode], direction: str) -> None:
     """Reject an empty list of modes, and modes of no driving point."""
     if not modes:
-        raise ValueError(f"{direction} has no modes; give at least one mode, or None where it is rigid")
+        raise ValueError(f"{direction} has no modes. Give at least one mode, or None if it is rigid.")
     for mode in modes:
         if not mode.is_driving_point:
             raise ValueError(
-                f"the mode at {mode.frequency:g} Hz of {direction} has stiffness {mode.stiffness:g} N/m, which is not "
-                "of a driving point; leave it out, or tap where the sensor sits"
+                f"the mode at {mode.frequency:g} Hz of {direction} has a negative stiffness of {mode.stiffness:g} N/m. "
+                "Leave it out, or tap at the sensor (driving point)."
             )
 
 
@@ -65,7 +65,7 @@ def tip_responses(x: TipData | None, y: TipData | None, tooth_frequency: float) 
     """
     given = [(axis, name, tip) for axis, name, tip in ((0, "x", x), (1, "y", y)) if tip is not None]
     if not given:
-        raise ValueError("x and y are both None; give the modes or the FRF of one direction at least")
+        raise ValueError("x and y are both None. Give the modes or the FRF of at least one direction.")
     for _, name, tip in given:
         if not isinstance(tip, Frf):
             check_modes(tip, name)
@@ -81,7 +81,7 @@ def cross_response(cross: TipData, highest: float) -> TipResponse:
     for an empty list.
     """
     if not isinstance(cross, Frf) and not cross:
-        raise ValueError("cross has no modes; give at least one mode, or None where x and y do not move each other")
+        raise ValueError("cross has no modes. Give at least one mode, or None if x and y are not coupled.")
     return _tip_response(cross, highest)
 
 
@@ -91,7 +91,7 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
     high = min(tip.grid[-1] for tip in tips)
     if not low < high:
         ends = f"one ends at {high:g} Hz, the other begins at {low:g} Hz"
-        raise ValueError(f"x and y have no band in common: {ends}; give FRFs that overlap")
+        raise ValueError(f"x and y have no common band: {ends}. Give FRFs that overlap.")
     if all(np.array_equal(tip.grid, tips[0].grid) for tip in tips[1:]):
         return tips[0].grid
     grid = np.unique(np.concatenate([tip.grid for tip in tips]))

@@ -14,7 +14,7 @@ from lobes.tooth_force import interval_forces, mean_force
 from modal.arrays import Complexes, Floats
 
 MIN_NET_FORCE_RATIO = 0.7
-"""Least mean force of one direction over the mean of its magnitude for which zero order is valid."""
+"""Least mean force of one direction over the mean of its magnitude for which the zero-order approximation is valid."""
 CANCELLATION_SAMPLES = 400
 """Intervals of a tooth period for that mean."""
 
@@ -78,7 +78,7 @@ def zero_order_lobes(
     tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)
     force = mean_force(cut)
     if cross is not None and len(tips) == 1:
-        raise ValueError("cross is known, x or y is not; give the modes or the FRF of both directions")
+        raise ValueError("cross is given, but x or y is missing. Give the modes or the FRF of both directions.")
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
@@ -96,8 +96,8 @@ def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
     if share >= MIN_NET_FORCE_RATIO:
         return ()
     text = (
-        f"zero order knows the mean force alone, and {100 * (1 - share):.0f} % of the force in {'xy'[axis]}, the one "
-        "direction known, cancels over a turn: the true limit can be far lower"
+        f"limit may be much too high, because {100 * (1 - share):.0f} % of the force in {'xy'[axis]} (the only known "
+        "direction) cancels over a turn"
     )
     return (Remark("force-cancels", "", text, MEAN_FORCE_REMEDY),)
 

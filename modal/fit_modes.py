@@ -94,7 +94,7 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     ['500.0 Hz']
     """
     if hits and len(hits) != len(state.frfs):
-        raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
+        raise ValueError(f"{len(hits)} lists of hits for {len(state.frfs)} FRFs. Give one list per FRF, even if empty.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
@@ -282,9 +282,9 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
     """
     records = np.atleast_2d(np.asarray(decays, dtype=np.float64))
     if records.ndim != 2 or records.shape[1] < 32:
-        raise ValueError(f"decays have shape {records.shape}; give (p, n) with 32 samples or more each")
+        raise ValueError(f"decays have shape {records.shape}. Give (p, n) with n of at least 32 samples.")
     if not np.all(np.isfinite(records)) or not np.all(np.ptp(records, axis=1)):
-        raise ValueError("a decay holds values that are not finite, or nothing but one value: leave it out")
+        raise ValueError("a decay is constant or has values that are not finite. Leave it out.")
     frequency = np.fft.rfftfreq(records.shape[1], 1 / sample_rate)
     return [from_accelerance(frequency, np.fft.rfft(record) / sample_rate) for record in records]
 

@@ -117,9 +117,9 @@ def mode_indicator(frfs: Sequence[Frf]) -> Floats:
     [0.0, 1.0]
     """
     if not frfs:
-        raise ValueError("there is no FRF; give one or more")
+        raise ValueError("no FRF given. Give one or more.")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
-        raise ValueError("the FRFs differ in their frequency lines; measure or export all with the same settings")
+        raise ValueError("the FRFs have different frequency lines. Measure or export all with the same settings.")
     receptance = np.array([frf.receptance for frf in frfs])
     size = np.abs(receptance)
     energy = np.sum(size**2, axis=0)
@@ -133,7 +133,7 @@ MIN_INNER_PEAK_RATIO = 10 ** (1 / 20)
 MIN_REAL_PART_DROP = 0.7
 """Largest real part at the half-power point over that at the edge.
 
-|mobility| of a mode has fallen to 1/sqrt(2) there and its real part, as |mobility|^2, to 1/2; before an antiresonance
+|mobility| of a mode drops to 1/sqrt(2) there and its real part, as |mobility|^2, to 1/2; before an antiresonance
 the real part stays.
 """
 

@@ -70,7 +70,7 @@ def _matching_lines(hit: Hit, frf: Frf) -> slice:
     first = int(np.searchsorted(frequency, frf.frequency[0]))
     part = slice(first, first + frf.frequency.size)
     if not np.array_equal(frequency[part], frf.frequency):
-        raise ValueError("hits and FRF differ in their frequency lines; give the hits that this FRF was averaged from")
+        raise ValueError("hits and FRF have different frequency lines. Give the hits averaged in this FRF.")
     return part
 
 
@@ -145,10 +145,9 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     if assess_trust(mode) is not Trust.TRUSTED or not is_felt or abs(slope) < sure * error:
         return mode
     per, words = 100 * 100 / mode.frequency, "softens" if slope < 0 else "stiffens"
-    forces = f"from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
-    shift = f"{per * slope:+.2g} ± {per * error:.1g} % for 100 N more, {forces}"
-    text = f"{words} with the force of the hit: f_n changes by {shift}"
-    return add_remark(mode, "force-dependent", text, "look at joints and clamping; hit equally hard")
+    shift = f"{per * slope:+.2g} ± {per * error:.1g} % per 100 N"
+    text = f"{words} with hit force: {shift} in frequency, from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
+    return add_remark(mode, "force-dependent", text, "Check joints and clamping, and hit equally hard")
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:

@@ -208,7 +208,7 @@ def calibrate(
     require_number("frequency", frequency, " Hz", positive=True)
     require_number("frequency_std", frequency_std, " Hz")
     if not 1 <= mode <= MAX_MODES:
-        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MAX_MODES}")
+        raise ValueError(f"mode={mode} is not between 1 (the lowest) and {MAX_MODES}")
     frequencies = [frequency]
     if frequency_std is not None:
         half = STANDARD_ERRORS_95_PERCENT * frequency_std
@@ -244,8 +244,8 @@ def calibrate(
 def _unreachable_error(spindle: Spindle, f: float, mode: int, chosen: Sequence[int]) -> UnreachableFrequencyError:
     low, high = (float(natural_frequencies(limit, mode)[-1]) for limit in _limit_spindles(spindle, chosen))
     return UnreachableFrequencyError(
-        f"no bearing stiffness puts mode {mode} at {f:g} Hz: it lies between {low:.1f} Hz (without these "
-        f"bearings) and {high:.1f} Hz (rigid bearings); check the geometry, and which mode was measured",
+        f"no bearing stiffness gives mode {mode} at {f:g} Hz, only {low:.1f} Hz (no bearings) to {high:.1f} Hz (rigid "
+        "bearings). Check the geometry and the mode number.",
         (low, high),
     )
 

@@ -77,7 +77,7 @@ class DampingCalibration:
             f"bearing damping  {damping} each on average\n"
             f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz\n"
             f"other damping    damping ratio {other}\n"
-            f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio"
+            f"sensitivity      1 % more bearing damping adds {self.sensitivity / 100:.3g} to the damping ratio"
         )
 
 
@@ -207,8 +207,8 @@ def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
     damped = [bearing for bearing in bearings if bearing.damping > 0]
     if damped and len(damped) < len(chosen):
         raise ValueError(
-            f"{len(damped)} of the {len(chosen)} bearings to calibrate have damping; give it to all of them, for its "
-            "ratio, or to none, for the ratio of their stiffnesses"
+            f"only {len(damped)} of {len(chosen)} bearings to calibrate have damping. Give damping to all of them, or "
+            "to none to distribute it by stiffness."
         )
     ratio = np.zeros(len(spindle.bearings))
     ratio[chosen] = [bearing.damping if damped else 1e-6 * bearing.stiffness for bearing in bearings]
@@ -220,8 +220,8 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
     without_dampers = start.mode.damping_ratio
     if without_dampers >= target:
         raise UnreachableDampingError(
-            f"damping_ratio={target:g} of mode {dampers.number} leaves nothing for these dampers: the loss factor and "
-            f"other bearings alone give {without_dampers:.6g}; lower them, or check the measurement",
+            f"damping_ratio={target:g} of mode {dampers.number} is not above {without_dampers:.6g}, the ratio without "
+            "these dampers. Reduce loss_factor or the damping of other bearings, or check the measurement.",
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
@@ -251,8 +251,8 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
             return low, top
         low, most = high, max(most, top.mode.damping_ratio)
     raise UnreachableDampingError(
-        f"damping_ratio={target:g} of mode {dampers.number} is out of reach: {most:.4g} is the most here; "
-        "stronger dampers hold the bearings still; look for damping elsewhere (loss_factor), or check the measurement",
+        f"damping_ratio={target:g} of mode {dampers.number} is above {most:.4g}, the maximum of these dampers. "
+        "Add other damping (loss_factor), or check the measurement.",
         most,
     )
 

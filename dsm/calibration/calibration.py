@@ -30,16 +30,16 @@ class RemainingPreload(NamedTuple):
         """Return a sentence."""
         low, high = (f"{100 * end:.2g}" if end < 0.995 else f"{100 * end:.0f}" for end in self)
         steep, flat = (1 / exponent for exponent in PRELOAD_EXPONENTS)
-        law = f"stiffness to the power of {flat:.1f} to {steep:.1f}"
-        return f"preload left: {low} to {high} % of that at the start, if the bearings have balls (by {law}); no finer"
+        law = f"preload ~ stiffness^{flat:.1f} to ^{steep:.1f}"
+        return f"remaining preload: {low} to {high} % of the start (ball bearings assumed, {law})"
 
 
 def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPreload | None:
     """Estimate the remaining preload of ball bearings from their stiffness.
 
-    The radial exponents of Jones's model at rest (T. A. Harris and M. N. Kotzalas, Rolling Bearing Analysis, 2007). Its
-    axial ones are those of makers' catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at 25, or between. A finer
-    estimate needs the geometry of the bearings.
+    The radial exponents follow from Jones's model without rotation (T. A. Harris and M. N. Kotzalas, Rolling Bearing
+    Analysis, 2007). Its axial exponents agree with bearing catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at
+    25, or are between them. A finer estimate needs the geometry of the bearings.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class UnreachableFrequencyError(ValueError):
     >>> calibrate(spindle, 5000.0)
     Traceback (most recent call last):
         ...
-    dsm.calibration.calibration.UnreachableFrequencyError: no bearing stiffness puts mode 1 at 5000 Hz: ...
+    dsm.calibration.calibration.UnreachableFrequencyError: no bearing stiffness gives mode 1 at 5000 Hz, ...
     """
 
     def __init__(self, message: str, reachable: tuple[float, float]) -> None:
@@ -166,11 +166,10 @@ class Calibration:
         """Remarks on doubtful stiffness."""
         if not self.is_open:
             return ()
-        text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them"
-        if self._is_unbounded:
-            text += ", and the frequency may as well be that of rigid ones"
-        cure = "measure another mode; the model may be too soft or too stiff"
-        return (FitRemark("bearings-not-felt", "bearings", f"{text}: they are open", cure),)
+        share = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} in the bearings"
+        text = f"stiffness not determined ({share}{', rigid bearings possible' if self._is_unbounded else ''})"
+        cure = "Measure another mode, and check whether the model is too soft or too stiff"
+        return (FitRemark("bearings-not-felt", "bearings", text, cure),)
 
     @cached_property
     def residual(self) -> float:
@@ -207,11 +206,11 @@ class Calibration:
             ("bearing stiffness", f"{stiffness} each"),
             (f"from mode {self.mode}", format_with_error(self.frequency, self.frequency_std, unit="Hz", percent=True)),
             ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
-            ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
+            ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in the bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
             ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (start -> calibrated)"),
             ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
-            ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
+            ("theory", f"{self.spindle.theory} (equivalent stiffness, comparable within one model only)"),
         ]
         if self.bearing_stiffness_interval is not None:
             low, high = (end / 1e6 for end in self.bearing_stiffness_interval)

@@ -146,7 +146,7 @@ class StiffnessFit:
         lines = [*self._stiffness_lines(), *self._correlation_lines(), *self._mode_lines()]
         chi = self.reduced_chi_square
         if chi is not None:
-            lines.append(f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right")
+            lines.append(f"reduced chi-square {chi:.3g} (about 1 if model and standard errors are right)")
         return "\n".join([*lines, *(f"warning: {remark}" for remark in self.remarks)])
 
     def _stiffness_lines(self) -> list[str]:
@@ -157,7 +157,8 @@ class StiffnessFit:
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
             start = f"start {stiffness / factor / scale:.5g} {unit}"
             estimate = f"{format_with_error(stiffness, std, scale, unit, percent=True)} each on average"
-            text = f"open, {start}" if group in self.open_groups else f"{estimate}, {start}: factor {factor:.5f}"
+            known = f"{estimate}, {start}: factor {factor:.5f}"
+            text = f"not determined, {start}" if group in self.open_groups else known
             lines.append(f"stiffness {group:{width}}  {text}")
         return lines
 
@@ -172,7 +173,7 @@ class StiffnessFit:
     def _mode_lines(self) -> list[str]:
         several = len(self.spindles) > 1
         head = "spindle, mode" if several else "mode"
-        lines = [f"{head}  measured, fitted less measured, share of each group in the strain energy"]
+        lines = [f"{head}  measured, fitted - measured, strain energy share of each group"]
         for index, number in enumerate(self.mode):
             std = None if self.frequency_std is None else float(self.frequency_std[index])
             energies = zip(self.groups, self.energy_share[index], strict=True)

@@ -123,8 +123,8 @@ def check_measured_modes(
     where = np.zeros(f.size, dtype=np.int_) if shaft is None else np.atleast_1d(np.asarray(shaft))
     if where.shape != f.shape or where.dtype.kind not in "iu" or {*where.tolist()} != {*range(spindles)}:
         raise ValueError(
-            f"shaft={shaft} does not say for each of {f.size} modes on which of {spindles} spindles it was measured, "
-            f"0 to {spindles - 1}, each at least once"
+            f"shaft={shaft} is invalid. Give the spindle number, 0 to {spindles - 1}, of each of {f.size} modes, "
+            "with every spindle at least once."
         )
     numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
@@ -136,11 +136,10 @@ def check_measured_modes(
 def _check_mode_numbers(f: Floats, numbers: Indices, mode: Sequence[int] | None) -> None:
     """Check the mode numbers of one spindle."""
     if numbers.shape != f.shape or np.any(numbers < 1) or np.unique(numbers).size < f.size:
-        raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
+        raise ValueError(f"mode={mode} is invalid. Give each of {f.size} modes its own number, from 1 (the lowest).")
     order = np.argsort(numbers)
     if np.any(np.diff(f[order]) <= 0):
-        rising = f"rise with the number of the mode, {numbers[order]}"
-        raise ValueError(f"frequency={f[order].tolist()} Hz does not {rising}")
+        raise ValueError(f"frequency={f[order].tolist()} Hz does not rise with the mode number {numbers[order]}")
 
 
 MAX_LOG_FACTOR = math.log(1e6)

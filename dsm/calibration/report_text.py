@@ -20,8 +20,8 @@ class FitRemark:
     """Remedy."""
 
     def __str__(self) -> str:
-        """Return one sentence."""
-        return ": ".join(filter(None, (self.about, self.text))) + f"; {self.cure}"
+        """Return finding and remedy."""
+        return ": ".join(filter(None, (self.about, self.text))) + f". {self.cure}."
 
 
 MIN_SHOWN_ERROR_SHARE = 1e-7

@@ -35,7 +35,7 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
     if not chosen:
         groups = ", ".join(sorted({repr(part.group) for part in _parts(spindle) if part.group})) or "none"
         wanted = "with a group" if group is None else f"of group {group!r}"
-        raise ValueError(f"there is no bearing {wanted} to calibrate; groups of this spindle: {groups}")
+        raise ValueError(f"no bearing {wanted} to calibrate. Choose one of the groups: {groups}.")
     for index in chosen:
         _require_spring(spindle, index, "or the group '' to leave it rigid")
     return chosen
@@ -62,12 +62,12 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
     names = known_names if groups is None else tuple(groups)
     listed = ", ".join(map(repr, known_names)) or "none"
     if not names:
-        raise ValueError(f"no group of bearings or joints was named; groups of this spindle: {listed}")
+        raise ValueError(f"no group of bearings or joints given. Choose from: {listed}.")
     for name in names:
         if name not in known_names:
-            raise ValueError(f"group {name!r} is none of this spindle; its groups: {listed}")
+            raise ValueError(f"unknown group {name!r}. Choose from: {listed}.")
         if names.count(name) > 1:
-            raise ValueError(f"group {name!r} is named {names.count(name)} times; name it once")
+            raise ValueError(f"group {name!r} is named {names.count(name)} times. Name it once.")
     for spindle in spindles:
         for index, bearing in enumerate(spindle.bearings):
             if bearing.group in names:
@@ -94,7 +94,7 @@ def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
         tilting = [joint.rotational_stiffness for joint in spindle.joints if joint.rotational_group == group]
         if tilting:
             return math.fsum(tilting) / len(tilting)
-    raise ValueError(f"group {group!r} is none of these spindles")
+    raise ValueError(f"no spindle has the group {group!r}")
 
 
 def is_tilting(spindles: Sequence[Spindle], group: str) -> bool:
@@ -147,5 +147,5 @@ def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:
 def _require_spring(spindle: Spindle, index: int, otherwise: str) -> None:
     """Raise ValueError for a rigid bearing, which no factor changes."""
     if math.isinf(spindle.bearings[index].stiffness):
-        remedy = f"give a finite one to start from, {otherwise}"
-        raise ValueError(f"bearing {index + 1}: stiffness=inf cannot be calibrated; {remedy}")
+        remedy = f"Give a finite start value, {otherwise}."
+        raise ValueError(f"bearing {index + 1}: stiffness=inf cannot be calibrated. {remedy}")

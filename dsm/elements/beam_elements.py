@@ -135,8 +135,8 @@ def place_nodes(
     parts = np.ceil(size / longest * (1 - 1e-12)).clip(1, MAX_SHAFT_ELEMENTS + 1).astype(int)
     if parts.sum() > MAX_SHAFT_ELEMENTS:
         raise ArithmeticError(
-            f"{top:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements: ask for lower frequencies and "
-            "modes, and look for segments far too thin or soft, and for wrong units"
+            f"{top:.4g} Hz needs more than {MAX_SHAFT_ELEMENTS} elements. Request lower frequencies or fewer modes, "
+            "and check units and very thin or soft segments."
         )
     if parts.max() > 1:
         split = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(nodes[:-1], nodes[1:], parts, strict=True)]
@@ -151,7 +151,7 @@ def _part_nodes(shaft: Sections, wanted: Sequence[float]) -> Floats:
     nodes, places = np.append(ends, _cone_nodes(shaft)), np.sort(wanted)
     off = places[~((places >= -slack) & (places <= ends[-1] + slack))]
     if off.size:
-        raise ValueError(f"position={off[0]} m is off the shaft, which spans 0 to {ends[-1]:g} m")
+        raise ValueError(f"position={off[0]} m is not on the shaft (0 to {ends[-1]:g} m)")
     apart = np.abs(places[:, np.newaxis] - nodes).min(axis=1, initial=np.inf) > slack
     apart[1:] &= np.diff(places) > slack
     return np.sort(np.append(nodes, places[apart]))

@@ -96,7 +96,7 @@ def _assemble_shaft(
 ) -> DynamicStiffness:
     """Assemble the shaft with its joints only, common to spindles that differ in bearings and masses.
 
-    fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft at rest.
+    fastest: for speeds up to that (rad/s), separate rotary terms; None: for a shaft without rotation.
     """
     segments, material, theory, joints = alone
     shaft = sections_of_segments(segments, material)

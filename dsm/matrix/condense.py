@@ -40,7 +40,7 @@ def condense_to_node(
     """Eliminate all nodes but one, from both ends, all frequencies at once.
 
     diagonal, coupling: blocks of K as in DynamicStiffness.blocks. is_link: nodes of force and moment;
-    each is eliminated together with the node before it, which alone may be free to move (a tip at rest). start: a node
+    each is eliminated together with the node before it, which alone may be free to move (a tip). start: a node
     not beyond `node` whose deflection is returned; None: the node itself.
     """
     diagonal, coupling = diagonal.swapaxes(0, 1), coupling.swapaxes(0, 1)
@@ -97,7 +97,7 @@ def _across_link(pivot: Complexes, near: Complexes, force: Complexes, far: Compl
 def damped_blocks(
     model: DynamicStiffness, spindle: Spindle, w: Complexes, damping: Damping, derivative: bool = False
 ) -> tuple[Complexes, Complexes]:
-    """Return the blocks of K(w) with damping, for a shaft at rest at complex w (rad/s), shape (n,).
+    """Return the blocks of K(w) with damping, for a shaft without rotation at complex w (rad/s), shape (n,).
 
     Shaft, bearings, housing and joints have the complex stiffness k (1 + i eta). Each bearing also has its viscous
     damper, i w c parallel to its spring, before the housing, taken from `damping`, not from the spindle.
@@ -132,7 +132,7 @@ def condense_damped(
     start: int | None = None,
     extra: Complexes | None = None,
 ) -> CondensedStiffness:
-    """Condense a shaft at rest dynamically to one node, exact at each frequency (Hz), shape (n,).
+    """Condense a shaft without rotation dynamically to one node, exact at each frequency (Hz), shape (n,).
 
     loss_factor: of all stiffness, see Damping; ValueError below 0. node and start: as for condense_to_node. extra:
     stiffness uu, ut, tt to be added at the last node, shape (3, n).

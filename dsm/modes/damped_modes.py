@@ -45,7 +45,7 @@ class DampedMode(NamedTuple):
 
 
 class DampedShaft(NamedTuple):
-    """Dynamic stiffness of a shaft at rest, at complex w, for any damping."""
+    """Dynamic stiffness of a shaft without rotation, at complex w, for any damping."""
 
     spindle: Spindle
     """Shaft, springs and masses; its dampers are ignored."""
@@ -119,8 +119,8 @@ class DampedShaft(NamedTuple):
                 step /= 2
             else:
                 raise ArithmeticError(
-                    f"mode {number} is lost at a damping ratio of {mode.damping_ratio:.3g}: with more damping it stops "
-                    "oscillating or merges with another mode; give smaller dampers"
+                    f"mode {number} cannot be followed beyond a damping ratio of {mode.damping_ratio:.3g}. "
+                    "Give smaller dampers."
                 )
         return mode
 
@@ -152,7 +152,7 @@ class DampedModes:
 
 
 def damped_modes(spindle: Spindle, count: int, loss_factor: float = 0.0) -> DampedModes:
-    """Compute the lowest modes of the shaft at rest with bearing dampers and a loss factor, exactly.
+    """Compute the lowest modes of the shaft without rotation with bearing dampers and a loss factor, exactly.
 
     A loss factor alone gives each mode zeta = sin(atan(eta)/2), eta/2 if small. Each certified undamped mode is
     followed

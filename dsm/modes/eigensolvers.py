@@ -41,15 +41,15 @@ LINK_SUPPORT_RATIO = 1e6
 
 
 def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, Floats]:
-    """Return w^2 (count,) of the lowest modes at rest and shapes phi (count, 2 n_nodes), phi^T M phi = 1: upper bounds.
+    """Return w^2 (count,) of the lowest modes without rotation and shapes phi (count, 2 n_nodes), phi^T M phi = 1.
 
-    Solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no exception. Raises ArithmeticError
-    if the model has fewer modes.
+    The frequencies are upper bounds. Solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no
+    exception. Raises ArithmeticError if the model has fewer modes.
     """
     basis, springs = _independent_motions(model)
     size = basis.shape[1]
     if size < count:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has {size}")
+        raise ArithmeticError(f"the shaft model has only {size} modes, not {count}")
     mass = -_reduced_term(model, basis, 1 if model.spin is None else 2)
     shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
     shifted = _reduced_term(model, basis, 0) + springs + shift * mass
@@ -61,12 +61,12 @@ def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[Floats, F
 def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: int) -> tuple[Floats, Floats]:
     """Return start values w (count,) of the lowest modes of forward whirl and shapes phi, -phi^T K' phi = 1.
 
-    Combines the modes at rest above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
+    Combines the modes above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
     y = w z it is diag(K0, I) (z, y) = w [[-K1, I], [I, 0]] (z, y), whose left side is positive definite. Raises
     LinAlgError if it is not.
     """
     if np.any(w2 <= 0):
-        raise np.linalg.LinAlgError("a shaft that nothing holds")
+        raise np.linalg.LinAlgError("the shaft has no support")
     gyroscopic = _reduced_term(model, shape.T, 1)
     n, still = w2.size, np.sqrt(w2)
     scaled = np.zeros((2 * n, 2 * n))

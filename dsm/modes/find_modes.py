@@ -30,7 +30,7 @@ MAX_MODES = 100
 """Most modes: the work grows with their third power."""
 
 EXTRA_WHIRL_MODES = 12
-"""Further modes at rest that the start values of whirl are made of."""
+"""Further modes without rotation that the start values of whirl are made of."""
 
 
 def find_modes(
@@ -47,7 +47,7 @@ def find_modes(
     Raises ValueError for a count outside 1 to MAX_MODES, ArithmeticError if rounding spoils the count.
     """
     if not 1 <= count <= MAX_MODES:
-        raise ValueError(f"{count} modes were asked for; 1 to {MAX_MODES} can be: beams say nothing of higher ones")
+        raise ValueError(f"cannot compute {count} modes. Request 1 to {MAX_MODES}, the range of beam theory.")
     shaft = ShaftRequest(spindle, tuple(map(float, places)), tuple(held), spin=spin)
     try:
         return _solve_modes(shaft, count)
@@ -60,8 +60,8 @@ class _RoundingError(ArithmeticError):
 
     def __str__(self) -> str:
         return (
-            "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the "
-            "others, and for bearings, masses or joints far too close to each other or to the end of a segment"
+            "the modes of this shaft cannot be computed because of rounding. Check for segments much shorter, thicker "
+            "or thinner than the others, and for parts nearly at the same position."
         )
 
 

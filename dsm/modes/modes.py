@@ -28,7 +28,7 @@ class StateVectors(NamedTuple):
 
 
 def evaluate_between_nodes(modes: Modes, places: Floats, left: Indices) -> StateVectors:
-    """Evaluate the modes of a shaft at rest inside its elements, exactly.
+    """Evaluate the modes of a shaft without rotation inside its elements, exactly.
 
     places (m), shape (n_places,), and the node left of each. The state (u, t, Q, M)' = T (u1, t1, Q1, M1)
     from the left node of the element must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
@@ -99,8 +99,7 @@ class Modes:
             For a spinning shaft: its modes have no modal mass of 1 kg.
         """
         if self.spin:
-            still = "shapes and stiffness are those of a shaft at rest"
-            raise ValueError(f"the shaft spins at {self.spin:g} rad/s; {still}")
+            raise ValueError(f"the shaft spins at {self.spin:g} rad/s. Shapes and stiffness need a shaft without spin.")
         left = np.clip(np.searchsorted(self.position, places, side="right") - 1, 0, self.position.size - 2)
         slack = SAME_PLACE * self.spindle.length
         from_left, from_right = places - self.position[left], self.position[left + 1] - places

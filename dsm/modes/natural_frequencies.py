@@ -166,9 +166,9 @@ def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -
         return modes
     position = np.asarray(places, dtype=np.float64)
     if position.ndim != 1:
-        raise ValueError(f"places has shape {position.shape}; a 1-D array (m) is needed")
+        raise ValueError(f"places has shape {position.shape}. Give a 1-D array (m).")
     slack = SAME_PLACE * spindle.length
     off = position[~((position >= -slack) & (position <= spindle.length + slack))]
     if off.size:
-        raise ValueError(f"places holds {off[0]} m, which is off the shaft, 0 to {spindle.length:g} m")
+        raise ValueError(f"places has {off[0]} m, not on the shaft (0 to {spindle.length:g} m)")
     return modes.at(np.clip(position, 0.0, spindle.length))

@@ -12,15 +12,15 @@ from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
 MAX_CRITICAL_SPEED_RATIO = 32
-"""Largest searched critical speed over the natural frequency at rest."""
+"""Largest searched critical speed over the natural frequency without rotation."""
 
 
 def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     """Compute the critical speed of a mode: unbalance drives its forward whirl, at 60 f_n of the spinning shaft.
 
-    For a round Euler-Bernoulli shaft without polar inertia it is 60 times the frequency at rest. Otherwise gyroscopic
-    moments raise the forward frequency with speed, more slowly than the speed itself where the two meet: each
-    mode has one critical speed at most.
+    For a round Euler-Bernoulli shaft without polar inertia it is 60 times the frequency without rotation. Otherwise
+    gyroscopic moments raise the forward frequency with speed, more slowly than the speed itself where the two meet:
+    each mode has one critical speed at most.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     ValueError
         For a mode below 1 and for an unsupported shaft.
     ArithmeticError
-        If there is none up to 32 times the frequency at rest.
+        If there is none up to 32 times the frequency without rotation.
 
     Examples
     --------
@@ -64,9 +64,7 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     while lead(high) > 0:
         low, high = high, 2 * high
         if high > MAX_CRITICAL_SPEED_RATIO * at_rest:
-            raise ArithmeticError(
-                f"mode {mode} has no critical speed up to {low * 30 / math.pi:.6g} rpm: its forward whirl stays ahead"
-            )
+            raise ArithmeticError(f"mode {mode} has no critical speed up to {low * 30 / math.pi:.6g} rpm")
     return float(scipy.optimize.brentq(lead, low, high, xtol=1e-12 * at_rest, rtol=1e-13)) * 30 / math.pi
 
 
@@ -97,7 +95,7 @@ class WhirlMap:
 def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     """Compute the lowest forward and backward whirl frequencies over speed, proved complete (Campbell diagram).
 
-    For an Euler-Bernoulli shaft without polar inertia they are the natural frequencies at rest at every speed. Only the
+    For an Euler-Bernoulli shaft without polar inertia they equal the natural frequencies without rotation. Only the
     view from the shaft changes, |f -+ speed/60|: figure 9 of Gaber & Hashemi, Shock and Vibration, 2015.
     Rotary inertia (theory="timoshenko") and polar inertia of masses separate them: forward rises, backward falls. Whirl
     is

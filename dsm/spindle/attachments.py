@@ -58,7 +58,7 @@ class Bearing:
         require_numbers(where, self, {"damping": "N s/m"})
         if self.rolling_elements not in get_args(RollingElements):
             known = ", ".join(get_args(RollingElements))
-            raise ValueError(f"{where}rolling_elements={self.rolling_elements!r} is none of {known}")
+            raise ValueError(f"{where}rolling_elements={self.rolling_elements!r} is not one of {known}")
         require_numbers(where, self, {"rotational_stiffness": "N m/rad"})
         require_numbers(where, self, {"housing_stiffness": "N/m"}, positive=True, infinite=True)
 
@@ -96,8 +96,8 @@ class LumpedMass:
         require_numbers(where, self, {"mass": "kg", "diametral_inertia": "kg m^2", "polar_inertia": "kg m^2"})
         if self.polar_inertia > 2 * self.diametral_inertia * (1 + 1e-9):
             raise ValueError(
-                f"{where}polar_inertia={self.polar_inertia} kg m^2 is larger than twice diametral_inertia="
-                f"{self.diametral_inertia} kg m^2, which no body of revolution has"
+                f"{where}polar_inertia={self.polar_inertia} kg m^2 is more than twice diametral_inertia="
+                f"{self.diametral_inertia} kg m^2, impossible for a body of revolution"
             )
 
 

@@ -45,7 +45,7 @@ class Material:
     >>> Material(youngs_modulus=210e9, density=7850.0, shear_modulus=60e9)
     Traceback (most recent call last):
         ...
-    ValueError: shear_modulus=6e+10 Pa gives Poisson's ratio 0.75 with youngs_modulus=2.1e+11 Pa; it ...
+    ValueError: shear_modulus=6e+10 Pa and youngs_modulus=2.1e+11 Pa give Poisson's ratio 0.75, ...
     """
 
     youngs_modulus: float
@@ -60,8 +60,8 @@ class Material:
         require_numbers("", self, MATERIAL_UNITS, positive=True)
         if not -1 < self.poisson_ratio <= 0.5 * (1 + 1e-9):
             raise ValueError(
-                f"shear_modulus={self.shear_modulus:g} Pa gives Poisson's ratio {self.poisson_ratio:.3g} with "
-                f"youngs_modulus={self.youngs_modulus:g} Pa; it must lie between -1 and 0.5"
+                f"shear_modulus={self.shear_modulus:g} Pa and youngs_modulus={self.youngs_modulus:g} Pa give Poisson's "
+                f"ratio {self.poisson_ratio:.3g}, which is not between -1 and 0.5"
             )
 
     @property
@@ -188,8 +188,7 @@ class Segment:
             _check_bore(where, "end_", bore, outer)
         if self.mass_diameter is not None:
             if self.is_cone:
-                text = "is for uniform segments; this one is a cone"
-                raise ValueError(f"{where}mass_diameter={self.mass_diameter} m {text}")
+                raise ValueError(f"{where}mass_diameter={self.mass_diameter} m is not supported for a cone")
             require_numbers(where, self, {"mass_diameter": "m"}, positive=True)
             _check_bore(where, "", self.bore_diameter, self.mass_diameter, "mass_diameter")
 
@@ -207,4 +206,4 @@ def ring_second_moment(outer_diameter: FloatOrArray, bore_diameter: FloatOrArray
 def _check_bore(where: str, end: str, bore: float, outer: float, outer_name: str = "") -> None:
     if not 0 <= bore < outer:
         name = outer_name or f"{end}outer_diameter"
-        raise ValueError(f"{where}{end}bore_diameter={bore} m is not at least 0 and smaller than {name}={outer} m")
+        raise ValueError(f"{where}{end}bore_diameter={bore} m is not between 0 and {name}={outer} m")

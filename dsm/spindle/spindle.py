@@ -39,7 +39,7 @@ class Spindle:
     >>> Spindle([Segment(0.1, 0.02)], [Bearing(0.15, 2e8)])
     Traceback (most recent call last):
         ...
-    ValueError: bearing 1: position=0.15 m is off the shaft, 0 to 0.1 m
+    ValueError: bearing 1: position=0.15 m is not on the shaft (0 to 0.1 m)
     """
 
     segments: Sequence[Segment]
@@ -64,9 +64,9 @@ class Spindle:
         for name in ("segments", "bearings", "masses", "joints"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.theory not in get_args(Theory):
-            raise ValueError(f"theory={self.theory!r} is none of {', '.join(get_args(Theory))}")
+            raise ValueError(f"theory={self.theory!r} is not one of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
-            raise ValueError(f"{len(self.segments)} segments were given; a spindle has 1 to {MAX_SEGMENTS} of them")
+            raise ValueError(f"{len(self.segments)} segments given. Give 1 to {MAX_SEGMENTS}.")
         require_numbers("", self, {"youngs_modulus": "Pa", "density": "kg/m^3"}, positive=True)
         if self.shear_modulus is not None:
             require_numbers("", self, {"shear_modulus": "Pa"}, positive=True)
@@ -113,11 +113,11 @@ class Spindle:
         for number, part in enumerate(parts, 1):
             where = f"{kind} {number}: "
             if not -slack <= part.position <= length + slack:
-                raise ValueError(f"{where}position={part.position} m is off the shaft, 0 to {length:g} m")
+                raise ValueError(f"{where}position={part.position} m is not on the shaft (0 to {length:g} m)")
             part.check(where)
             for earlier, other in enumerate(parts[: number - 1], 1):
                 if abs(other.position - part.position) <= slack:
-                    same = f"that of {kind} {earlier}; put both into one {kind}"
+                    same = f"the position of {kind} {earlier}. Combine both into one {kind}."
                     raise ValueError(f"{where}position={part.position} m is {same}")
 
     def _check_joints(self) -> None:
@@ -127,11 +127,11 @@ class Spindle:
         for number, joint in enumerate(self.joints, 1):
             where = f"joint {number}: position={joint.position} m is "
             if not slack < joint.position < self.length - slack:
-                raise ValueError(f"{where}an end of the shaft; nothing is joined there")
+                raise ValueError(f"{where}an end of the shaft. Place the joint between two segments.")
             for kind, parts in others:
                 for other, part in enumerate(parts, 1):
                     if abs(part.position - joint.position) <= slack:
-                        raise ValueError(f"{where}that of {kind} {other}; move the {kind} to the side it belongs to")
+                        raise ValueError(f"{where}the position of {kind} {other}. Move the {kind} to its own side.")
 
 
 def require_support(spindle: Spindle) -> None:
@@ -139,8 +139,8 @@ def require_support(spindle: Spindle) -> None:
     tilting = any(bearing.rotational_stiffness > 0 for bearing in spindle.bearings)
     if len(spindle.bearings) + tilting < 2:
         raise ValueError(
-            f"the shaft is held by {len(spindle.bearings)} bearing(s) and can move freely; at least two are needed, "
-            "or one with a rotational stiffness"
+            f"the shaft has {len(spindle.bearings)} bearing(s) and can move freely. Give at least two, or one with a "
+            "rotational stiffness."
         )
 
 
@@ -155,7 +155,7 @@ def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | Non
     """
     slack = SAME_PLACE * spindle.length
     if not 0 <= position < spindle.length - slack:
-        raise ValueError(f"position={position} m leaves no spindle; cut it between 0 and {spindle.length:g} m")
+        raise ValueError(f"position={position} m leaves no spindle. Cut it between 0 and {spindle.length:g} m.")
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
     end = float(ends[nearest_index(ends, position)])
     cut = end if abs(end - position) <= slack else float(position)
@@ -236,6 +236,6 @@ def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
 def check_tool(tool: Spindle, theory: str) -> None:
     """Raise ValueError for a tool that does not fit into a spindle of a beam theory."""
     if tool.bearings:
-        raise ValueError(f"the tool has {len(tool.bearings)} bearing(s); give it without, as a free shaft")
+        raise ValueError(f"the tool has {len(tool.bearings)} bearing(s). Give it without bearings, as a free shaft.")
     if tool.theory != theory:
-        raise ValueError(f"theory={tool.theory!r} of the tool is not that of the spindle, {theory!r}")
+        raise ValueError(f"the tool has theory={tool.theory!r}, the spindle {theory!r}. Use one theory for both.")

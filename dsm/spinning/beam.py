@@ -75,7 +75,7 @@ class SpinningBeam:
         for name in ("segments", "springs", "held"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.segments:
-            raise ValueError("a beam without segments was given; at least one is needed")
+            raise ValueError("the beam has no segments. Give at least one.")
         for number, segment in enumerate(self.segments, 1):
             for name in ("length", "rigidity_xx", "rigidity_yy", "mass_per_length"):
                 require_number(f"segment {number}: {name}", getattr(segment, name), positive=True)
@@ -84,7 +84,7 @@ class SpinningBeam:
         for position, dof in self.held:
             self._check_place("held: ", position)
             if dof not in get_args(SpinningDof):
-                raise ValueError(f"held: dof={dof!r} is none of {', '.join(get_args(SpinningDof))}")
+                raise ValueError(f"held: dof={dof!r} is not one of {', '.join(get_args(SpinningDof))}")
 
     @property
     def length(self) -> float:
@@ -127,11 +127,11 @@ class SpinningBeam:
         self._check_place(where, spring.position)
         for dof, value in self.stiffness(spring):
             axis = "x" if dof == "u" else "y"
-            require_number(f"{where}stiffness_{axis}", value, note="; hold the dof instead")
+            require_number(f"{where}stiffness_{axis}", value, note=". To make it rigid, hold the dof.")
 
     def _check_place(self, where: str, position: float) -> None:
         if not 0 <= position <= self.length * (1 + 1e-9):
-            raise ValueError(f"{where}position={position} m is off the beam, 0 to {self.length:g} m")
+            raise ValueError(f"{where}position={position} m is not on the beam (0 to {self.length:g} m)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +263,7 @@ def spinning_element(
 
     Examples
     --------
-    At rest, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
+    Without rotation, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
 
     >>> element = spinning_element(1e4, 1e4, mass_per_length=15.0, length=0.5, frequency=[0.0], speed_rpm=0.0)
     >>> element.shape

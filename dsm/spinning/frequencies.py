@@ -53,8 +53,8 @@ def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[Floats,
                 break
     if modes is None:
         raise ArithmeticError(
-            f"the modes at speed_rpm={spin * 30 / np.pi:g} cannot be proved: two meet, or rounding spoils them; try a "
-            "speed beside, and look for springs or segment ends far too close together"
+            f"the modes at speed_rpm={spin * 30 / np.pi:g} cannot be verified: two coincide, or rounding is too large. "
+            "Try a slightly different speed, and check for springs or segment ends very close together."
         )
     return modes
 
@@ -69,7 +69,7 @@ def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) 
         if w.size >= count and w[-1] <= top:
             return chain, w, shape
         top = max(2 * top, 1.01 * np.max(w, initial=0.0))
-    raise np.linalg.LinAlgError("no frequency is high enough for all modes wanted")
+    raise np.linalg.LinAlgError(f"no frequency range holds all {count} modes")
 
 
 def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> SpinningChain:
@@ -128,8 +128,8 @@ def _count_planar_below(chain: SpinningChain, spin: float) -> tuple[int, int]:
     below = [int(plane.count(at, spin * (1 - SPINNING_INTERVAL_WIDTH))[0]) for plane in planes]
     if below != [int(plane.count(at, spin * (1 + SPINNING_INTERVAL_WIDTH))[0]) for plane in planes]:
         raise ArithmeticError(
-            f"speed_rpm={spin * 30 / np.pi:.12g} is a critical speed, where a frequency falls to zero and cannot be "
-            "proved; choose a speed below or above"
+            f"speed_rpm={spin * 30 / np.pi:.12g} is a critical speed, with a frequency of zero. "
+            "Choose a lower or higher speed."
         )
     return below[0], below[1]
 
@@ -183,7 +183,7 @@ class UnstableSpinError(ArithmeticError):
     >>> spinning_frequencies(flat, 1, 60 * (f_x + f_y) / 2)
     Traceback (most recent call last):
         ...
-    dsm.spinning.frequencies.UnstableSpinError: at speed_rpm=11749.8 1 mode(s) grow instead of lasting ...
+    dsm.spinning.frequencies.UnstableSpinError: 1 mode(s) are unstable at speed_rpm=11749.8 ...
     """
 
     def __init__(self, message: str, frequency: Floats, unstable: int, proved: int) -> None:
@@ -229,7 +229,7 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Fl
 
     Examples
     --------
-    A round pinned beam, of f_1 = 162.2 Hz at rest, seen from the shaft at 3000 rpm: f_1 -+ 50 Hz.
+    A round pinned beam, of f_1 = 162.2 Hz without rotation, seen from the shaft at 3000 rpm: f_1 -+ 50 Hz.
 
     >>> pins = [(place, dof) for place in (0.0, 0.5) for dof in ("u", "v")]
     >>> beam = SpinningBeam([SpinningSegment(0.5, 1e4, 1e4, 15.0)], held=pins)
@@ -239,18 +239,18 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Fl
     [112.2, 212.2]
     """
     if count < 1:
-        raise ValueError(f"{count} modes were asked for; at least 1 is needed")
+        raise ValueError(f"{count} modes requested. Request at least 1.")
     spin = angular_speed(speed_rpm)
     if not beam.is_supported:
-        raise ValueError("the beam can move without bending in a plane; hold more dofs or give more springs")
+        raise ValueError("the beam can move as a rigid body in one plane. Hold more dofs or add springs.")
     if beam.is_round:
         return _round_beam_frequencies(beam, count, spin) / (2 * np.pi)
     w, proved, unstable = spinning_modes(beam, count, spin)
     frequency = w / (2 * np.pi)
     if unstable:
         raise UnstableSpinError(
-            f"at speed_rpm={speed_rpm:g} {unstable} mode(s) grow instead of lasting ({proved} proved by counting); "
-            "choose a speed below the critical ones, or take the other modes from `frequency` of this error",
+            f"{unstable} mode(s) are unstable at speed_rpm={speed_rpm:g} ({proved} verified by counting). "
+            "Choose a speed below the critical speeds, or use the other modes in `frequency` of this error.",
             frequency,
             unstable,
             proved,

@@ -171,7 +171,7 @@ def converged_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, In
     if np.all(limit_holds):
         return crossings, number
     speed = rows.speed_rpm[np.flatnonzero(~limit_holds)[0]]
-    raise ArithmeticError(f"the limit at {speed:g} rpm has not settled; leave this speed out")
+    raise ArithmeticError(f"the limit at {speed:g} rpm has not converged. Leave this speed out.")
 
 
 def _has_converged(rows: MillingRows, depth: Floats, number: Integers) -> tuple[Flags, Flags]:

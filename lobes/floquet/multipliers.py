@@ -135,8 +135,8 @@ def _arnoldi_multipliers(
     if doubt[row, column] <= tolerance:
         return value
     raise ArithmeticError(
-        f"the multiplier at {rows.speed_rpm[row]:g} rpm and {depth[row, column] * 1e3:g} mm is not found to "
-        f"{tolerance:g} (residual {doubt[row, column]:.1e}); leave this speed or depth out"
+        f"the multiplier at {rows.speed_rpm[row]:g} rpm and {depth[row, column] * 1e3:g} mm has not converged to "
+        f"{tolerance:g} (residual {doubt[row, column]:.1e}). Leave this speed or depth out."
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from acquisition import CROSS_TAP, DataError, Remark
+from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
@@ -64,8 +65,8 @@ class UsableTaps:
         """Raise DataError for an excluded tap test."""
         for tap in self.excluded:
             if tap.id == tap_id:
-                cure = f"{format_command('include', self._folder.path)} {tap_id} takes it back"
-                raise DataError(f"{tap_id}: stored already, but excluded, for {tap.excluded!r}; {cure}")
+                cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use it again."
+                raise DataError(f"{tap_id}: stored already, but excluded ({tap.excluded!r}). {cure}")
 
     def list_until(self, tap_id: str | None) -> list[TapPlace]:
         """Return the tap tests up to one of them since its baseline; None: up to now."""
@@ -121,13 +122,13 @@ class UsableTaps:
         tool_text = "" if tool is None else f" with tool {tool!r}"
         damaged = [str(remark) for remark in self.remarks]
         if damaged:
-            raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} that can be used: {'; '.join(damaged)}")
-        cure = "take one with session.TapSession, or replay a recorded file"
+            raise NotTappedError(join_sentences(f"{self._folder.path}: no usable tap test{tool_text}", *damaged))
+        cure = "Take one with session.TapSession, or replay a recorded file."
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
         if self.excluded:
-            since += f", but {len(self.excluded)} excluded"
-            cure += f"; {format_command('include', self._folder.path)} TAP takes one back"
-        raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}; {cure}")
+            since += f" ({len(self.excluded)} excluded)"
+            cure += f" Run {format_command('include', self._folder.path)} TAP to use an excluded one."
+        raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}. {cure}")
 
     def newest_damaged_remarks(self, tool: str = "") -> tuple[Remark, ...]:
         """Return remarks on damaged tap tests that are newer than all usable ones of their series."""
@@ -137,8 +138,8 @@ class UsableTaps:
         since = self.baseline or EARLIEST_TIME
         lost = [entry for entry in self.lost if entry.created >= since and tool in ("", entry.tool)]
         newer = [entry for entry in lost if entry.created > usable.get((entry.tool, entry.direction), EARLIEST_TIME)]
-        text = "newer than all of its tool and direction that can be used, but its file is damaged"
-        return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
+        text = "newest test of its tool and direction, but its file is damaged"
+        return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "Tap again") for entry in newer)
 
     def add(self, entry: TapEntry) -> bool:
         """Add a newly committed tap test, and tell whether it is the newest and all others are unchanged.
@@ -338,12 +339,12 @@ class TapMeasurements:
             if row.stiffness.is_known and not row.questions and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
         if calibrated and not any(rows[place.number].stiffness.is_known for place in calibrated):
-            text = "no force was measured, K is not known; tap with a hammer that measures its force"
-            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {text}")
+            text = "K is unknown (no force measured). Tap with an instrumented hammer."
+            raise NotTappedError(f"no tap test and no prediction for tool {tool!r}, because {text}")
         try:
             return predict_assembly(self._folder.machine, list(newest.values()), tool)
         except DataError as error:
-            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
+            raise NotTappedError(f"no tap test and no prediction for tool {tool!r}: {error}") from error
 
     def all_rows(
         self, rows: Sequence[HistoryRow], older_rows: Mapping[str, HistoryRow], behind: ReusableRows

@@ -15,8 +15,8 @@ FIRST_RELEASE = datetime(2026, 1, 1, tzinfo=UTC)
 MAX_TIME_AHEAD = timedelta(days=1)
 """Largest time ahead that a time zone explains."""
 CLOCK_QUESTIONS = {
-    "clock-behind": "before the newest test that was there",
-    "clock-before-release": f"before the first release of this program, {FIRST_RELEASE:%Y-%m-%d}",
+    "clock-behind": "before the newest test already stored",
+    "clock-before-release": f"before the first release of lobewatch ({FIRST_RELEASE:%Y-%m-%d})",
     "clock-ahead": "more than a day in the future",
 }
 """Reason of each question about the time of a test, by its code in the journal."""
@@ -30,9 +30,8 @@ def is_in_future(time: datetime, now: datetime) -> bool:
 def clock_question(code: str, time: str) -> Remark:
     """Return the question of a code about the time of a test (ISO 8601); KeyError for an unknown code."""
     when = f"{datetime.fromisoformat(time).astimezone(UTC):%Y-%m-%d %H:%M} UTC"
-    cure = "put the clock of the computer right and tap again; exclude the test with the wrong time"
-    text = f"its time, {when}, is {CLOCK_QUESTIONS[code]}: was the clock of the computer right?"
-    return Remark(code, when, text, cure)
+    text = f"recorded at {when}, {CLOCK_QUESTIONS[code]} (computer clock wrong?)"
+    return Remark(code, when, text, "Set the clock, exclude this test and tap again")
 
 
 def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | str) -> Iterator[Remark]:
@@ -40,5 +39,5 @@ def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | 
     if is_in_future(time, now):
         entry = shlex.join([str(path), tap_id])
         out = f"folder_updates.exclude_entry {entry} exclude_entry.reason 'clock was wrong'"
-        cure = f"Put the clock right; if it was wrong at that test, take it out and tap again: {out}"
-        yield Remark("tap-in-future", f"tap test {tap_id}", f"dated {time:%Y-%m-%d}, in the future", cure)
+        cure = f"Set the clock. If it was wrong at that test, run {out} and tap again."
+        yield Remark("tap-in-future", f"tap test {tap_id}", f"date {time:%Y-%m-%d} is in the future", cure)

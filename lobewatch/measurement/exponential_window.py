@@ -70,14 +70,12 @@ class Window:
             If the time of the hit is unknown or before the start.
         """
         if self.hit_at is None and not hits:
-            problem = "an FRF does not say when the hit came, and K is too high by exp((hit - start)/window)"
-            seconds = "the seconds from the record's start (the pre-trigger), 0 where the window begins at the hit"
-            cure = f"add Window.hit_at with {seconds}"
-            raise ValueError(f"Window.time_constant {self.time_constant:g}: {problem}; {cure}")
+            cure = "Give it in s from the start of the record with Window.hit_at, or 0 if the window begins at the hit."
+            raise ValueError(f"Window.time_constant {self.time_constant:g}: the time of the hit is unknown. {cure}")
         times = [acquisition.find_hit_time(hit) for hit in hits] if self.hit_at is None else [self.hit_at]
         hit_at = float(np.mean(times))
         if not hit_at >= self.start:
-            problem = f"the window begins after the hit at {hit_at:.4g} s; both count from the record's start"
+            problem = f"the window begins after the hit at {hit_at:.4g} s (both from the start of the record)"
             raise ValueError(f"Window.start {self.start:g}: {problem}")
         return hit_at - self.start
 
@@ -88,20 +86,19 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     Raises ValueError if the time constant is unknown or contradicts the file.
     """
     if named is None and given is not None and np.isnan(given.time_constant):
-        cure = "add Window.time_constant with its time constant (s)"
-        raise ValueError(f"Window.hit_at, Window.start: the file names no window; {cure}")
+        cure = "Give its time constant (s) with Window.time_constant."
+        raise ValueError(f"Window.hit_at, Window.start: the file declares no window. {cure}")
     if named is None:
         return given
     window = Window(named) if given is None else given
     if np.isnan(window.time_constant):
         window = replace(window, time_constant=named)
     if np.isnan(window.time_constant):
-        cure = "give the time constant of an exponential one with Window.time_constant"
-        problem = "the response lies under a window, and the file does not say how that falls"
-        raise ValueError(f"{problem}; {cure}, export the file anew where it is another")
+        cure = "Give it with Window.time_constant if the window is exponential, or export without a window."
+        raise ValueError(f"the response has a window of unknown time constant. {cure}")
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
         option = f"Window.time_constant {window.time_constant:g}"
-        raise ValueError(f"{option}: the file says {named:.4g} s; leave the option out")
+        raise ValueError(f"{option}: the file states {named:.4g} s. Leave the option out.")
     return window
 
 
@@ -110,8 +107,8 @@ def missing_window_text(named: float | None, given: Window | None) -> str:
     if (named is None and given is None) or (given is not None and given.hit_at is not None):
         return ""
     is_unknown = given is None and named is not None and np.isnan(named)
-    needed = f"{'Window.time_constant with its time constant and ' if is_unknown else ''}Window.hit_at, too"
-    return f"; its response lies under a window: an FRF needs {needed}, with the s from the record's start"
+    needed = f"{'Window.time_constant (s) and ' if is_unknown else ''}Window.hit_at (s from the start of the record)"
+    return f"The response has a window: give {needed} as well"
 
 
 def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], float]:
@@ -126,8 +123,9 @@ def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], floa
 
 def own_window_remark(about: str, time_constant: float, cure: str) -> Remark:
     """Return the remark on our own window over a mode, or over all hits for an empty subject."""
-    text = f"rings on when the record ends: fitted under an exponential window of {time_constant:.3g} s, corrected"
-    return Remark("windowed-here", about, text if about else f"every hit {text}", cure)
+    text = f"{'vibration' if about else 'every hit'} outlasts the record"
+    text += f" (fitted with an exponential window of {time_constant:.3g} s, corrected)"
+    return Remark("windowed-here", about, text, cure)
 
 
 def remove_own_window(modes: Sequence[Mode], time_constant: float) -> Iterator[Mode]:
@@ -149,8 +147,8 @@ def remove_recorded_window(
     rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
     kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]
     wider = (widen_for_window(mode, time_constant, record) for mode in kept)
-    text = f"decays no faster than the window of {time_constant:.3g} s: no mode behind it, left out"
-    said = text, "a wrong Window.time_constant does that to all modes"
+    text = f"not a mode, because it decays no faster than the window of {time_constant:.3g} s"
+    said = text, "Check Window.time_constant if all modes are affected"
     slow = [mode for mode, is_mode in zip(modes, rings, strict=True) if not is_mode]
     remarks = tuple(Remark("slower-than-window", f"{mode.frequency:.0f} Hz", *said) for mode in slow)
     return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
@@ -172,7 +170,7 @@ def refit_ringing_modes(
         same = _find_same_mode(mode, refitted) if _is_ringing(mode) else None
         best.append(same or mode)
         if same is not None:
-            remarks.append(own_window_remark(f"{same.frequency:.0f} Hz", tau, "a longer record needs none"))
+            remarks.append(own_window_remark(f"{same.frequency:.0f} Hz", tau, "Record longer to avoid the window"))
     return tuple(best), tuple(remarks)
 
 
@@ -192,12 +190,11 @@ def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterato
     """Yield a remark on an undeclared exponential window, detected in the hits or else in equal decay rates."""
     trusted = [mode for mode in modes if assess_trust(mode) is Trust.TRUSTED]
     if hits:
-        tau, sign = acquisition.infer_window(hits), "the noise at the end of the records is lower than before the hits"
+        tau, sign = acquisition.infer_window(hits), "the noise is lower at the end of the records than before the hits"
     else:
-        rate, sign = common_decay_rate(trusted), "all modes decay alike, damping falls as 1/f"
+        rate, sign = common_decay_rate(trusted), "all modes decay at the same rate"
         tau = None if rate is None else 1 / rate
     if tau is not None:
-        lost = "damping is too large, and stiffness by what it had lost by the hit"
-        text = f"{sign}, as under an exponential window of {tau:.2g} s: {lost}"
-        cure = "look it up, and name it with Window.time_constant, or export without"
+        text = f"{sign}, as with an exponential window of {tau:.2g} s: zeta and K read too high"
+        cure = "Give the window with Window.time_constant, or export without a window"
         yield Remark("window-suspected", "", text, cure)

@@ -9,6 +9,7 @@ import numpy as np
 import acquisition
 import modal
 from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
+from acquisition.errors import join_sentences
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -53,12 +54,13 @@ def read_file_frf(
     recording = acquisition.inspect_file(path, description)
     if recording.problems:
         phase = "" if conjugate else _check_phase(path, description)
-        raise DataError(f"{path}: {recording.problems}{missing_window_text(recording.window, window)}{phase}")
+        missing = missing_window_text(recording.window, window)
+        raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
     if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:
-        raise ValueError(f"Description.averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+        raise ValueError(f"Description.averages {averages}: lobewatch counts the hits of {path.name}. Leave it out.")
     frf = _average_hits(path, recording.hits, accepted, description)
     return replace(frf, facts=recording.facts, recorded_window=recording.window)
 
@@ -71,7 +73,7 @@ def _check_phase(path: Path, description: Description) -> str:
         if frf is not None:
             pick_peaks(frf)
     except ValueError as error:
-        return f"; {error}" if isinstance(error, ConjugateError) else ""
+        return f"Also {error}" if isinstance(error, ConjugateError) else ""
     return ""
 
 
@@ -80,7 +82,7 @@ def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, descripti
     good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
-        text = f"{refused} of {len(hits)} hits are averaged though they were refused"
+        text = f"average includes {refused} of {len(hits)} hits that failed the checks"
         frf = acquisition.estimate_frf(good) if good[0].has_force else None
         return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
     if good and not good[0].has_force:
@@ -92,7 +94,7 @@ def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, descripti
         if not ringing or not hits[0].has_force:
             raise
         frf, windowed, tau = window_ringing_hits(ringing)
-        cure = "a longer record needs none; fit_file_modes.accept not-decayed takes the hits as they are"
+        cure = "Record longer, or use the hits without a window with fit_file_modes.accept not-decayed"
         return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),))
 
 
@@ -101,8 +103,7 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            allowed = ", ".join(flags)
-            raise ValueError(f"fit_file_modes.accept {code}: no verdict on hits that can be accepted; give {allowed}")
+            raise ValueError(f"fit_file_modes.accept {code}: not accepted. Choose from {', '.join(flags)}.")
         accepted |= flags[code]
     return accepted
 
@@ -112,17 +113,17 @@ def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
     if averages is not None:
         option = f"Description.averages {averages}"
         if averages < 1:
-            raise ValueError(f"{option}: give the number of hits averaged, 1 or more")
+            raise ValueError(f"{option}: not above 0. Give the number of averaged hits.")
         if frf.coherence is None:
-            raise ValueError(f"{option}: {path.name} has no coherence to use it with; leave it out")
+            raise ValueError(f"{option}: {path.name} has no coherence. Leave it out.")
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = acquisition.infer_averages(frf), "give it with Description.averages"
+    inferred, cure = acquisition.infer_averages(frf), "Give it with Description.averages"
     if inferred is None:
-        text = "the coherence is not used: the number of averages is not known and cannot be inferred"
+        text = "coherence not used, because the number of averages is unknown"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))
-    text = f"about {inferred} averages, inferred from the coherence and the scatter from line to line"
+    text = f"about {inferred} averages, estimated from coherence and line-to-line scatter"
     return FileFrf(replace(frf, n_averages=inferred), remarks=(Remark("averages-inferred", "", text, cure),))
 
 
@@ -221,7 +222,7 @@ def fit_file_modes(
     if file_frf.frf is None:
         if window is not None or conjugate:
             fields = "Window.time_constant, Window.hit_at and fit_file_modes.conjugate"
-            raise ValueError(f"{fields} are of hits with their force; leave them out")
+            raise ValueError(f"{fields} need a measured force. Leave them out.")
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
     frf, hits = file_frf.frf, file_frf.hits
     if conjugate:
@@ -259,7 +260,7 @@ def _fit_decay_modes(
 ) -> FileModes:
     """Fit the modes of hits without force; DataError if a window adds damping to them."""
     if decays.recorded_window is not None:
-        raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
+        raise DataError(f"{path}: the response has a window, which adds damping. Export it without a window.")
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
@@ -270,12 +271,12 @@ def _fit_decay_modes(
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
     yield from check_modes_together(modes)
     for edge in modal.find_truncated_peaks(frf, modes, band):
-        text = "a peak may be cut by the edge of the lines, its mode missing"
-        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
+        text = "a mode may be missing, because a peak is cut off at the edge of the band"
+        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "Widen the band, with a harder tip if necessary")
     if band is None:
         yield from _peaks_beyond_remarks(frf)
     if not modes:
-        yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
+        yield Remark("no-mode", "", "no mode found", "Check the band, and hit hard enough")
 
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
@@ -285,9 +286,9 @@ def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
         return
     where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
     if len(peaks) > MAX_LISTED_PEAKS:
-        where = f"{len(peaks)} places from {peaks[0]:.0f} to {peaks[-1]:.0f}"
-    text = f"peaks at {where} Hz lie beyond the usable band, which ends at {frf.usable_band[1]:.0f} Hz: not fitted"
-    yield Remark("peaks-beyond", "", text, "a harder tip reaches higher")
+        where = f"{len(peaks)} frequencies from {peaks[0]:.0f} to {peaks[-1]:.0f}"
+    text = f"peaks at {where} Hz not fitted, because they are above the usable band ({frf.usable_band[1]:.0f} Hz)"
+    yield Remark("peaks-beyond", "", text, "Use a harder tip")
 
 
 def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
@@ -305,13 +306,13 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     """
     remarks = []
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
-        text = "every K is negative: hammer or sensor is mounted or wired the other way round"
-        remarks.append(Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign"))
+        text = "K is negative for all modes, because hammer or sensor is mounted or wired in reverse"
+        remarks.append(Remark("sign-swapped", "", text, "Reverse it, or change the sign of its sensitivity"))
     delay = modal.common_delay(modes)
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
-        text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
-        cure = "measure it with sensor_checks.check_skew, or add that to skew_us of the accelerometer in machine.toml"
+        text = f"phase grows with frequency for all modes: response sampled {late} us late"
+        cure = "Measure the delay with sensor_checks.check_skew, or add it to the accelerometer's skew_us"
         remarks.append(Remark("channel-delay", "", text, cure))
     return remarks
 
@@ -366,7 +367,7 @@ def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], other
     numbers = [modes.extraction.frf.receptance for modes in (file_modes, *others)]
     for place, (text, new) in enumerate(zip(beside, numbers[1:], strict=True), 1):
         if any(np.array_equal(new, earlier) for earlier in numbers[:place]):
-            problem = "the same numbers are looked at already; name another measurement"
+            problem = "same data as another measurement. Name a different one."
             raise ValueError(f"list_comparison_files.beside {text}: {problem}")
     found = [other.fitted for other in others]
     as_recorded, fitted = (modal.match_modes(modes, found) for modes in (file_modes.as_recorded, file_modes.fitted))

@@ -40,16 +40,13 @@ class RecordingQuestion:
 FREQUENCY_JUMP = RecordingQuestion(
     "frequency-jump",
     0.15,
-    "frequency {now:.1f} Hz is {percent:+.0f} % off the newest test of the series ({last:.1f} Hz): is this the "
-    "machine, the tool and the direction it is said to be?",
+    "frequency {now:.1f} Hz is {percent:+.0f} % off the newest test ({last:.1f} Hz): wrong machine, tool or direction?",
 )
 """Limit: relative change of the frequency since the newest test of the series, either way; chosen."""
-NO_MODE_IN_BAND = RecordingQuestion(
-    "no-mode-in-band", sentence="no mode to follow: none with positive stiffness{place}; {peaks}"
-)
+NO_MODE_IN_BAND = RecordingQuestion("no-mode-in-band", sentence="no mode with positive stiffness{place} ({peaks})")
 """Asked if no mode can be followed."""
 OTHER_BAND = RecordingQuestion(
-    "other-band", 0.9, "its usable lines, {low:.0f}..{high:.0f} Hz, do not cover [mode] band_hz {first:g}..{last:g} Hz"
+    "other-band", 0.9, "usable band {low:.0f}..{high:.0f} Hz does not cover [mode] band_hz {first:g}..{last:g} Hz"
 )
 """Limit: share of [mode] band_hz that a recording has to cover; chosen."""
 NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
@@ -57,8 +54,8 @@ NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
 STIFFNESS_JUMP = RecordingQuestion(
     "stiffness-jump",
     1.5,
-    "stiffness {now} N/um is {ratio:.2g} times that of the newest test of the series ({last} N/um), the frequency "
-    "moved by {percent:g} %: has a gain, a range or a sensitivity changed, or the place that is tapped?",
+    "K {now} N/um is {ratio:.2g} times that of the newest test ({last} N/um), but the frequency changed only "
+    "{percent:g} %: gain, range, sensitivity or hit point changed?",
 )
 """Limit: ratio of K, and of K / f_n^2, to the newest test of the series, or the inverse; chosen.
 
@@ -67,8 +64,7 @@ mostly switched by 2 and more."""
 STIFFNESS_OFF_MODEL = RecordingQuestion(
     "stiffness-off-model",
     4.0,
-    "stiffness {now} N/um is {ratio:.2g} times that of the model, {model} N/um: is this the machine of [spindle], are "
-    "the sensitivities of hammer and accelerometer right?",
+    "K {now} N/um is {ratio:.2g} times that of the model ({model} N/um): wrong machine, [spindle] or sensitivity?",
 )
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
@@ -116,7 +112,7 @@ def no_mode_remark(modes: Sequence[Mode], machine: Machine) -> Remark:
     """Return the question about a recording without a mode to follow; modes: all that were found."""
     low, high = machine.mode.band_hz or (0.0, np.inf)
     place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
-    peaks = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
+    peaks = f"found: {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "no modes found"
     return NO_MODE_IN_BAND.ask(place=place, peaks=peaks)
 
 
@@ -135,7 +131,7 @@ def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...
     """Return the remarks on a test and its time, with accepted questions replaced by remarks on the answers."""
     remarks = (*remarks, *(clock.clock_question(code, tap.time) for code in tap.asked))
     texts = {remark.code: str(remark) for remark in remarks}
-    answers = [Remark(ACCEPTED_CODE, code, texts.get(code, "asked no longer")) for code in tap.accepted]
+    answers = [Remark(ACCEPTED_CODE, code, texts.get(code, "no longer asked")) for code in tap.accepted]
     return (*(remark for remark in remarks if remark.code not in tap.accepted), *answers)
 
 
@@ -153,7 +149,7 @@ def check_question_codes(codes: Iterable[str]) -> list[str]:
     """Return each code once; ValueError for an unknown one."""
     distinct = list(dict.fromkeys(codes))
     for code in [code for code in distinct if code not in RECORDING_QUESTIONS]:
-        raise ValueError(f"accept_questions.codes {code}: no such question; there are {', '.join(RECORDING_QUESTIONS)}")
+        raise ValueError(f"accept_questions.codes {code}: unknown. Choose from {', '.join(RECORDING_QUESTIONS)}.")
     return distinct
 
 
@@ -179,9 +175,9 @@ def accept_questions(
 
 def format_not_asked(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[str, Sequence[str]]) -> str:
     """Return the sentence on codes that tap tests do not ask, with their open questions."""
-    still_open = "; ".join(f"{tap_id}: {', '.join(open_codes)}" for tap_id, open_codes in asked.items())
-    text = f"accept_questions.codes {' '.join(codes)}: not asked of {', '.join(tap_ids)}, which is stored"
-    return f"{text}; open questions: {still_open or 'none'}"
+    still_open = ", ".join(f"{tap_id}: {' '.join(open_codes)}" for tap_id, open_codes in asked.items())
+    text = f"accept_questions.codes {' '.join(codes)}: not an open question of {', '.join(tap_ids)} (stored)"
+    return f"{text}. Open questions: {still_open or 'none'}."
 
 
 def question_remarks(
@@ -197,16 +193,14 @@ def question_remarks(
             same.setdefault(replace(question, about=""), []).append(tap_id)
     counts = Counter(question.code for questions in asked.values() for question in questions)
     for question, tap_ids in same.items():
-        files, test = [taps / f"{tap_id}.h5" for tap_id in tap_ids], "this test is"
-        about, rest = f"tap test {tap_ids[0]}", "it sets no reference until you say that it is"
+        files, about = [taps / f"{tap_id}.h5" for tap_id in tap_ids], f"tap test {tap_ids[0]}"
         if len(tap_ids) > 1:
-            files, test = [taps] if len(tap_ids) == counts[question.code] else files, "these tests are"
+            files = [taps] if len(tap_ids) == counts[question.code] else files
             about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
-            rest = "they set no reference until you say that they are"
         answer = shlex.join(["lobewatch", "replay", str(path), *map(str, files)])
         answer += f" accept_questions.codes {question.code}"
-        cure = f"Tap again; if {test} right, say so: {answer}"
-        yield Remark(question.code, about, f"{question.text}; {rest} right: {answer}", cure)
+        cure = f"Tap again, or run {answer} to confirm"
+        yield Remark(question.code, about, f"{question.text} ({answer} confirms it)", cure)
 
 
 def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

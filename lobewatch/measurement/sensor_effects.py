@@ -43,17 +43,17 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
     bare = remove_sensor_mass(frf, sensor.mass)
     state, modes, remarks = fit(bare)
     if not _is_driving_point(modes):
-        remark = _mass_not_removed_remark(sensor, "not the driving point, a K is negative")
+        remark = _mass_not_removed_remark(sensor, "not the driving point (a K is negative)")
         state, modes, remarks = fit(frf)
         return FrfFit(state, modes, (*remarks, remark))
     modes = tuple(modal.with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
-    remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} are taken off")
+    remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} removed from the FRF")
     return FrfFit(state, modes, (*remarks, remark, *_mounting_remarks(modes, bare, sensor)))
 
 
 def _mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:
     """Return the remark that the sensor mass stays in the FRF."""
-    return Remark("sensor-mass-stays", "", f"{_format_sensor_mass(sensor)} are not taken off: {why}")
+    return Remark("sensor-mass-stays", "", f"{_format_sensor_mass(sensor)} not removed: {why}")
 
 
 def _format_sensor_mass(sensor: SensorLoading) -> str:
@@ -79,9 +79,9 @@ def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
         fall = 1 - (1 - 2 * loading.frequency) ** -0.5  # also where the modal mass is far below 10 g
         stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < MAX_FIRST_ORDER_DROP else ""
         changes = f"the frequency by {-100 * fall:.2g} %{stiffness}"
-        text = f"an accelerometer of {1e3 * TYPICAL_SENSOR_MASS:g} g would change {changes}, more than its interval"
-        cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or fit_file_modes.sensor for a file"
-        yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", f"{text}: its mass is not known", cure)
+        text = f"sensor mass unknown: {1e3 * TYPICAL_SENSOR_MASS:g} g would change {changes}, beyond the interval"
+        cure = "Enter [tap] sensor_mass_g (0 without a sensor on the structure), or fit_file_modes.sensor for a file"
+        yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", text, cure)
 
 
 def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) -> Iterator[Remark]:
@@ -94,10 +94,10 @@ def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) ->
     worst = [pair for pair, limit in zip(biased, limits, strict=True) if pair[1] > limit]
     if worst:
         mode, bias = max(worst, key=lambda pair: pair[1])
-        text = f"resonates at about {resonance / 1e3:g} kHz: K reads about {100 * min(bias, 1.0):.0f} % low"
-        held = f"held by {sensor.mounting}" if sensor.mounting else "that is held by a magnet, which nobody says,"
-        cure = "use a stud, glue or wax" if sensor.mounting else "enter [tap] mounting: stud, glue and wax are fine"
-        yield Remark("mounting-resonance", f"{mode.frequency:.0f} Hz", f"an accelerometer {held} {text}", cure)
+        text = f"resonance at about {resonance / 1e3:g} kHz makes K read about {100 * min(bias, 1.0):.0f} % low"
+        held = f"held by {sensor.mounting}" if sensor.mounting else "with unknown mounting (magnet assumed)"
+        cure = "Use a stud, glue or wax" if sensor.mounting else "Enter [tap] mounting (stud, glue and wax are fine)"
+        yield Remark("mounting-resonance", f"{mode.frequency:.0f} Hz", f"accelerometer {held}: {text}", cure)
 
 
 NO_FORCE_CODE = "force-not-measured"
@@ -119,6 +119,6 @@ def extract_decay_modes(hits: Sequence[Hit], band: tuple[float, float] | None = 
 
 def decay_remarks(sensor: SensorLoading) -> list[Remark]:
     """Return the remarks on what free decays cannot tell."""
-    text = "no force was measured: frequency and damping are known, stiffness is not; no stability lobes, no depths"
-    remark = Remark(NO_FORCE_CODE, "", text, "tap with a hammer that measures its force")
-    return [remark, *([_mass_not_removed_remark(sensor, "what they do needs K")] if sensor.mass else [])]
+    text = "no force measured: only frequency and damping, no stiffness and no stability lobes"
+    remark = Remark(NO_FORCE_CODE, "", text, "Tap with an instrumented hammer")
+    return [remark, *([_mass_not_removed_remark(sensor, "the correction needs K")] if sensor.mass else [])]

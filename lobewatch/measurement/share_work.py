@@ -52,8 +52,8 @@ def scheduler_remarks(address: str) -> list[Remark]:
     scheme, host = _parse_scheduler_address(address)
     if scheme in ENCRYPTED_SCHEMES or _is_local_host(host):
         return []
-    text = "unencrypted, and whoever can reach it can run programs on all its computers and on this one"
-    return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "use tls:// (docs/several-computers.md)")]
+    text = "not encrypted: anyone with access can run programs on all its computers and on this one"
+    return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "Use tls:// (docs/several-computers.md)")]
 
 
 def _parse_scheduler_address(address: str) -> tuple[str, str]:
@@ -63,11 +63,11 @@ def _parse_scheduler_address(address: str) -> tuple[str, str]:
 
         return parse_address(address)[0], get_address_host_port(address)[0]
     except ImportError as error:
-        cure = 'install it: pip install "lobewatch[fleet]"'
-        raise DataError(f"Workers.scheduler {address}: needs Dask; {cure}") from error
+        cure = 'Install it with pip install "lobewatch[fleet]".'
+        raise DataError(f"Workers.scheduler {address}: Dask is missing. {cure}") from error
     except ValueError as error:
-        allowed = "give tls://HOST:PORT, or tcp://HOST:PORT"
-        raise DataError(f"Workers.scheduler {address}: is no address of a scheduler ({error}); {allowed}") from error
+        allowed = "Give tls://HOST:PORT or tcp://HOST:PORT."
+        raise DataError(f"Workers.scheduler {address}: invalid address ({error}). {allowed}") from error
 
 
 def _is_local_host(host: str) -> bool:
@@ -102,8 +102,8 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
             thread.submit(asyncio.run, _probe_scheduler(address)).result()
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as error:
-        cure = "start one with: dask scheduler (tls:// and certificates: docs/several-computers.md)"
-        raise DataError(f"{option}: no Dask scheduler answers there ({error}); {cure}") from error
+        cure = 'Start one with "dask scheduler" (for tls:// see docs/several-computers.md).'
+        raise DataError(f"{option}: no Dask scheduler answers ({error}). {cure}") from error
     with client:
         _wait_for_workers(client, address)
         try:
@@ -111,13 +111,13 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
                 count = len(client.nthreads())
                 yield WorkerPool(executor, count, lambda future: _wait_for_result(client, address, future))
         except KilledWorker as error:
-            raise DataError(f"{option}: a task has ended several workers ({error})") from error
+            raise DataError(f"{option}: a task crashed several workers ({error})") from error
         except ModuleNotFoundError as error:
-            raise DataError(f"{option}: {error} on a worker; install lobewatch there, too") from error
+            raise DataError(f"{option}: {error} on a worker. Install lobewatch there as well.") from error
         except (CancelledError, OSError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise
-            raise DataError(f"{option}: the scheduler was lost; nothing is stored") from error
+            raise DataError(f"{option}: connection to the scheduler lost. Nothing was stored.") from error
 
 
 def _wait_for_workers(client: Any, address: str) -> None:
@@ -127,7 +127,7 @@ def _wait_for_workers(client: Any, address: str) -> None:
         if client.status != "running":
             raise CancelledError
         if time.monotonic() - begin > WORKER_TIMEOUT:
-            raise DataError(f"Workers.scheduler {address}: it has no workers; start some with: dask worker {address}")
+            raise DataError(f'Workers.scheduler {address}: no workers. Start some with "dask worker {address}".')
         time.sleep(WORKER_START_POLL_INTERVAL)
 
 
@@ -159,7 +159,7 @@ class Workers:
 
     def __post_init__(self) -> None:
         if self.jobs > 1 and self.scheduler:
-            raise ValueError(f"Workers.jobs {self.jobs} and Workers.scheduler {self.scheduler}: give one of them")
+            raise ValueError(f"Workers.jobs {self.jobs} and Workers.scheduler {self.scheduler} exclude each other")
 
     @property
     def use_other_processes(self) -> bool:
@@ -206,7 +206,7 @@ def share_work(
             yield take()
     if refused:
         kinds = ", ".join(dict.fromkeys(refused))
-        _log.warning("answers of workers that were no results (%s): %d, worked out here instead", kinds, len(refused))
+        _log.warning("invalid answers of workers (%s): %d, computed here instead", kinds, len(refused))
 
 
 @contextmanager
@@ -216,8 +216,8 @@ def _start_processes(count: int) -> Iterator[WorkerPool]:
         with ProcessPoolExecutor(count, get_context("spawn")) as executor:
             yield WorkerPool(executor, count, lambda future: future.result())
     except BrokenProcessPool as error:
-        text = f"one of the {count} processes was ended from outside; nothing is stored"
-        raise DataError(f"{text}; try again with fewer Workers.jobs") from error
+        text = f"one of the {count} processes was killed and nothing was stored"
+        raise DataError(f"{text}. Try again with fewer Workers.jobs.") from error
 
 
 _task_lock = threading.Lock()
@@ -240,7 +240,7 @@ def _collect_answer(team: WorkerPool, future: Future[Any]) -> object:
     if not (isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[0], SoftwareVersions)):
         return TypeError()
     if answer[0] != CURRENT_SOFTWARE:
-        raise DataError(f"a worker has {answer[0].text}, here is {CURRENT_SOFTWARE.text}; install the same on all")
+        raise DataError(f"a worker has {answer[0].text}, not {CURRENT_SOFTWARE.text}. Install the same on all.")
     return answer[1]
 
 

@@ -113,7 +113,7 @@ def compute_model_frf(state: ModelState) -> Frf:
     """
     machine, table = state.machine, state.machine.spindle
     if table is None:
-        raise DataError("no model: add a [spindle] table")
+        raise DataError("no spindle model. Add a [spindle] table.")
     first = float(dsm.natural_frequencies(state.spindle, 1)[0])
     frequency = np.linspace(MODEL_FRF_BAND[0] * first, MODEL_FRF_BAND[1] * first, 2 * MODEL_FRF_POINTS)
     followed = state.measurement.followed if state.measurement else None

@@ -124,7 +124,7 @@ def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tup
     try:
         return modal.edit_modes(state, by_hand) if by_hand else state, mode_edits_remarks(by_hand)
     except ValueError as error:
-        cure = "say it anew with folder_updates.store_mode_edits, or NO_MODE_EDITS to take it back"
+        cure = "Change the edits with folder_updates.store_mode_edits, or undo them with NO_MODE_EDITS"
         return state, (Remark(EDITS_NOT_APPLIED_CODE, str(by_hand), str(error), cure),)
 
 
@@ -159,8 +159,8 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
     followed = modal.predominant_mode(trusted.modes) if last is None else modal.follow_mode(last, trusted.modes).mode
     remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
     if machine.tap.position_mm:
-        text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
-        remarks.append(Remark("cross-beside-tip", "", text, "tap across at the tip"))
+        text = "cross tap not used, because it was not at the tool tip ([tap] position_mm)"
+        remarks.append(Remark("cross-beside-tip", "", text, "Repeat it at the tip"))
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
     results = {"followed": followed, "cross": at_tip, "remarks": (*remarks, *trusted.remarks)}
@@ -187,7 +187,7 @@ def _follow_mode(
         remarks.append(jump)
         return now
     remarks += [] if next_mode.mode is None else filter(None, [questions.check_stiffness_jump(last, next_mode.mode)])
-    cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if next_mode.mode is None else ""
+    cure = "For a rebuilt spindle, set [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode
 
@@ -202,7 +202,7 @@ def _calibrate(
         spindle = machine.model(tool)
         calibration = calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
     except (ValueError, ArithmeticError) as error:
-        remarks.append(Remark("no-bearing-stiffness", "", f"no bearing stiffness: {error}"))
+        remarks.append(Remark("no-bearing-stiffness", "", f"bearing stiffness unknown: {error}"))
         return None
     doubt = _check_calibration(calibration, followed, last)
     remarks += [] if doubt is None else [doubt]
@@ -219,15 +219,15 @@ def _check_calibration(calibration: Calibration, followed: Mode, last: Mode | No
     ratio = followed.stiffness / before if followed.has_stiffness and not math.isnan(before) else 1.0
     if not low <= calibration.bearing_stiffness <= high:
         stiffness = format_rounded(calibration.bearing_stiffness, scale=1e6, digits=3)
-        text = f"bearing stiffness {stiffness} N/um is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
-        cure = "compare [spindle] with the drawing, and [mode] model_mode with the mode that is tapped"
+        text = f"{stiffness} N/um is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
+        cure = "Compare [spindle] with the drawing, and [mode] model_mode with the tapped mode"
     elif not 1 / MAX_STIFFNESS_CHANGE_RATIO <= ratio <= MAX_STIFFNESS_CHANGE_RATIO:
         then, now = (format_rounded(stiffness, scale=1e6, digits=3) for stiffness in (before, followed.stiffness))
-        text = f"stiffness was {then} N/um in the test before, is {now} now, {ratio:.2g} times as much"
-        cure = "tap again; compare the sensitivities of hammer and accelerometer, and where it was tapped"
+        text = f"K changed from {then} to {now} N/um since the test before ({ratio:.2g} times)"
+        cure = "Tap again, and check hit point and sensitivities of hammer and accelerometer"
     else:
         return None
-    return Remark("calibration-not-believed", "", f"bearing stiffness unknown: {text}", cure)
+    return Remark("calibration-not-believed", "", f"bearing stiffness implausible: {text}", cure)
 
 
 def _transfer_to_tip(
@@ -238,15 +238,15 @@ def _transfer_to_tip(
         return []
     if trusted.opposed:
         where = ", ".join(f"{mode.frequency:.0f}" for mode in trusted.opposed)
-        text = f"no stability lobes: not a driving point, the stiffness of the modes at {where} Hz is negative"
-        cure = "hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
+        text = f"no stability lobes, because K is negative at {where} Hz (not a driving point)"
+        cure = "Hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
         remarks.append(Remark("no-lobes-driving-point", "", text, cure))
         return []
     if machine.tap.position_mm == 0:
         return list(trusted.modes)
     if model is None or followed is None:
-        text = "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and no model is calibrated"
-        remarks.append(Remark("no-lobes-beside-tip", "", text, "tap at the tip, or add a [spindle]"))
+        text = "no stability lobes without a calibrated model, because [tap] position_mm is not at the tool tip"
+        remarks.append(Remark("no-lobes-beside-tip", "", text, "Tap at the tip, or add a [spindle] table"))
         return []
     at_tap = modal_stiffness(model.spindle, model.mode, machine.tap.position_mm / 1e3)
     return [followed.scaled(1.0, modal_stiffness(model.spindle, model.mode) / at_tap, "model to tip")]

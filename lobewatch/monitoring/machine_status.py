@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import CROSS_TAP, Remark
+from acquisition.errors import join_sentences
 from lobewatch.history.history import History, HistoryRow
 from lobewatch.machine import LimitsTable, Machine
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
@@ -28,7 +29,7 @@ OTHER_VALUES = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
 """Labels of the values monitored besides the frequency; bearing stiffness follows from the frequency."""
 MIN_REPORTED_CHANGE = 0.1
 """Smallest reported change of these values (%), above that of computed data and too small for any verdict."""
-RUN_IN_TEXT = "; it fell among its first tests and has slowed since: settling (run-in)?"
+RUN_IN_TEXT = " (dropped early, slower since: may be run-in)"
 """Text for a drop as by bearings that run in; it triggers an alarm like any other."""
 
 
@@ -66,11 +67,11 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
 
 
 def _describe_change(change: SeriesChange) -> dict[str, str]:
-    """Describe course and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
-    past, present = ("fell", "falling") if change.size > 0 else ("rose", "rising")
+    """Describe trend and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
+    past, present = ("dropped", "dropping") if change.size > 0 else ("rose", "rising")
     ratio = math.exp(-change.size / 100)
     size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} %"
-    course = f"{past} at once before" if change.kind == "step" else f"has been {present} since"
+    course = f"{past} suddenly before" if change.kind == "step" else f"has been {present} since"
     return {"course": course, "change": size}
 
 
@@ -117,7 +118,7 @@ class MachineStatus:
     reasons: tuple[Remark, ...]
     """Remarks in order of severity, without acknowledgements."""
     next_step: str
-    """Next step, one sentence."""
+    """Next step."""
     remarks: tuple[Remark, ...]
     """Remarks in order of severity, with acknowledgements in their text."""
     alarms: tuple[Alarm, ...] = ()
@@ -173,7 +174,8 @@ def assess_status(
     """
     rows = history.current
     if not rows and files:
-        return _build_status(now, [rules.unreadable_remark("; ".join(map(str, files)))], rules.UNREADABLE_NEXT_STEP)
+        reason = join_sentences(*map(str, files))
+        return _build_status(now, [rules.unreadable_remark(reason)], rules.UNREADABLE_NEXT_STEP)
     if not rows:
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
         return _build_status(now, [rules.NEVER_TAPPED.remark("", since=since)])
@@ -198,7 +200,7 @@ def assess_status(
 def _build_status(
     now: datetime, remarks: Sequence[Remark], default_step: str = "", alarms: Sequence[Alarm] = ()
 ) -> MachineStatus:
-    """Build the status from its remarks; default_step: next step where no remark has one."""
+    """Build the status from its remarks; default_step: next step if no remark has one."""
     ordered, alarms = rules.sort_by_severity(remarks), rules.sort_by_severity(alarms)
     acknowledged = add_acknowledgements(ordered, alarms, now)
     return MachineStatus(now, ordered, rules.find_next_step(ordered, default_step), acknowledged, alarms)
@@ -233,7 +235,7 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
     for name, ruling in (rows[-1].verdicts or {}).items():
         tap, stability = to_tap.get(tools[name], ""), ruling.stability.value
         if ruling.stability is Stability.NOT_STABLE:
-            cure = tap and f"Do not run these programs. {tap}"
+            cure = tap and f"Do not run this program. {tap}."
             yield rules.PROGRAM_NOT_STABLE.remark(name, cure, stability=stability)
         elif ruling.stability is Stability.UNKNOWN:
             yield rules.PROGRAM_UNKNOWN.remark(name, stability=stability)

@@ -80,15 +80,15 @@ def add_acknowledgements(remarks: Iterable[Remark], alarms: Sequence[Alarm], now
 def select_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:
     """Select the alarm of this identity or part of one, or all that are not acknowledged."""
     if not alarms:
-        raise ValueError("nothing rings on this machine: there is nothing to acknowledge")
+        raise ValueError("no open alarm to acknowledge")
     exact = [alarm for alarm in alarms if alarm.id == name]
     fitting = exact or [alarm for alarm in alarms if (name in alarm.id if name else not alarm.is_acknowledged(now))]
     names = ", ".join(alarm.id for alarm in alarms)
     if not fitting and not name:
-        raise ValueError(f"all is acknowledged already; name the alarm to say something else of it: {names}")
+        raise ValueError(f"all alarms are acknowledged already. Name the alarm to change: {names}.")
     if not fitting or (name and len(fitting) > 1):
-        what = f"part of {len(fitting)} alarms" if fitting else "no such alarm"
-        raise ValueError(f"{name!r}: {what}; open are {names}")
+        what = f"matches {len(fitting)} alarms" if fitting else "is not an open alarm"
+        raise ValueError(f"{name!r} {what}. Choose one of: {names}.")
     return fitting
 
 
@@ -120,80 +120,82 @@ class StatusRule(NamedTuple):
     status: StatusLevel
     """Status of a machine with this remark."""
     text: str = ""
-    """Sentence of the remark; empty where another package writes it."""
+    """Sentence of the remark; empty if another package writes it."""
     remedy: str = ""
     """Next step."""
     is_limit: bool = False
     """True if a limit of machine.toml or a program is exceeded: then an alarm is not early."""
 
     def remark(self, about: str, remedy: str = "", **values: object) -> Remark:
-        """Build the remark on a series, a program or a file, with another remedy where one is given."""
+        """Build the remark on a series, a program or a file, with another remedy if given."""
         return Remark(self.code, about, self.text.format(**values), (remedy or self.remedy).format(**values))
 
 
 FREQUENCY_ALARM = StatusRule(
     "frequency-alarm",
     ALARM,
-    "frequency fallen by {drop:.1f} % since the first tests (alarm at {limit:g} %)",
-    "Before the next part have the bearings, the tool and its clamping looked at, then tap again.",
+    "frequency dropped {drop:.1f} % since the first tests (alarm at {limit:g} %)",
+    "Stop. Inspect bearings, tool and clamping, then repeat the tap test.",
     is_limit=True,
 )
 FREQUENCY_DECAY = StatusRule(
     "decay",
     ALARM,
     "frequency {course} {since:%Y-%m-%d}, by {change}{run_in}",
-    "Have the bearings, the tool and its clamping looked at; after a repair: {event}. "
-    "Known already: operator_entries.acknowledge_alarms {folder}",
+    "Inspect bearings, tool and clamping. Then run {event} after a repair, "
+    "or operator_entries.acknowledge_alarms {folder} if the cause is known.",
 )
 PROGRAM_NOT_STABLE = StatusRule(
     "program-not-stable",
     ALARM,
     "{stability}",
-    "Change these programs before the next part: Logbook.verdicts names a safe speed and depth.",
+    "Change speed or depth before the next part. Logbook.verdicts suggests safe values.",
     is_limit=True,
 )
 UNREADABLE = StatusRule("unreadable", UNKNOWN, "{reason}")
 NEVER_TAPPED = StatusRule(
-    "never-tapped", UNKNOWN, "no tap test {since}", "Take the first tap test: all others are compared with it."
+    "never-tapped", UNKNOWN, "no tap test {since}", "Take the first tap test, the reference for all others"
 )
 FREQUENCY_WARNING = StatusRule(
     "frequency-warn",
     WARN,
-    "frequency fallen by {drop:.1f} % since the first tests (warning at {limit:g} %)",
-    "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon.",
+    "frequency dropped {drop:.1f} % since the first tests (warning at {limit:g} %)",
+    "Repeat the tap test. If it confirms the drop, inspect bearings and clamping soon.",
     is_limit=True,
 )
 DOUBTFUL_DECAY = StatusRule(
     "decay-doubtful",
     WARN,
-    "the newest test is lower than those before it",
-    "Clamp the tool anew and tap again: TapSession.run {folder} Conditions.reclamped shows whether it fell.",
+    "frequency of the newest test is lower than before",
+    "Reclamp the tool, then run TapSession.run {folder} Conditions.reclamped to check the drop",
 )
 MODE_LOST = StatusRule(
     "mode-lost",
     WARN,
-    "the newest test does not show the mode followed",
-    "Tap again: the mode that is followed was not found in the newest test.",
+    "followed mode not found in the newest test",
+    "Repeat the tap test",
 )
-OVERDUE = StatusRule("overdue", WARN, "the next tap test is overdue by {days}", "Take the tap test that is due.")
-PROGRAM_UNKNOWN = StatusRule("program-unknown", WARN, "{stability}", "See why with Logbook.verdicts.")
+OVERDUE = StatusRule("overdue", WARN, "tap test overdue by {days}", "Take the tap test")
+PROGRAM_UNKNOWN = StatusRule("program-unknown", WARN, "{stability}", "Run Logbook.verdicts for the reason")
 PROGRAM_DOUBTFUL = StatusRule(
     "program-doubtful",
     WARN,
     "{stability}",
-    "See with Logbook.verdicts what would settle it, and where to go until then.",
+    "Run Logbook.verdicts for the cause, and for safe values until then",
 )
-FREQUENCY_ROSE = StatusRule("frequency-rose", GOOD, "frequency rose by {change}: assembly changed?", "If so: {event}")
+FREQUENCY_ROSE = StatusRule(
+    "frequency-rose", GOOD, "frequency rose by {change} (assembly changed?)", "Run {event} if the assembly was changed"
+)
 VALUE_CHANGED = StatusRule(
     "value-changed",
     GOOD,
-    "{value} {course} {since:%Y-%m-%d}, by {change}; programs are judged with it, the light does not watch it",
+    "{value} {course} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
 )
 ONE_DIRECTION = StatusRule(
     "one-direction",
     GOOD,
-    "tapped in direction {direction} alone",
-    "Tap direction {missing} of the same tool too: no program is sure with one direction alone.",
+    "tapped in direction {direction} only",
+    "Tap direction {missing} of this tool as well, because verdicts need both directions",
 )
 EVENT_CALL = 'folder_updates.add_event {folder} "what was done" add_event.new_baseline'
 """Call that records a repair in the journal of a folder."""
@@ -218,7 +220,7 @@ STATUS_RULES = (
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
 """Status by remark code, in order of severity."""
-UNREADABLE_NEXT_STEP = "Put its files right: the sentence above says which."
+UNREADABLE_NEXT_STEP = "Repair or restore the file named above"
 """Next step for a machine that cannot be read."""
 
 
@@ -250,13 +252,13 @@ def is_early_alarm(ordered: Sequence[Remark]) -> bool:
 
 
 def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:
-    """Return the next step, one sentence; default_step: where no remark has one."""
+    """Return the next step; default_step: if no remark has one."""
     return ordered[0].cure if ordered and ordered[0].cure else default_step
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:
-    """Return the next step where nothing is wrong; newest: time of the last tap test."""
-    return f"All is well: tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
+    """Return the next step of a machine without problems; newest: time of the last tap test."""
+    return f"No problem found. Tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
 
 
 def count_days_left(newest: datetime, interval_days: float, now: datetime) -> float:
@@ -275,7 +277,7 @@ def date_remarks(tap_id: str, newest: datetime, days: float, now: datetime, path
 
 def add_file_remedy(remark: Remark) -> Remark:
     """Add a remedy that can be the next step to a remark on a file."""
-    return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
+    return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}")
 
 
 def add_damage_remarks(ordered: tuple[Remark, ...], damage: Sequence[Remark]) -> tuple[Remark, ...]:

@@ -172,7 +172,7 @@ def fit_trend(
 ) -> Trend:
     """Fit the trend of a series of taps, oldest first, with at least one value.
 
-    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, also; known:
+    now: its day tells whether that is too long ago for a forecast; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
     points, past = list_newest_points(taps), None

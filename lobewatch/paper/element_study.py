@@ -77,20 +77,20 @@ def element_section(spindle: Spindle) -> NumberGroup:
     as_printed = printed_element(UNEQUAL_BEAM, 0.3, UNEQUAL_BEAM_SPEED_RPM)
     asymmetry = float(np.max(np.abs(as_printed - as_printed.T)) / np.max(np.abs(as_printed)))
     right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
-    solver = "against an eigenvalue solver, 26 segments at 1722 Hz: right as printed"
+    solver = "compared with an eigenvalue solver, 26 segments at 1722 Hz: correct as printed"
     rpm = ELEMENT_SPEED_RPM
-    rounding = f"signs put right, 26 segments, {rpm:.0f} rpm: rounding; at speed 0 A B^-1 {at_rest}, ours does"
-    near = f"1e-6 beside the speed of 1722 Hz; where both are equal A B^-1 {at_speed}, ours does"
-    shapes = f"a cantilever that is not round; {right[0]:.5f} with the right sign: shapes alone are changed"
-    symmetric = "in its largest entry: end forces have one sign as printed; with the right ones K is symmetric"
+    rounding = f"signs corrected, 26 segments, {rpm:.0f} rpm: rounding. At speed 0 A B^-1 {at_rest}, ours does."
+    near = f"speed 1e-6 off 1722 Hz. At exactly that speed A B^-1 {at_speed}, ours does."
+    shapes = f"cantilever with unequal axes: {right[0]:.5f} with the correct sign, which changes the shapes only"
+    symmetric = "largest entry: end forces printed with one sign. With the correct signs K is symmetric."
     highest = f"{ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s"
-    none = f"assembled as printed, that cantilever has so many frequencies below {highest}; right are {len(right)}"
+    none = f"number of frequencies of that cantilever below {highest}, assembled as printed. Correct: {len(right)}."
     numbers = (
         Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
         Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),
-        Comparison("the same next to w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
+        Comparison("error of A B^-1 near w = Omega", "(17)-(25)", None, critical_error, "-", 1, near),
         Comparison("first root with the sign of (5)", "(5)", None, other[0], "rad/s", 6, shapes),
-        Comparison("K less its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
+        Comparison("K minus its transpose", "(23)", None, asymmetry, "-", 2, symmetric),
         Comparison("roots with the signs of (23)", "(23)", None, len(wrong), "", 1, none),
     )
     return NumberGroup("The spinning element: eqs. (5) and (13) to (25)", (), numbers)

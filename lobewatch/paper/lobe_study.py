@@ -24,7 +24,7 @@ class LobeStudy(NamedTuple):
     new: StabilityLobes
     """Lobes of the measured mode."""
     by_rule: StabilityLobes
-    """Lobes of the old mode: f_1 and K 10 % lower, as in the paper."""
+    """Lobes of the old mode: f1 and K 10 % lower, as in the paper."""
     by_model: StabilityLobes
     """Lobes of the old mode with K of the recalibrated model."""
     one_mode: StabilityLobes
@@ -75,16 +75,16 @@ def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -
 def lobe_section(study: LobeStudy) -> NumberGroup:
     """Return the numbers of the lobes."""
     before, after = study.pocket
-    deepest = f"the deepest below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two teeth"
-    moved = f"x {after / before:.3f}: goes with f_1, whatever K does"
-    text = "limit at the speed of that pocket over what it was: a cut that sat in it"
+    deepest = f"deepest pocket below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two flutes"
+    moved = f"x {after / before:.3f}: shifts with f1, independent of K"
+    text = "limit at the speed of the new pocket, old over new"
     rule, model = study.pocket_limit_ratio(study.by_rule), study.pocket_limit_ratio(study.by_model)
     numbers = (
         *_limit_numbers(study),
-        Comparison("a pocket, new", "Fig. 10", None, before, "rpm", 5, deepest),
-        Comparison("the same pocket, old", "Fig. 10", None, after, "rpm", 5, moved),
-        Comparison("left at the speed of the first", "Fig. 10", None, rule, "-", 3, text),
-        Comparison("the same, the model's K", "", None, model, "-", 3, text),
+        Comparison("pocket speed, new", "Fig. 10", None, before, "rpm", 5, deepest),
+        Comparison("pocket speed, old", "Fig. 10", None, after, "rpm", 5, moved),
+        Comparison("remaining limit, paper's rule", "Fig. 10", None, rule, "-", 3, text),
+        Comparison("remaining limit, model's K", "", None, model, "-", 3, text),
         *_further_numbers(study),
     )
     return NumberGroup("Stability lobes, new and old: Fig. 10", ("fig-10",), numbers)
@@ -94,17 +94,17 @@ def _limit_numbers(study: LobeStudy) -> list[Comparison]:
     loop = STUDY_CUT.specific_force * STUDY_CUT.teeth_in_cut * STUDY_CUT.orientation_factors[0]
     per_stiffness = 2 * printed.DAMPING_RATIO * (1 + printed.DAMPING_RATIO)
     new, old = study.new.minimum.depth * loop, study.by_rule.minimum.depth * loop
-    form = "2 K zeta (1 + zeta) of the printed K and zeta; ours is the lowest point of the chart"
+    form = "paper: 2 K zeta (1 + zeta) of the printed K and zeta. Ours: lowest point of the chart."
     by_rule, by_model = study.share(study.by_rule), study.share(study.by_model)
-    rule = "by K x 0.9, whatever the cut: the paper gives neither coefficients nor teeth"
-    tip = "the lowest limit goes with K, which worn bearings hardly change at the tip"
-    masses = ("new", "K/w^2 of the paper's mode"), ("old, rule", "K x 0.9 for f x 0.9 is mass / 0.9")
+    rule = "K x 0.9, independent of the cut (the paper gives neither coefficients nor teeth)"
+    tip = "lowest limit is proportional to K, which worn bearings hardly change at the tip"
+    masses = ("new", "K/w^2 of the paper's mode"), ("old, rule", "K x 0.9 at f x 0.9 means mass / 0.9")
     named = (*masses, ("old, model", "more of the shaft moves with the tip"))
     return [
         Comparison("b_lim Ks mu Nt*, new", "Fig. 10", per_stiffness * printed.STIFFNESS, new, "N/m", 6, form),
         Comparison("b_lim Ks mu Nt*, old", "Fig. 10", per_stiffness * printed.OLD_STIFFNESS, old, "N/m", 6, form),
         Comparison("lowest limit, old over new", "Fig. 10", 0.9, by_rule, "-", 4, rule),
-        Comparison("the same, the model's K", "", 0.9, by_model, "-", 4, tip),
+        Comparison("lowest limit ratio, model's K", "", 0.9, by_model, "-", 4, tip),
         *(
             Comparison(f"modal mass, {name}", "", None, mass, "kg", 4, reason)
             for (name, reason), mass in zip(named, study.masses, strict=True)
@@ -114,14 +114,15 @@ def _limit_numbers(study: LobeStudy) -> list[Comparison]:
 
 def _further_numbers(study: LobeStudy) -> list[Comparison]:
     rows = []
-    for name, first, several in (("feed alone", study.one_mode, study.six_modes), ("x and y", *study.by_zero_order)):
+    for name, first, several in (("feed only", study.one_mode, study.six_modes), ("x and y", *study.by_zero_order)):
         lowest, median, worst = (100 * error for error in study.errors_of_one_mode(first, several))
-        beginning = f"1 mode for 6, {name}"
-        claim = f"error of the lowest limit; {several.method}; the claim is that of its reference [18]"
-        side = "on the side of a pocket, which other modes move"
+        beginning = f"one mode, {name}"
+        method = {"zero order": "ZOA"}.get(several.method, several.method)
+        claim = f"error of the lowest limit, 1 mode instead of 6 ({method}): a claim of its reference [18]"
+        side = "on the side of a pocket, which other modes shift"
         rows += [
             Comparison(f"{beginning}: lowest", "", None, lowest, "%", 2, claim),
-            Comparison(f"{beginning}: median", "", None, median, "%", 2, "size of the error over all speeds"),
+            Comparison(f"{beginning}: median", "", None, median, "%", 2, "absolute error over all speeds"),
             Comparison(f"{beginning}: worst", "", None, worst, "%", 2, side),
         ]
     return rows

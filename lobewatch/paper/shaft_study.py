@@ -76,35 +76,35 @@ def study_shaft(theory: Theory) -> ShaftStudy:
 
 
 def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
-    """Return the numbers at rest and of the spinning spindle; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    """Return the numbers without and with rotation; plain is Euler-Bernoulli, shear Timoshenko theory."""
     at_rest, spinning = tuple(_numbers_at_rest(plain, shear)), tuple(_spinning_numbers(plain, shear))
     return (
-        NumberGroup("The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), at_rest),
-        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), spinning),
+        NumberGroup("Model and bearings: Figs. 3 and 8", ("fig-3", "fig-8"), at_rest),
+        NumberGroup("Rotating spindle: Figs. 7 and 9", ("fig-7", "fig-9"), spinning),
     )
 
 
 def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
-    fitted = "what the fit of the surrogate leaves"
-    same = "as many; dimensions are not public: those of the surrogate are fitted to the frequencies"
+    fitted = "residual of the surrogate fit"
+    same = "same number. The paper's dimensions are not public, ours are fitted to its frequencies."
     excess = (plain.rigid_frequency / printed.FREQUENCY - 1) * 100
-    rounded = f"the paper rounds {(printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100:.1f} %; the rest is the fit"
-    theory = "a stiffness calibrated to a frequency is an equivalent number of the beam theory"
-    left = "a quotient of the two above"
+    rounded = f"the paper rounds {(printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100:.1f} %, the rest is the fit"
+    theory = "a calibrated stiffness is an equivalent stiffness of its beam theory"
+    left = "ratio of the two above"
     (new, old), stiff, soft = plain.printed_frequencies, printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
     return [
         Comparison("segments", "Fig. 3", printed.SEGMENTS, len(plain.rigid.segments), "", 2, same),
         Comparison("bearings", "Fig. 3", printed.BEARINGS, len(plain.rigid.bearings), "", 2, same),
-        Comparison("f_1, rigid bearings", "", printed.RIGID_FREQUENCY, plain.rigid_frequency, "Hz", 6, fitted),
-        Comparison("it is above f_1 measured by", "", printed.RIGID_EXCESS, excess, "%", 3, rounded),
-        Comparison("f_1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
-        Comparison("f_1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
+        Comparison("f1, rigid bearings", "", printed.RIGID_FREQUENCY, plain.rigid_frequency, "Hz", 6, fitted),
+        Comparison("excess over measured f1", "", printed.RIGID_EXCESS, excess, "%", 3, rounded),
+        Comparison("f1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
+        Comparison("f1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
         Comparison("each bearing, for 1722 Hz", "Fig. 8", stiff, plain.new.bearing_stiffness, "N/m", 5, fitted),
-        Comparison("the same with shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
+        Comparison("each bearing, 1722 Hz, shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
         Comparison("each bearing, for 1550 Hz", "Fig. 8", soft, plain.old.bearing_stiffness, "N/m", 5, fitted),
-        Comparison("the same with shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
-        Comparison("stiffness that is left", "Fig. 8", round(soft / stiff, 3), plain.old.factor, "-", 3, left),
-        Comparison("the same with shear", "", None, shear.old.factor, "-", 3, theory),
+        Comparison("each bearing, 1550 Hz, shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
+        Comparison("remaining stiffness", "Fig. 8", round(soft / stiff, 3), plain.old.factor, "-", 3, left),
+        Comparison("remaining stiffness, shear", "", None, shear.old.factor, "-", 3, theory),
     ]
 
 
@@ -113,24 +113,24 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
         ("critical speed, rigid", "Fig. 7", printed.RIGID_CRITICAL_SPEED, 60 * printed.RIGID_FREQUENCY),
         ("critical speed, 1722 Hz", "Fig. 9", printed.CRITICAL_SPEED, 60 * printed.FREQUENCY),
     )
-    lifted = "gyroscopic moments lift the forward whirl"
+    lifted = "gyroscopic moments raise the forward whirl"
     rows = []
     for i, (name, where, value, exact) in enumerate(pairs):
         off = format_share(value / exact - 1, "+")
-        reason = lifted if i else f"{lifted}, shear and rotary inertia lower f_1 more"
-        text = f"exact is 60 f_1, {exact:.0f} rpm with the paper's: {off} off, as if read in the figure"
+        reason = lifted if i else f"{lifted}, but shear and rotary inertia lower f1 more"
+        text = f"exact: 60 f1, {exact:.0f} rpm with the paper's f1. The paper is {off} off (read from its figure?)."
         rows += [
             Comparison(name, where, value, plain.critical_speeds[i], "rpm", 6, text),
-            Comparison("the same with shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
+            Comparison(f"{name}, shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
         ]
-    seen = "seen from the housing: spin changes the view from the shaft alone"
-    parted = "seen from the housing: what spin does where rotary inertia counts"
+    seen = "fixed frame: speed changes f1 in the rotating frame only"
+    parted = "fixed frame: effect of speed with rotary inertia"
     turning = f"at {OPERATING_SPEED_RPM:.0f} rpm"
     return [
         *rows,
-        Comparison(f"f_1 {turning}", "", None, plain.at_speed[1], "Hz", 6, seen),
-        Comparison("backward, with shear", "", None, shear.at_speed[0], "Hz", 6, parted),
-        Comparison("forward, with shear", "", None, shear.at_speed[1], "Hz", 6, parted),
+        Comparison(f"f1 {turning}", "", None, plain.at_speed[1], "Hz", 6, seen),
+        Comparison("backward whirl, shear", "", None, shear.at_speed[0], "Hz", 6, parted),
+        Comparison("forward whirl, shear", "", None, shear.at_speed[1], "Hz", 6, parted),
     ]
 
 
@@ -158,15 +158,15 @@ def stiffness_section(study: StiffnessStudy) -> NumberGroup:
     old = printed.OLD_STIFFNESS
     ratio = round(old / printed.STIFFNESS, 4)
     static, modal = study.linearized[1] / study.linearized[0], study.modal[1] / study.modal[0]
-    rounded = "0.9 x 1722, which the paper rounds"
-    rule = "equal in every printed digit: K_theo is this rule, and not (30) to (36)"
+    rounded = "0.9 x 1722, rounded in the paper"
+    rule = "equal in every printed digit: K_theo follows from this rule, not from (30) to (36)"
     off = format_share(study.linearized[1] / study.static[1] - 1, "+")
-    cost = f"linearised at 1550 Hz, {off} off the exact one; and another shaft"
+    cost = f"linearised at 1550 Hz, {off} off the exact value, and for another shaft"
     exact = "term 0 of the dynamic stiffness, exact"
-    part = "by (30) to (36) at both frequencies: the bearings are a part of the softness only"
-    shown = "what an FRF shows and the lobes need: it hardly falls"
+    part = "by (30) to (36) at both frequencies: the bearings are only part of the compliance"
+    shown = "seen in an FRF and needed for lobes: hardly drops"
     numbers = (
-        Comparison("f_1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
+        Comparison("f1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
         Comparison("K_theo by the rule 0.9 K_exp", "(36)", old, 0.9 * printed.STIFFNESS, "N/m", 6, rule),
         Comparison("K_theo by (30) to (36)", "(36)", old, study.linearized[1], "N/m", 5, cost),
         Comparison("K static, new", "(35)", None, study.static[0], "N/m", 5, exact),

@@ -13,12 +13,11 @@ from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
 def _validation_claim(meshes: FiniteElementStudy) -> Claim:
     softer = meshes.exact["timoshenko"] / meshes.exact["euler-bernoulli"] - 1
     return Claim(
-        "Finite elements with shear validate the model without it: 2367 against 2303 Hz, less than 3 % apart.",
+        "Finite elements with shear validate the model without it: 2367 compared with 2303 Hz, less than 3 % apart.",
         "fails",
-        f"Shear takes {format_share(-softer)} off f_1 of this shaft, and {printed.FEM_ELEMENTS} elements are exact to "
-        f"{format_share(meshes.error('linear'))}. With shear f_1 lies below that without it, even clamped in all "
-        f"bearings ({meshes.clamped:.0f} Hz): a model with shear that lies above is another shaft, and how little "
-        "above says nothing.",
+        f"Shear lowers f1 of this shaft by {format_share(-softer)}, and {printed.FEM_ELEMENTS} elements are exact to "
+        f"{format_share(meshes.error('linear'))}. A model with shear is always below one without, even if clamped in "
+        f"all bearings ({meshes.clamped:.0f} Hz). A model with shear above it describes another shaft.",
     )
 
 
@@ -27,16 +26,16 @@ def _bearing_claims(plain: shaft_study.ShaftStudy, shear: shaft_study.ShaftStudy
     stiffness, stiffer = plain.new.bearing_stiffness / 1e6, shear.new.bearing_stiffness / 1e6
     return (
         Claim(
-            "Rigid bearings put f_1 about a third too high; springs must be tuned to the measured frequency.",
+            "Rigid bearings make f1 about a third too high. Springs must be tuned to the measured frequency.",
             "holds",
-            f"{format_share(high)} here. With shear it is {format_share(sheared)}: nearly half of the third is theory.",
+            f"{format_share(high)} here, but {format_share(sheared)} with shear: nearly half of the third is theory.",
         ),
         Claim(
-            "The tuned springs stand for the bearings: 1.28e9 N/m each, 7.72e8 N/m after the fall.",
+            "The tuned springs represent the bearings: 1.28e9 N/m each, 7.72e8 N/m after the frequency drop.",
             "holds in part",
-            f"They belong to the beam theory: {stiffness:.0f} N/um without shear, {stiffer:.0f} N/um with it, of "
-            f"which {format_share(plain.old.factor)} and {format_share(shear.old.factor)} are left at 1550 Hz. Compare "
-            "such numbers within one model only.",
+            f"They depend on the beam theory: {stiffness:.0f} N/um without shear, {stiffer:.0f} N/um with it. At 1550 "
+            f"Hz {format_share(plain.old.factor)} and {format_share(shear.old.factor)} remain. Compare such numbers "
+            "within one model only.",
         ),
     )
 
@@ -44,11 +43,11 @@ def _bearing_claims(plain: shaft_study.ShaftStudy, shear: shaft_study.ShaftStudy
 def _spin_claim(shear: shaft_study.ShaftStudy) -> Claim:
     backward, forward = shear.at_speed
     return Claim(
-        "f_1 falls with the speed of the spindle and vanishes at the critical speed.",
+        "f1 drops with spindle speed and reaches zero at the critical speed.",
         "holds in part",
-        "Seen from the shaft. From the housing, where hammer, sensor and workpiece are, f_1 of the paper's theory does "
-        f"not change at all; with rotary inertia it parts into {backward:.0f} and {forward:.0f} Hz at "
-        f"{shaft_study.OPERATING_SPEED_RPM:.0f} rpm. Without it the critical speed is 60 f_1, and no search is needed.",
+        "True in the rotating frame only. In the fixed frame of hammer, sensor and workpiece, f1 of the paper's theory "
+        f"does not change. With rotary inertia it splits into {backward:.0f} and {forward:.0f} Hz at "
+        f"{shaft_study.OPERATING_SPEED_RPM:.0f} rpm. Without it the critical speed is simply 60 f1.",
     )
 
 
@@ -57,18 +56,18 @@ def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tu
     before, after = lobes.pocket
     return (
         Claim(
-            "With f_1 the tip stiffness falls by 10 %, from K_exp to K_theo.",
+            "The tip stiffness drops by 10 % with f1, from K_exp to K_theo.",
             "fails",
-            "K_theo is 0.9 K_exp in every digit. On the surrogate the static stiffness falls by "
-            f"{format_share(static)}, that of the mode, which an FRF shows, by {format_share(modal)}. Lobewatch takes "
-            "K from each new tap test.",
+            "K_theo is 0.9 K_exp in every digit. On the surrogate the static stiffness drops by "
+            f"{format_share(static)}, the modal stiffness seen in an FRF by {format_share(modal)}. lobewatch measures "
+            "K in each tap test.",
         ),
         Claim(
-            "A fall of f_1 by 10 % shifts the stability lobes significantly.",
+            "A drop of f1 by 10 % shifts the stability lobes significantly.",
             "holds",
-            f"Sideways: pockets go with f_1 ({before:.0f} to {after:.0f} rpm), and at the speed of that pocket "
-            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit is left. Down it is K that counts: "
-            f"of the lowest limit {format_share(lobes.share(lobes.by_model))} is left with the model's K, "
+            f"Pockets shift with f1 ({before:.0f} to {after:.0f} rpm). At the first speed "
+            f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit remains. The lowest limit depends "
+            f"on K: {format_share(lobes.share(lobes.by_model))} remains with the model's K, "
             f"{format_share(lobes.share(lobes.by_rule))} by the paper's rule.",
         ),
     )
@@ -77,10 +76,10 @@ def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tu
 def _mode_claim(lobes: LobeStudy) -> Claim:
     lowest, worst = lobes.errors_of_one_mode(lobes.one_mode, lobes.six_modes)[::2]
     return Claim(
-        "More modes than the first hardly matter for the lobes (its reference [18]).",
+        "Modes above the first hardly affect the lobes (its reference [18]).",
         "holds in part",
-        f"In the feed alone the lowest limit of one mode is {format_share(lowest)} off that of six of the surrogate; "
-        f"on the side of a pocket, which they move, the limit is off by up to {format_share(worst)}.",
+        f"With one mode instead of six, along the feed only, the lowest limit is off by {format_share(lowest)}. "
+        f"On the side of a pocket, shifted by the other modes, the limit is off by up to {format_share(worst)}.",
     )
 
 

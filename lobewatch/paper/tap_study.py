@@ -114,28 +114,28 @@ def tap_section(study: TapStudy) -> NumberGroup:
     below, above = study.extremes
     zeta, stiffness = printed.DAMPING_RATIO, printed.STIFFNESS
     picked, fitted, model = study.picked, study.fitted, study.surrogate_modes[0]
-    closed = "closed form; not printed"
-    exact = "least squares has no bias"
-    halves = "half by (28), half by the f_1 of the peak"
-    high = f"zeta^2 ({format_share(zeta**2)}) high for one mode alone, {halves}; the rest: lines 1 Hz apart"
-    low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) low for one mode alone; the rest: lines 1 Hz apart"
-    other = "the surrogate is fitted to frequencies, not to K"
+    closed = "closed form, not printed"
+    exact = "least squares without bias"
+    halves = "half from (28), half from the f1 of the peak"
+    high = f"zeta^2 ({format_share(zeta**2)}) too high for a single mode, {halves}. The rest: lines 1 Hz apart."
+    low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) too low for a single mode. The rest: lines 1 Hz apart."
+    other = "surrogate fitted to frequencies, not to K"
     shift = format_share(study.surrogate_picked.stiffness / model.stiffness - 1, "+")
-    tails = f"{shift}: tails of modes 2 to {SURROGATE_MODES} too"
-    often = f"rms over {EMULATED_TESTS} emulated tap tests of ten hits, against the truth"
-    rest = f"{often}: picking takes three lines, 4 Hz apart, for all"
+    tails = f"{shift}, also from the tails of modes 2 to {SURROGATE_MODES}"
+    often = f"rms over {EMULATED_TESTS} emulated tap tests of ten hits, compared with the true value"
+    rest = f"{often} (picking uses only three lines, 4 Hz apart)"
     (zeta_picked, k_picked), (zeta_fitted, k_fitted) = study.scatter_picked, study.scatter_fitted
     numbers = (
-        Comparison("f_1", "Fig. 5, 6", printed.FREQUENCY, fitted.frequency, "Hz", 6, "the same mode, fitted"),
+        Comparison("f1", "Fig. 5, 6", printed.FREQUENCY, fitted.frequency, "Hz", 6, "same mode, fitted"),
         Comparison("omega_A", "(28)", None, below, "Hz", 6, closed),
         Comparison("omega_B", "(28)", None, above, "Hz", 6, closed),
         Comparison("zeta, picked", "(28)", zeta, picked.damping_ratio, "-", 5, high),
         Comparison("zeta, fitted", "", zeta, fitted.damping_ratio, "-", 5, exact),
-        Comparison("D = Im G(f_1)", "(29)", None, study.depth, "m/N", 5, closed),
+        Comparison("D = Im G(f1)", "(29)", None, study.depth, "m/N", 5, closed),
         Comparison("K_exp, picked", "(29)", stiffness, picked.stiffness, "N/m", 5, low),
         Comparison("K_exp, fitted", "", stiffness, fitted.stiffness, "N/m", 5, exact),
         Comparison("K of the surrogate's mode 1", "", stiffness, model.stiffness, "N/m", 5, other),
-        Comparison("the same, picked", "(29)", None, study.surrogate_picked.stiffness, "N/m", 5, tails),
+        Comparison("K of that mode, picked", "(29)", None, study.surrogate_picked.stiffness, "N/m", 5, tails),
         Comparison("error of zeta, picked", "(28)", None, 100 * zeta_picked, "%", 2, rest),
         Comparison("error of zeta, fitted", "", None, 100 * zeta_fitted, "%", 2, often),
         Comparison("error of K, picked", "(29)", None, 100 * k_picked, "%", 2, rest),

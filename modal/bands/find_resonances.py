@@ -78,15 +78,15 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     """
     n = frf.frequency.size
     if n < MIN_FRF_LINES:
-        raise ValueError(f"{n} lines are too few to find a mode; at least {MIN_FRF_LINES} are needed: widen the band")
+        raise ValueError(f"{n} lines are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines.")
     if not np.any(frf.receptance):
-        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
+        raise ValueError("the FRF is zero on every line: no response was measured. Check the sensor and its cable.")
     frf = remove_drift(frf)
     peaks = _find_peaks_at_all_scales(frf)
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
-            "the FRF is real on every line: its phase is missing, and without it damping and stiffness cannot be told "
-            "from neighbouring modes; export real and imaginary part, or magnitude and phase"
+            "the FRF is real on every line: its phase is missing. "
+            "Export real and imaginary part, or magnitude and phase."
         )
     _check_phase(frf, peaks)
     turning = (peak for peak in peaks if peak.turn < -MIN_PHASE_TURN or peak.turn > MAX_PHASE_TURN)
@@ -127,8 +127,8 @@ def _check_phase(frf: Frf, peaks: list[Resonance]) -> None:
     phase_step = np.imag(frf.accelerance[1:] * frf.accelerance[:-1].conj())
     if rising > falling and np.sum(phase_step) > 0:
         raise ConjugateError(
-            "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
-            "complex conjugate of response over force: give Frf the conjugate of receptance (numpy.conj)"
+            "the phase rises through the resonances, so the FRF is the complex conjugate of response over force. "
+            "Conjugate it (numpy.conj)."
         )
 
 

@@ -88,7 +88,7 @@ DRIFT_ROUNDING_SHARE = 1e-9
 
 
 def remove_drift(frf: Frf) -> Frf:
-    """Subtract the drift A/f^2 (A complex) of an accelerometer at rest, if the low lines show one.
+    """Subtract the drift A/f^2 (A complex) of an accelerometer without motion, if the low lines show one.
 
     A constant error of an accelerance is such a drift of the receptance, of any phase; against the phase of a mode it
     turns the peak into a dip. Behind a high-pass filter it begins above the lowest lines.

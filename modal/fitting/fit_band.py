@@ -172,7 +172,7 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
     """Fit the same modes with real constants, if Akaike's criterion allows.
 
     It does if they raise the sum of squares by no more than twice what phases take off by chance. The errors stay
-    those of the complex fit, for an unfitted phase is not known to be 0. Otherwise the fit is unchanged. Arguments
+    those of the complex fit, because an unfitted phase need not be 0. Otherwise the fit is unchanged. Arguments
     as `fit_band`.
 
     Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.

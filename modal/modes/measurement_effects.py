@@ -24,7 +24,7 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     time_constant : float
         Time constant of the window (s).
     delay : float
-        Time from the start of the window to the centre of the pulse (s). The window has fallen to
+        Time from the start of the window to the centre of the pulse (s). The window has dropped to
         exp(-delay/time_constant) by then, which makes K larger; this is removed, too. 0 if the window begins at the
         hit,
         or covers the force, too.
@@ -59,13 +59,13 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     if not (np.isfinite(time_constant) and time_constant > 0):
         raise ValueError(f"time_constant={time_constant} s is not a finite number > 0")
     if not (np.isfinite(delay) and delay >= 0):
-        raise ValueError(f"delay={delay} s is not a finite number >= 0: the window cannot begin after the hit")
+        raise ValueError(f"delay={delay} s is not a finite number >= 0. The window must begin before the hit.")
     size = 2 * np.pi * mode.frequency
     decay = mode.damping_ratio * size - 1 / time_constant
     if decay <= 0:
         raise ValueError(
-            f"the mode at {mode.frequency:.1f} Hz decays with {decay + 1 / time_constant:.3g}/s, no faster than the "
-            f"window, {1 / time_constant:.3g}/s: the time constant is not that of its window; look it up"
+            f"the mode at {mode.frequency:.1f} Hz decays at {decay + 1 / time_constant:.3g}/s, no faster than its "
+            f"window ({1 / time_constant:.3g}/s). Check the time constant."
         )
     w = float(np.hypot(decay, size * np.sqrt(1 - mode.damping_ratio**2)))
     left = float(np.exp(-delay / time_constant))

@@ -92,7 +92,7 @@ class Mode:
     relative_peak: float | None = None
     """Peak of receptance over the highest of the same free decays from one excitation; None if K is known."""
     remarks: tuple[Remark, ...] = ()
-    """Reasons why the mode may not be trusted. docs/remarks.md lists their codes."""
+    """Reasons for doubt about the mode. docs/remarks.md lists their codes."""
 
     def __post_init__(self) -> None:
         """Check values and covariances."""
@@ -105,13 +105,16 @@ class Mode:
                 yield f"{name}={value} is not a finite number > 0"
         if self.relative_peak is not None:
             if self.has_stiffness or not self.relative_peak > 0:
-                yield f"relative_peak={self.relative_peak} with stiffness={self.stiffness}: give NaN and a number > 0"
+                yield (
+                    f"relative_peak={self.relative_peak} with stiffness={self.stiffness} is invalid. "
+                    "Give a peak > 0 and a stiffness of NaN."
+                )
         elif not np.isfinite(self.stiffness) or self.stiffness == 0:
             yield f"stiffness={self.stiffness} is not a finite number other than 0 (N/m)"
         if not abs(self.phase_deg) <= 90:
-            yield f"phase_deg={self.phase_deg} is not -90 to 90 degrees; beyond that give the stiffness the other sign"
+            yield f"phase_deg={self.phase_deg} is not within -90 to 90 degrees. Change the sign of the stiffness."
         if self.phase_deg and self.damping_ratio >= 1:
-            yield f"damping_ratio={self.damping_ratio} with phase_deg={self.phase_deg}: give one below 1"
+            yield f"damping_ratio={self.damping_ratio} with phase_deg={self.phase_deg} is not below 1"
 
     def _wrong_errors(self) -> Iterator[str]:
         for name, matrix in (("covariance", self.covariance), ("jackknife", self.jackknife)):
@@ -122,7 +125,7 @@ class Mode:
         if not self.degrees_of_freedom > 0:
             yield f"degrees_of_freedom={self.degrees_of_freedom} is not a number > 0"
         if self.jackknife is not None and self.n_hits < 2:
-            yield f"n_hits={self.n_hits}: a jackknife has at least 2 hits"
+            yield f"n_hits={self.n_hits} is not at least 2, as a jackknife needs"
 
     @property
     def has_stiffness(self) -> bool:

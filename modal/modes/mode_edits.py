@@ -23,7 +23,7 @@ class ModeEdits:
     >>> ModeEdits(fix=((1500.0, 1.5),))
     Traceback (most recent call last):
         ...
-    ValueError: fix 1500:1.5: the damping ratio is not between 0 and 1; 3 % is 0.03
+    ValueError: fix 1500:1.5: damping ratio 1.5 is not between 0 and 1. Give 3 % as 0.03.
     """
 
     add: tuple[float, ...] = ()
@@ -37,15 +37,16 @@ class ModeEdits:
         """Check frequencies and damping ratios."""
         for name, (frequency, *_) in self._edits():
             if not (isfinite(frequency) and frequency > 0):
-                raise ValueError(f"{name} {frequency:g}: is no frequency > 0; give it in Hz")
+                raise ValueError(f"{name} {frequency:g}: the frequency is not above 0 Hz")
         for frequency, zeta in self.fix:
             if not 0 < zeta < 1:
-                raise ValueError(f"fix {frequency:g}:{zeta:g}: the damping ratio is not between 0 and 1; 3 % is 0.03")
+                finding = f"fix {frequency:g}:{zeta:g}: damping ratio {zeta:g} is not between 0 and 1"
+                raise ValueError(f"{finding}. Give 3 % as 0.03.")
         named: dict[float, str] = {}
         for name, (frequency, *_) in self._edits():
             if frequency in named:
                 both = f"{name} twice" if named[frequency] == name else f"{named[frequency]} and {name}"
-                raise ValueError(f"{frequency:g} Hz: {both}; say one thing of one mode")
+                raise ValueError(f"{frequency:g} Hz: {both}. Give one edit per mode.")
             named[frequency] = name
 
     def _edits(self) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -113,10 +114,10 @@ def parse_mode_edits(
     >>> parse_mode_edits(add=["298"], fix=["1500:0.03"])
     ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
     """
-    pairs = [_numbers("fix", t, "the frequency in Hz and the damping ratio, as in 1500:0.03", 2) for t in fix or ()]
+    pairs = [_numbers("fix", t, "frequency (Hz) and damping ratio, for example 1500:0.03", 2) for t in fix or ()]
     return ModeEdits(
-        tuple(_numbers("add", text, "the frequency in Hz, as in 298.5", 1)[0] for text in add or ()),
-        tuple(_numbers("drop", text, "the frequency in Hz, as in 412", 1)[0] for text in drop or ()),
+        tuple(_numbers("add", text, "a frequency (Hz), for example 298.5", 1)[0] for text in add or ()),
+        tuple(_numbers("drop", text, "a frequency (Hz), for example 412", 1)[0] for text in drop or ()),
         tuple((frequency, zeta) for frequency, zeta in pairs),
     )
 
@@ -127,6 +128,6 @@ def _numbers(name: str, text: str, wanted: str, count: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count:
-        point = "; write decimals with a point" if "," in text else ""
-        raise ValueError(f"ModeEdits.{name} {text}: give {wanted}{point}")
+        point = " with a decimal point" if "," in text else ""
+        raise ValueError(f"ModeEdits.{name} {text}: invalid. Give {wanted}{point}.")
     return numbers

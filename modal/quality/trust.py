@@ -141,16 +141,14 @@ def relative_error(mode: Mode) -> float:
 
 
 REJECTION_REASONS = {
-    "heavy-damping": "drift has no peak either",
-    "misfit": "the fit leaves too much of it",
-    "uncertain": "its damping or stiffness is hardly known",
+    "heavy-damping": "no clear peak, may be drift",
+    "misfit": "poor fit",
+    "uncertain": "damping or stiffness too uncertain",
 }
 """Text for each rule of `trust_rules` that rejects a mode."""
 MAX_NEGATIVE_PEAK_SHARE = 0.1
 """Peak of a mode with negative stiffness over the largest, below which it is left out; chosen."""
-REJECTED_MODE_REMEDY = (
-    "look at it with modal.synthesize_frf; against drift let the sensor rest longer, or change its cable"
-)
+REJECTED_MODE_REMEDY = "Check it with modal.synthesize_frf. If it is drift, let the sensor settle or change its cable"
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,8 +200,8 @@ def select_credible_modes(modes: Sequence[Mode]) -> CredibleModes:
 
 
 def _opposed_mode_remark(mode: Mode, largest: float) -> Remark:
-    text = f"left out: K is negative, its peak {100 * mode.peak / largest:.1g} % of the largest"
-    cure = "where it is a mode of the machine, hit and measure at one point in one direction"
+    text = f"left out, because K is negative and its peak only {100 * mode.peak / largest:.1g} % of the largest"
+    cure = "If it is a mode of the machine, hit and measure at one point in one direction"
     return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 
 
@@ -213,8 +211,8 @@ def _rejection_remark(mode: Mode) -> Remark | None:
     stiffness = stiffness_remark(mode.stiffness) if mode.has_stiffness else None
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
-        reasons.append("its peak is cut by the edge of the lines")
+        reasons.append("peak cut off at the edge of the band")
     if reasons:
-        text = f"not followed and not used for lobes, damping {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
+        text = f"mode not used, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, REJECTED_MODE_REMEDY)
     return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, stiffness.cure)

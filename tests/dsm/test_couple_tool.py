@@ -164,17 +164,17 @@ def test_longer_tool_lowers_the_frequency() -> None:
 def test_refusals() -> None:
     given, side = spindle(), spindle_side(spindle(), F, 0.11)
     for position in (-0.01, 0.67, np.nan):
-        with pytest.raises(ValueError, match="leaves no spindle"):
+        with pytest.raises(ValueError, match="position="):
             change_tool(given, position, tool())
-    with pytest.raises(ValueError, match=r"theory='timoshenko' of the tool is not that of the spindle, 'euler-"):
+    with pytest.raises(ValueError, match=r"tool .*theory='timoshenko'.* 'euler-"):
         couple_tool(side, tool("timoshenko"))
-    with pytest.raises(ValueError, match=r"theory='timoshenko' of the tool"):
+    with pytest.raises(ValueError, match=r"tool .*theory='timoshenko'"):
         change_tool(given, 0.11, tool("timoshenko"))
     with pytest.raises(ValueError, match=r"the tool has 1 bearing\(s\)"):
         couple_tool(side, replace(tool(), bearings=[Bearing(0.0, 1e6)]))
     with pytest.raises(ValueError, match=r"loss_factor=-0\.1"):
         spindle_side(given, F, 0.11, -0.1)
-    with pytest.raises(ValueError, match="held by a rigid bearing"):
+    with pytest.raises(ValueError, match=r"position=.*rigid"):
         spindle_side(replace(given, bearings=[*given.bearings, Bearing(0.11, np.inf)]), F, 0.11)
-    with pytest.raises(ValueError, match="held by 1 bearing"):
+    with pytest.raises(ValueError, match="1 bearing"):
         spindle_side(replace(given, bearings=given.bearings[-1:]), F, 0.11)

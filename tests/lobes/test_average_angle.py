@@ -231,21 +231,21 @@ def test_bad_speeds_are_rejected(speed: Any) -> None:
 
 
 def test_two_rigid_directions_are_rejected() -> None:
-    with pytest.raises(ValueError, match="x and y are both None"):
+    with pytest.raises(ValueError, match=r"x and y .*None"):
         average_angle_lobes(None, None, CUT, SPEEDS)
 
 
 def test_no_modes_are_rejected() -> None:
-    with pytest.raises(ValueError, match="y has no modes"):
+    with pytest.raises(ValueError, match=r"y .*modes"):
         average_angle_lobes(X, [], CUT, SPEEDS)
 
 
 def test_a_mode_of_no_driving_point_is_rejected() -> None:
-    with pytest.raises(ValueError, match=r"3671 Hz of x has stiffness -1e\+07 N/m.*driving point"):
+    with pytest.raises(ValueError, match=r"3671 Hz of x .*-1e\+07 N/m.*driving point"):
         average_angle_lobes([Mode(3671.0, 0.002, -1e7)], None, CUT, SPEEDS)
 
 
 def test_frfs_without_a_common_band_are_rejected() -> None:
     low, high = frf(X, 1.0).in_band((1, 500)), frf(Y, 1.0).in_band((600, 900))
-    with pytest.raises(ValueError, match="no band in common: one ends at 500 Hz, the other begins at 600 Hz"):
+    with pytest.raises(ValueError, match=r"band.* 500 Hz.* 600 Hz"):
         average_angle_lobes(low, high, CUT, SPEEDS)

@@ -65,7 +65,7 @@ def test_up_and_down_are_mirror_images(immersion: float) -> None:
     [
         ({"teeth": 0}, "teeth=0"),
         ({"teeth": 2.5}, "teeth=2.5"),
-        ({"immersion": 0.0}, "radial depth divided by cutter diameter"),
+        ({"immersion": 0.0}, "immersion=0.0"),
         ({"immersion": 1.01}, "immersion=1.01"),
         ({"immersion": math.nan}, "immersion=nan"),
         ({"direction": "climb"}, "'climb'"),

@@ -116,9 +116,9 @@ def test_a_history_begins_with_no_rows(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"time": "t"}, "the new row has"),
-        ({"time": 3.0, "natural_frequency": [1.0, 2.0], "bearing_stiffness": 2e8}, "keep text and numbers"),
-        ({"time": "t", "natural_frequency": [1.0], "bearing_stiffness": 2e8}, "'natural_frequency' has shape \\(1,\\)"),
+        ({"time": "t"}, r"\['time'\].*bearing_stiffness"),
+        ({"time": 3.0, "natural_frequency": [1.0, 2.0], "bearing_stiffness": 2e8}, "'time' .*float64"),
+        ({"time": "t", "natural_frequency": [1.0], "bearing_stiffness": 2e8}, r"'natural_frequency' .*\(1,\).*\(2,\)"),
     ],
 )
 def test_rows_of_another_form_are_rejected(change: dict[str, Any], message: str) -> None:
@@ -130,17 +130,17 @@ def test_rows_of_another_form_are_rejected(change: dict[str, Any], message: str)
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"depth": {"": np.ones((2, 3))}}, "empty name"),
-        ({"depth": {"a\0b": np.ones((2, 3))}}, "cannot be stored"),
-        ({"depth": {"half \ud800": np.ones((2, 3))}}, "cannot be stored"),
-        ({"depth": {"a": np.ones((2, 4))}}, "\\(2, 4\\), not \\(n, 3\\)"),
-        ({"depth": {"a": np.zeros((2, 3))}}, "not > 0 m"),
-        ({"depth": {"a": np.ones((1, 3))}}, "differ in their number of measurements"),
-        ({"columns": {"a/b": np.ones(2)}}, "'a/b' is not made of letters"),
-        ({"columns": {"a": np.array([None, "x"])}}, "'a' is object"),
-        ({"columns": {"a": np.ones((2, 3, 4))}, "units": {}}, "give numbers \\(n,\\) or \\(n, k\\)"),
-        ({"units": {"mass": "kg"}}, "\\['mass'\\]"),
-        ({"speed_rpm": np.array([3.0, 2.0, 4.0])}, "does not rise"),
+        ({"depth": {"": np.ones((2, 3))}}, "name"),
+        ({"depth": {"a\0b": np.ones((2, 3))}}, r"'a\\x00b'"),
+        ({"depth": {"half \ud800": np.ones((2, 3))}}, r"'half \\ud800'"),
+        ({"depth": {"a": np.ones((2, 4))}}, r"'a' .*\(2, 4\).*\(n, 3\)"),
+        ({"depth": {"a": np.zeros((2, 3))}}, "'a' .*> 0 m"),
+        ({"depth": {"a": np.ones((1, 3))}}, "'a': 1"),
+        ({"columns": {"a/b": np.ones(2)}}, "'a/b'"),
+        ({"columns": {"a": np.array([None, "x"])}}, "'a' .*object"),
+        ({"columns": {"a": np.ones((2, 3, 4))}, "units": {}}, r"'a' .*\(2, 3, 4\).*\(n,\) .*\(n, k\)"),
+        ({"units": {"mass": "kg"}}, r"\['mass'\]"),
+        ({"speed_rpm": np.array([3.0, 2.0, 4.0])}, "speed_rpm "),
         ({"speed_rpm": np.array([0.0, 2.0, 4.0])}, "speed_rpm\\[0\\]=0.0"),
     ],
 )
@@ -197,11 +197,11 @@ def test_a_missing_file_is_distinguished_from_a_bad_one(tmp_path: Path) -> None:
 def test_other_files_are_rejected(tmp_path: Path) -> None:
     path = tmp_path / "history.h5"
     path.write_text("speed,depth\n")
-    with pytest.raises(ValueError, match=r"history\.h5: damaged, or no lobewatch-history file.*rebuild it"):
+    with pytest.raises(ValueError, match=r"history\.h5: .*lobewatch-history"):
         read_history(path)
     with h5py.File(path, "w") as file:
         file.attrs["format"] = "lobewatch-history"
-    with pytest.raises(ValueError, match=r"history\.h5: damaged, or no lobewatch-history file.*rebuild it"):
+    with pytest.raises(ValueError, match=r"history\.h5: .*lobewatch-history"):
         read_history(path)
 
 
@@ -217,5 +217,5 @@ def test_damage_is_rejected(place: float, bit: int, tmp_path_factory: pytest.Tem
     flipped[offset] ^= 1 << bit
     for damaged in (flipped, sound[:offset], sound + b"\0"):
         path.write_bytes(damaged)
-        with pytest.raises(ValueError, match="damaged"):
+        with pytest.raises(ValueError, match=r"history\.h5"):
             read_history(path)

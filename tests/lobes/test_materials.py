@@ -147,9 +147,7 @@ def test_materials_are_found_by_a_part_of_a_name_or_by_their_group() -> None:
     }
     assert {known.iso_group for known in find_materials("s")} == {"S"}
     assert len(find_materials("")) == len(all_cutting_coefficients())
-    with pytest.raises(
-        ValueError, match=re.escape("no material has 'Inconell 718' in a name; is 'Inconel 718' meant?")
-    ):
+    with pytest.raises(ValueError, match=r"'Inconell 718'.*'Inconel 718'"):
         find_materials("Inconell 718")
 
 

@@ -117,9 +117,9 @@ def test_the_system_shows_the_receptance_of_its_vectors() -> None:
 @pytest.mark.parametrize(
     ("vectors", "problem"),
     [
-        ([[1.0, 0.0]], r"vectors has shape \(1, 2\); \(2, 2\) is needed"),
-        ([1.0, 0.0, 0.0, 1.0], "vectors has shape"),
-        ([[1.0, 0.0], [np.nan, 1.0]], "vectors holds a value that is not finite"),
+        ([[1.0, 0.0]], r"vectors .*\(1, 2\).*\(2, 2\)"),
+        ([1.0, 0.0, 0.0, 1.0], r"vectors .*\(4,\)"),
+        ([[1.0, 0.0], [np.nan, 1.0]], "vectors .*finite"),
     ],
 )
 def test_vectors_that_fit_no_modes_are_rejected(vectors: list[list[float]], problem: str) -> None:
@@ -128,7 +128,7 @@ def test_vectors_that_fit_no_modes_are_rejected(vectors: list[list[float]], prob
 
 
 def test_a_cross_frf_without_both_directions_is_rejected() -> None:
-    with pytest.raises(ValueError, match="cross is known, x or y is not"):
+    with pytest.raises(ValueError, match=r"cross .*x or y"):
         zero_order_lobes(PAIR, None, CUT, SPEEDS, PAIR)
-    with pytest.raises(ValueError, match="cross has no modes"):
+    with pytest.raises(ValueError, match=r"cross .*modes"):
         zero_order_lobes(PAIR, PAIR, CUT, SPEEDS, [])

@@ -34,7 +34,7 @@ def test_depth_between_speeds_is_linear_and_takes_the_finite_neighbour() -> None
 
 @pytest.mark.parametrize("speed", [999.0, 4001.0, NAN])
 def test_depth_outside_the_chart_is_rejected(speed: float) -> None:
-    with pytest.raises(ValueError, match=f"{speed:g} rpm is outside the chart \\(1000..4000 rpm\\)"):
+    with pytest.raises(ValueError, match=rf"{speed:g} rpm .*1000\.\.4000 rpm"):
         chart().depth_at([2000.0, speed])
 
 
@@ -56,11 +56,11 @@ def test_cuts_below_the_limit_are_stable() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"depth": np.array([1e-3, NAN, 1e-3, 1e-3])}, "depth\\[1\\]=nan m is not > 0"),
+        ({"depth": np.array([1e-3, NAN, 1e-3, 1e-3])}, "depth\\[1\\]=nan m .*> 0"),
         ({"depth": np.array([1e-3, 1e-3, 0.0, 1e-3])}, "depth\\[2\\]=0.0 m"),
-        ({"depth": np.ones(3)}, "depth has shape \\(3,\\)"),
-        ({"kind": np.array(["hopf"])}, "kind has shape \\(1,\\)"),
-        ({"crossings": np.ones(4)}, "crossings has shape \\(4,\\)"),
+        ({"depth": np.ones(3)}, r"depth .*\(3,\)"),
+        ({"kind": np.array(["hopf"])}, r"kind .*\(1,\)"),
+        ({"crossings": np.ones(4)}, r"crossings .*\(4,\)"),
         ({"speed_rpm": np.array([1.0, 2.0, 3.0, 0.0])}, "speed_rpm\\[3\\]=0.0"),
     ],
 )

@@ -182,7 +182,9 @@ def test_low_immersion_is_warned_of() -> None:
     low = Cut(2, 0.1, "down", 6e8, 2e8)
     for method in (zero_order_lobes, average_angle_lobes):
         (remark,) = method(BENCHMARK, None, low, 18000).remarks
-        assert (remark.code, remark.cure) == ("low-immersion", "use semi-discretisation")
+        assert remark.code == "low-immersion"
+        assert "0.1 " in remark.text
+        assert "semi-discretisation" in remark.cure
     assert zero_order_lobes(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).remarks == ()
     assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).remarks == ()
 
@@ -193,7 +195,7 @@ def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, 
         short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
         (remark,) = short.remarks
         assert remark.code == "chatter-band-missing"
-        assert f"between {band[0]:g} and {band[1]:g} Hz" in remark.text
+        assert f"{band[0]:g} to {band[1]:g} Hz" in remark.text
         assert method(frf(X), frf(Y), CUT, SPEEDS / 4).remarks == ()
 
 
@@ -237,7 +239,7 @@ def test_a_cancelling_force_is_warned_of_at_every_speed_also_where_fast_teeth_ar
     fast = zero_order_lobes(modes, None, cut, np.linspace(4000.0, 20000.0, 20))
     assert codes(fast) == ["force-cancels", "fast-teeth"]
     assert "of the force in x" in fast.remarks[0].text
-    assert "no flip lobes: above 1" in fast.remarks[1].text
+    assert "above 1" in fast.remarks[1].text
     slow = zero_order_lobes(modes, None, cut, np.linspace(4000.0, 5000.0, 5))
     true = stability_boundary(modes, None, cut, slow.speed_rpm, float(np.min(slow.depth)) / 10)
     assert np.max(true.depth) < np.min(slow.depth) / 10

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal import Mode, fit_modes, pick_peaks, synthesize_frf
+from modal import ConjugateError, Mode, fit_modes, pick_peaks, synthesize_frf
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 GOOD = synthesize_frf([Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.02, -4e7)], LINES)
@@ -22,21 +22,21 @@ both = pytest.mark.parametrize("extract", [fit_modes, pick_peaks])
 
 @both
 def test_zeros_are_no_response(extract: Extraction) -> None:
-    with pytest.raises(ValueError, match="zero on every line"):
+    with pytest.raises(ValueError, match=r"zero.*sensor"):
         extract(Frf(LINES, np.zeros(LINES.size, complex)))
 
 
 @both
 @pytest.mark.parametrize("n_lines", [2, 3, 7])
 def test_too_few_lines(extract: Extraction, n_lines: int) -> None:
-    with pytest.raises(ValueError, match=f"{n_lines} lines are too few"):
+    with pytest.raises(ValueError, match=f"{n_lines} lines .*8 lines"):
         extract(Frf(LINES[:n_lines], GOOD.receptance[:n_lines]))
 
 
 @both
 @pytest.mark.parametrize("band", [(5000.0, 6000.0), (2000.0, 1000.0), (1721.0, 1722.0), (np.nan, 2000.0)])
 def test_band_without_lines(extract: Extraction, band: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match="choose a wider band"):
+    with pytest.raises(ValueError, match=rf"{band[0]:g}.*{band[1]:g} Hz"):
         extract(GOOD, band)
 
 
@@ -44,7 +44,7 @@ def test_band_without_lines(extract: Extraction, band: tuple[float, float]) -> N
 @pytest.mark.parametrize("modes", [[Mode(1722.0, 0.03, 3.5e7)], [Mode(700.0, 0.005, -3e7), Mode(1722.0, 0.03, 3.5e7)]])
 def test_conjugated_frf_is_rejected(extract: Extraction, modes: list[Mode]) -> None:
     frf = synthesize_frf(modes, LINES)
-    with pytest.raises(ValueError, match=r"phase rises .* conjugate of receptance"):
+    with pytest.raises(ConjugateError, match=r"numpy\.conj"):
         extract(Frf(LINES, frf.receptance.conj()))
     assert len(extract(Frf(LINES, frf.receptance))) == len(modes)
 
@@ -58,14 +58,14 @@ def test_frf_without_resonance_gives_an_empty_list(extract: Extraction, receptan
 @both
 @pytest.mark.parametrize("lost", [np.abs, np.real])
 def test_magnitude_or_real_part_alone_is_rejected(extract: Extraction, lost: Callable[..., Any]) -> None:
-    with pytest.raises(ValueError, match="phase is missing"):
+    with pytest.raises(ValueError, match="phase"):
         extract(Frf(LINES, lost(GOOD.receptance)))
 
 
 def test_values_that_are_none_are_rejected_by_the_frf() -> None:
-    with pytest.raises(ValueError, match=f"not finite at {LINES.size} lines"):
+    with pytest.raises(ValueError, match=f"{LINES.size} lines"):
         Frf(LINES, np.full(LINES.size, np.nan))
-    with pytest.raises(ValueError, match="coherence must lie between 0 and 1"):
+    with pytest.raises(ValueError, match=r"coherence.* 0 .*1"):
         Frf(LINES, GOOD.receptance, np.full(LINES.size, 1.1))
 
 

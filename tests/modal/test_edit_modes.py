@@ -104,13 +104,13 @@ def test_nothing_stated_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("said", "words"),
     [
-        ({"add": ("3500",)}, "add 3500 Hz: lies outside the lines, 10 to 3198 Hz"),
-        ({"fix": ("5:0.03",)}, "fix 5 Hz at zeta 3 %: lies outside the lines"),
-        ({"add": ("800",)}, "add 800 Hz: no mode fits there"),
-        ({"add": ("1501",)}, "add 1501 Hz: the mode at 1500.* Hz is there already"),
-        ({"fix": ("800:0.01",)}, "fix 800 Hz at zeta 1 %: nothing of it is to be seen there"),
-        ({"drop": ("1520",)}, "drop 1520 Hz: no mode within 1 % of it; there are modes at: 298, 1500 Hz"),
-        ({"drop": ("1500", "1501")}, "drop 1501 Hz: no mode within 1 %"),
+        ({"add": ("3500",)}, "add 3500 Hz: .*10 to 3198 Hz"),
+        ({"fix": ("5:0.03",)}, "fix 5 Hz at zeta 3 %: .*10 to 3198 Hz"),
+        ({"add": ("800",)}, "add 800 Hz: .*fits"),
+        ({"add": ("1501",)}, "add 1501 Hz: .*1500.* Hz.*fix .*drop"),
+        ({"fix": ("800:0.01",)}, "fix 800 Hz at zeta 1 %: .*FRF"),
+        ({"drop": ("1520",)}, "drop 1520 Hz: .*1 %.*298, 1500"),
+        ({"drop": ("1500", "1501")}, "drop 1501 Hz: .*1 %.*298"),
     ],
 )
 def test_what_cannot_be_done_is_rejected_with_what_is_there(said: dict[str, tuple[str, ...]], words: str) -> None:
@@ -121,15 +121,12 @@ def test_what_cannot_be_done_is_rejected_with_what_is_there(said: dict[str, tupl
 @pytest.mark.parametrize(
     ("said", "words"),
     [
-        (
-            {"add": ("298,5",)},
-            "ModeEdits.add 298,5: give the frequency in Hz, as in 298.5; write decimals with a point",
-        ),
-        ({"add": ("",)}, "ModeEdits.add : give the frequency"),
-        ({"drop": ("0",)}, "drop 0: is no frequency > 0"),
-        ({"drop": ("nan",)}, "drop nan: is no frequency > 0"),
-        ({"fix": ("1500",)}, "ModeEdits.fix 1500: give the frequency in Hz and the damping ratio, as in 1500:0.03"),
-        ({"fix": ("1500:3",)}, "fix 1500:3: the damping ratio is not between 0 and 1; 3 % is 0.03"),
+        ({"add": ("298,5",)}, r"ModeEdits.add 298,5: .*298\.5.* point"),
+        ({"add": ("",)}, r"ModeEdits.add : .*298\.5"),
+        ({"drop": ("0",)}, "drop 0: .* 0 Hz"),
+        ({"drop": ("nan",)}, "drop nan: .* 0 Hz"),
+        ({"fix": ("1500",)}, r"ModeEdits.fix 1500: .*1500:0\.03"),
+        ({"fix": ("1500:3",)}, r"fix 1500:3: .*between 0 and 1.* 0\.03"),
         ({"add": ("298", "298.0")}, "298 Hz: add twice"),
         ({"add": ("298",), "drop": ("298",)}, "298 Hz: add and drop"),
     ],

@@ -59,7 +59,7 @@ def test_one_frf_is_allowed_and_different_lines_and_none_are_not() -> None:
     assert [round(mode.frequency) for mode in fit_common_modes([one])] == [900, 1722, 1790]
     with pytest.raises(ValueError, match="no FRF"):
         fit_common_modes([])
-    with pytest.raises(ValueError, match="differ in their frequency lines"):
+    with pytest.raises(ValueError, match="frequency lines"):
         fit_common_modes([one, Frf(LINES[1:], one.receptance[1:])])
 
 
@@ -131,7 +131,7 @@ def test_mac_of_textbook_shapes() -> None:
     assert mac([1, 0], [0, 1]) == 0
     assert mac([1, 1], [1, 0]) == pytest.approx(0.5)
     assert mac([1, 1j], [1j, -1]) == pytest.approx(1.0)
-    with pytest.raises(ValueError, match="over the same points"):
+    with pytest.raises(ValueError, match="points"):
         mac([1, 2], [1, 2, 3])
     with pytest.raises(ValueError, match="zero"):
         mac([0, 0], [1, 2])
@@ -150,7 +150,7 @@ def test_mode_indicator_is_one_at_a_real_mode_alone_and_what_it_is_elsewhere() -
     assert peaks[1] < 0.3
     with pytest.raises(ValueError, match="no FRF"):
         mode_indicator([])
-    with pytest.raises(ValueError, match="differ in their frequency lines"):
+    with pytest.raises(ValueError, match="frequency lines"):
         mode_indicator([frf, *points()])
 
 

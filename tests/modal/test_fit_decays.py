@@ -122,7 +122,7 @@ def test_95_percent_intervals_of_tap_tests_without_force_hold_the_truth(hits: in
 @pytest.mark.parametrize(
     ("decays", "why"),
     [
-        (np.zeros((2, 64)), "nothing but one value"),
+        (np.zeros((2, 64)), "constant"),
         (np.full((1, 64), np.nan), "not finite"),
         (np.ones((1, 8)), "32 samples"),
         (np.ones((2, 3, 64)), "shape"),

@@ -221,7 +221,7 @@ def test_band_and_usable_band_choose_the_lines() -> None:
     frf = from_accelerance(LINES, accelerance(SPINDLE, LINES), usable_band=(5.0, 2300.0))
     assert [round(m.frequency) for m in fit_modes(frf)] == [900, 1722]
     assert [round(m.frequency) for m in fit_modes(frf, (1300.0, 4000.0))] == [1722]
-    with pytest.raises(ValueError, match="holds 0 lines"):
+    with pytest.raises(ValueError, match=r"2500.*4000 Hz"):
         fit_modes(frf, (2500.0, 4000.0))
 
 
@@ -237,5 +237,5 @@ def test_predominant_is_the_largest_peak_of_a_driving_point() -> None:
     assert predominant_mode([soft, damped, opposite], (500.0, 1000.0)) is soft
     assert predominant_mode([soft, damped, opposite], (2000.0, 3000.0)) is None
     assert predominant_mode([]) is None
-    with pytest.raises(ValueError, match="lower frequency first"):
+    with pytest.raises(ValueError, match=r"1000\.\.500 Hz"):
         predominant_mode([soft], (1000.0, 500.0))

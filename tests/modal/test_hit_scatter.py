@@ -100,7 +100,7 @@ def test_hits_of_a_single_frf_of_several_count_without_a_jackknife() -> None:
     some, none = fit_common_modes(frfs, hits=[sets[0], []])[0], fit_common_modes(frfs)[0]
     assert some.jackknife is None
     assert some.fit_error[0] > none.fit_error[0]
-    with pytest.raises(ValueError, match="hits of 1 FRFs for 2"):
+    with pytest.raises(ValueError, match=r"1 .*hits .*2 FRFs"):
         fit_common_modes(frfs, hits=sets[:1])
 
 
@@ -127,7 +127,7 @@ def test_two_hits_have_no_jackknife(n_hits: int) -> None:
 def test_hits_of_another_record_are_rejected(n_hits: int) -> None:
     hits = tap(0, n_hits)
     short = [Hit(hit.force[:4096], hit.acceleration[:4096], EMULATED_SAMPLE_RATE, PRE_TRIGGER) for hit in hits]
-    with pytest.raises(ValueError, match="differ in their frequency lines"):
+    with pytest.raises(ValueError, match=r"hits.*frequency lines"):
         fit_modes(estimate_frf(hits), hits=short)
 
 
@@ -157,7 +157,7 @@ def test_interval_is_students_over_hits_and_with_the_freedom_of_the_fit_without(
     assert of_few_lines.interval()[0] == pytest.approx(1722 + t.ppf([0.025, 0.975], 13) * 2)
     assert over_hits.interval(0.9)[2] == pytest.approx(3.5e7 + t.ppf([0.05, 0.95], 9) * 6e4)
     assert np.all(np.isnan(Mode(1722.0, 0.03, 3.5e7).interval()))
-    with pytest.raises(ValueError, match="not between 0 and 1"):
+    with pytest.raises(ValueError, match=r"level=.* 0 and 1"):
         alone.interval(1.0)
 
 
@@ -168,7 +168,7 @@ def test_freedom_of_a_fit_is_twice_its_lines_less_unknowns() -> None:
 
 
 def test_freedom_is_positive() -> None:
-    with pytest.raises(ValueError, match="freedom=0 is not"):
+    with pytest.raises(ValueError, match="degrees_of_freedom=0"):
         Mode(1722.0, 0.03, 3.5e7, degrees_of_freedom=0)
 
 
@@ -180,9 +180,9 @@ def test_correlation_of_damping_and_stiffness_of_a_driving_point_is_negative() -
 
 
 def test_shape_of_a_covariance_and_hits_of_a_jackknife_are_checked() -> None:
-    with pytest.raises(ValueError, match="jackknife has shape"):
+    with pytest.raises(ValueError, match=r"jackknife .*\(2, 2\)"):
         Mode(1722.0, 0.03, 3.5e7, jackknife=np.eye(2), n_hits=10)
-    with pytest.raises(ValueError, match="at least 2 hits"):
+    with pytest.raises(ValueError, match="n_hits=0"):
         Mode(1722.0, 0.03, 3.5e7, jackknife=np.eye(3))
 
 

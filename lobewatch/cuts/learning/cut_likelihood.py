@@ -138,7 +138,7 @@ def is_setting_taken(
 ) -> bool:
     """Return whether chatter was recorded at a setting (rpm, m) or hardly deeper, and no stable cut there since.
 
-    doubted: cuts that are not believed, which take more.
+    doubted: rejected cuts, which take more.
     """
     return any(
         cut.has_chatter
@@ -240,7 +240,7 @@ def power_distance(cut: CutEvidence, force: Floats, before: Sequence[CutEvidence
     ValueError for a cut without power.
     """
     if cut.power is None:
-        raise ValueError(f"cut {cut.id} has no power; ask for one that has")
+        raise ValueError(f"cut {cut.id} has no power reading")
     shared, precision = np.zeros(force.shape), 1.0
     for other in before:
         if other.power is not None and other.material == cut.material:

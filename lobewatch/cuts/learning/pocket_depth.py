@@ -96,8 +96,8 @@ def apply_test_cuts(verdict: Verdict, tool: Assembly, machine: Machine, cuts: Cu
         return verdict
     found = (chattering or stable)[-1]
     word, what = (Stability.NOT_STABLE, "chatter") if chattering else (Stability.DOUBTFUL, "stable")
-    text = f"cut {found.id} was heard {what} at {1e3 * found.depth:.4g} mm; without K no limit is known beside it"
-    remark = Remark("heard-alone", program.name, text, "tap with a hammer that measures its force")
+    text = f"based only on cut {found.id} ({what} at {1e3 * found.depth:.4g} mm), because K is unknown"
+    remark = Remark("heard-alone", program.name, text, "Tap with an instrumented hammer")
     others = [other for other in verdict.remarks if other.code != NOT_CHECKED_CODE]
     return replace(verdict, stability=word, remarks=(remark, *others))
 

@@ -142,7 +142,7 @@ class NewEvidence(NamedTuple):
 def build_prior(rest: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
     """Build the posterior before the first cut.
 
-    rest: the spindle at rest in the median estimate (a row).
+    rest: the spindle without rotation in the median estimate (a row).
     """
     return Posterior(sample_prior(rest, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
 
@@ -177,7 +177,7 @@ def _refresh(posterior: Posterior) -> Posterior:
 def _joint_log_density(samples: SpindleSamples, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     """Return the log of prior times likelihood of all cuts; -inf where that is not above the least (r,).
 
-    A sample that cannot come to more any more is not asked about further cuts.
+    A sample that cannot come to more any more is not evaluated for further cuts.
     """
     value: Floats = -np.sum(samples.normal**2, axis=1) / 2
     hope = [cut.weight * cut_likelihood.max_log_likelihood(cut) for cut in cuts]
@@ -282,9 +282,9 @@ def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[Inconsiste
     """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, rejected)
     if posterior.is_frequency_unusual:
-        between = f"between {USUAL_FREQUENCY_INTERVAL[0]:g} and {USUAL_FREQUENCY_INTERVAL[1]:g} times it"
-        text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
-        yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
+        usual = f"{USUAL_FREQUENCY_INTERVAL[0]:g} to {USUAL_FREQUENCY_INTERVAL[1]:g} times the tap test"
+        text = f"test cuts give a frequency at speed outside {usual}"
+        yield Remark("frequency-far-off", about, text, "Tap again with a warm spindle, this tool and this stick-out")
 
 
 def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
@@ -297,19 +297,18 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
-    wrong = f"by the other cuts wrong with {100 * contradicting.wrong_probability:.0f} %"
-    kind, out = contradicting.contradiction, "out with folder_updates.exclude_entry"
-    misread = "this or an earlier one misread, another feed, another depth, worn edges?"
+    wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong by the other cuts"
+    kind, exclude = contradicting.contradiction, "exclude it with folder_updates.exclude_entry"
     text = {
-        Contradiction.FREQUENCY: f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
-        Contradiction.CHATTERS: f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
-        Contradiction.STABLE: f"stable {at}, {wrong}: a slip, another depth or speed than told?",
-        Contradiction.POWER: f"its power {at} says another Kt than what was known before: {misread}",
+        Contradiction.FREQUENCY: f"chatter{pitch} {at} (no mode there: workpiece or fixture?)",
+        Contradiction.CHATTERS: f"chatter{pitch} {at} ({wrong}: entry error, workpiece, fixture or worn tool?)",
+        Contradiction.STABLE: f"stable {at} ({wrong}: entry error, other depth or speed?)",
+        Contradiction.POWER: f"power {at} contradicts the known Kt (misread, other feed or depth, worn edges?)",
     }[kind]
     cure = {
-        Contradiction.FREQUENCY: "tap the workpiece where it is cut",
-        Contradiction.CHATTERS: f"cut it again, or take it {out}; tap again if it stays",
-        Contradiction.STABLE: f"cut it again, or take it {out}",
-        Contradiction.POWER: f"read it again, or take the cut whose power was misread {out}; its word counts",
+        Contradiction.FREQUENCY: "Tap the workpiece at the cut",
+        Contradiction.CHATTERS: f"Repeat the cut, or {exclude}. If it chatters again, repeat the tap test.",
+        Contradiction.STABLE: f"Repeat the cut, or {exclude}",
+        Contradiction.POWER: f"Read the power again, or if it was misread, {exclude}. Its stability still counts.",
     }[kind]
-    return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)
+    return Remark("cut-unexplained", cut.id, f"not used: {text}", cure)

@@ -246,7 +246,7 @@ def suggest_cut(
     """Suggest the next test cut, or None if nothing more can be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts
-    that are not believed. One of those within the grid is made again, once, but for a stable one with the
+    that are rejected. One of those within the grid is made again, once, but for a stable one with the
     last cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut
     is worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its
     chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by
@@ -279,7 +279,7 @@ def _find_repeat(
 ) -> CutEvidence | None:
     """Find the cut whose verdict is worth a repetition, or None.
 
-    The last cut makes none again whose word "stable" is not believed: that would gain nothing.
+    The last cut makes none again whose "stable" is rejected: that would gain nothing.
     """
     again = find_cut_to_repeat(cuts, [cut for cut in rejected if cut.has_chatter or left > 1])
     if again is not None or left <= 1:

@@ -38,16 +38,16 @@ def _draw_modes(shaft: Axes, shapes: Axes, study: PaperStudy) -> None:
 
 def _draw_convergence(axes: Axes, study: PaperStudy) -> None:
     looks: tuple[tuple[ElementKind, str, str, str], ...] = (
-        ("linear", "straight lines with shear (as BEAM188)", Paint.ALARM, "s"),
-        ("timoshenko", "cubics with shear", Paint.NEWEST, "o"),
-        ("euler-bernoulli", "cubics without shear", Paint.GOOD, "^"),
+        ("linear", "linear with shear (as BEAM188)", Paint.ALARM, "s"),
+        ("timoshenko", "cubic with shear", Paint.NEWEST, "o"),
+        ("euler-bernoulli", "cubic without shear", Paint.GOOD, "^"),
     )
     for kind, label, colour, mark in looks:
         error = np.array(study.meshes.frequencies[kind]) / study.meshes.exact[kind] - 1
         axes.loglog(ELEMENT_COUNTS, error, color=colour, marker=mark, label=label)
     paper = printed.FEM_FREQUENCY / printed.RIGID_FREQUENCY - 1
     axes.loglog(printed.FEM_ELEMENTS, paper, label="paper: FEM above DSM", **PAPER_MARK)
-    axes.set(xlabel="elements", ylabel="share above the exact f_1 (-)")
+    axes.set(xlabel="number of elements", ylabel="relative error of f1 (-)")
     axes.legend(loc="lower left")
 
 
@@ -62,7 +62,9 @@ def _draw_response(axes: Axes, study: PaperStudy, part: str) -> None:
     frequency, receptance = tap.surrogate_frf.frequency, tap.surrogate_frf.receptance
     axes.plot(frequency, values(receptance), color=Paint.FIRST, ls="--", label=surrogate)
     hits = tap.tapped.in_band(RESPONSE_BAND)
-    axes.plot(hits.frequency, values(hits.receptance), ".", color=Paint.GOOD, ms=5, label="ten emulated hits on it")
+    axes.plot(
+        hits.frequency, values(hits.receptance), ".", color=Paint.GOOD, ms=5, label="surrogate, ten emulated hits"
+    )
     if part == "Re":
         for at, name in zip(tap.extremes, ("omega_A", "omega_B"), strict=True):
             _draw_mark(axes, tap.measured.receptance(np.array([at])).real[0] * 1e6, at, name)
@@ -81,14 +83,14 @@ def _draw_mark(axes: Axes, height: float, frequency: float, name: str) -> None:
 
 def _draw_whirl(axes: Axes, study: PaperStudy, whirl: str, critical: float) -> None:
     plain, shear = (getattr(shaft, whirl) for shaft in (study.plain, study.shear))
-    speed, label = plain.speed_rpm / 1e3, "seen from the shaft, as in the paper"
+    speed, label = plain.speed_rpm / 1e3, "rotating frame, as in the paper"
     axes.plot(speed, plain.rotating_forward[0], color=Paint.NEWEST, lw=1.8, label=label)
-    axes.plot(speed, plain.forward[0], color=Paint.GOOD, lw=1.8, ls="--", label="seen from the housing")
-    label = "the same with shear and gyroscopic moments"
+    axes.plot(speed, plain.forward[0], color=Paint.GOOD, lw=1.8, ls="--", label="fixed frame")
+    label = "both with shear and gyroscopic moments"
     axes.plot(speed, shear.rotating_forward[0], color=Paint.NEWEST, lw=0.9, ls=":")
     axes.plot(speed, shear.forward[0], color=Paint.GOOD, lw=0.9, ls=":", label=label)
     axes.plot(speed, shear.backward[0], color=Paint.GOOD, lw=0.9, ls=":")
-    axes.plot(speed, plain.speed_rpm / 60, color="black", lw=0.8, ls="-.", label="once a revolution")
+    axes.plot(speed, plain.speed_rpm / 60, color="black", lw=0.8, ls="-.", label="once per revolution")
     axes.plot(critical / 1e3, 0, label="critical speed in the paper", clip_on=False, **PAPER_MARK)
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="first frequency (Hz)")
     axes.set(xlim=(0, speed[-1]), ylim=(0, 1.65 * plain.forward[0, 0]))
@@ -121,7 +123,7 @@ def _draw_paper_lobes(axes: Axes, study: PaperStudy) -> None:
         axes.plot(chart.speed_rpm / 1e3, depth, color=colour, ls=dashes, lw=1.5, label=label)
     before, after = ((speed / 1e3, 5.2) for speed in lobes.pocket)
     axes.annotate("", after, before, arrowprops={"arrowstyle": "->", "color": "black", "lw": 1.2})
-    axes.set(xlabel="spindle speed (1000 rpm)", ylabel="limiting depth / lowest limit, new (-)")
+    axes.set(xlabel="spindle speed (1000 rpm)", ylabel="limit depth / lowest limit, new (-)")
     axes.set(xlim=(lobes.new.speed_rpm[0] / 1e3, lobes.new.speed_rpm[-1] / 1e3), ylim=(0, MAX_DEPTH_RATIO))
     axes.legend(loc="upper left")
 
@@ -141,14 +143,14 @@ class PaperFigure(NamedTuple):
 
 RIGID_WHIRL, WHIRL = ("rigid_whirl", printed.RIGID_CRITICAL_SPEED), ("whirl", printed.CRITICAL_SPEED)
 PAPER_FIGURES: Mapping[str, PaperFigure] = {
-    "fig-3": PaperFigure("Fig. 3: the surrogate with its ten bearings, and its first modes", _draw_modes, (), 2),
-    "fig-8": PaperFigure("Fig. 8: the first frequency over the stiffness of each bearing", _draw_stiffness_curve),
-    "convergence": PaperFigure("Finite elements against the exact first frequency", _draw_convergence),
-    "fig-7": PaperFigure("Fig. 7: the first frequency over speed, rigid bearings", _draw_whirl, RIGID_WHIRL),
-    "fig-9": PaperFigure("Fig. 9: the first frequency over speed, bearings calibrated to 1722 Hz", _draw_whirl, WHIRL),
+    "fig-3": PaperFigure("Fig. 3: surrogate with ten bearings, and its first modes", _draw_modes, (), 2),
+    "fig-8": PaperFigure("Fig. 8: first frequency over stiffness of each bearing", _draw_stiffness_curve),
+    "convergence": PaperFigure("Finite elements compared with the exact first frequency", _draw_convergence),
+    "fig-7": PaperFigure("Fig. 7: first frequency over speed, rigid bearings", _draw_whirl, RIGID_WHIRL),
+    "fig-9": PaperFigure("Fig. 9: first frequency over speed, bearings calibrated to 1722 Hz", _draw_whirl, WHIRL),
     "fig-5": PaperFigure("Fig. 5: real part of the receptance at the tool tip", _draw_response, ("Re",)),
-    "fig-6": PaperFigure("Fig. 6: its imaginary part", _draw_response, ("Im",)),
-    "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a fall of f_1 by 10 %", _draw_paper_lobes),
+    "fig-6": PaperFigure("Fig. 6: imaginary part of the receptance at the tool tip", _draw_response, ("Im",)),
+    "fig-10": PaperFigure("Fig. 10: stability lobes, new and after a drop of f1 by 10 %", _draw_paper_lobes),
 }
 """Figures 3 and 5 to 10, and the convergence of the finite elements, by file name."""
 
@@ -161,9 +163,9 @@ def render_paper_page(study: PaperStudy) -> str:
 
 
 def write_paper_page(study: PaperStudy, folder: Path) -> Path:
-    """Write the page, and its figures in `images`, into a folder, made where it is not there; DataError for a file."""
+    """Write the page, and its figures in `images`, into a folder, made if missing; DataError for a file."""
     if folder.exists() and not folder.is_dir():
-        raise DataError(f"{folder}: is a file; name a folder with --out")
+        raise DataError(f"{folder}: not a folder. Name a folder with --out.")
     make_folder(folder / "images")
     for name, picture in PAPER_FIGURES.items():
         figure, axes = new_axes(picture.rows, PAPER_FIGURE_SIZES[picture.rows])

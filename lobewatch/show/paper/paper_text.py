@@ -27,14 +27,14 @@ def paper_json(study: PaperStudy, page: Path | None) -> JsonObject:
 
 def paper_lines(study: PaperStudy, width: int) -> Iterator[str]:
     """Return a table of all numbers with reasons, and the claims, in lines of this width (characters)."""
-    yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, beside a surrogate of the"
-    yield "spindle (its drawing is not public): fitted to the frequencies in the paper."
+    yield "Gaber & Hashemi, Shock and Vibration 2016, 4390185, compared with a surrogate"
+    yield "spindle fitted to the paper's frequencies (its drawing is not public)."
     for section in study.sections:
-        yield from ("", section.title, _table_line(("", "place", "paper", "ours", "unit", "differs")))
+        yield from ("", section.title, _table_line(("", "source", "paper", "ours", "unit", "deviation")))
         for row in section.comparisons:
             yield _table_line(paper_cells(row))
             yield from _indent(row.reason, width)
-    yield from ("", "What the paper claims, and whether it holds on the surrogate")
+    yield from ("", "Claims of the paper, tested on the surrogate")
     for claim in study.claims:
         yield from textwrap.wrap(f"{claim.verdict}: {claim.text}", width)
         yield from _indent(claim.evidence, width)

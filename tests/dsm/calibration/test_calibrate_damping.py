@@ -157,7 +157,7 @@ def test_light_damping_is_that_of_first_order(dampers: list[float], eta: float) 
 
 
 def test_a_mode_that_stops_oscillating_is_no_mode() -> None:
-    with pytest.raises(ArithmeticError, match=r"mode 2 is lost at a damping ratio of (0\.9|1).* smaller dampers"):
+    with pytest.raises(ArithmeticError, match=r"mode 2 .* damping ratio of (0\.9|1)"):
         damped_modes(two_bodies(1.1 * W0 * MASS), 2)
 
 
@@ -180,7 +180,7 @@ def test_bad_loss_factors_are_rejected(eta: float) -> None:
 
 
 def test_free_shafts_and_no_modes_are_rejected() -> None:
-    with pytest.raises(ValueError, match="held by 0"):
+    with pytest.raises(ValueError, match="0 bearing"):
         damped_modes(replace(stepped((0, 0, 0)), bearings=[]), 1)
     with pytest.raises(ValueError, match="0 modes"):
         damped_modes(stepped((0, 0, 0)), 0)
@@ -235,7 +235,7 @@ def test_report() -> None:
 @pytest.mark.parametrize(("group", "mode"), [("front", 1), ("front", 2)])
 def test_more_than_a_damper_can_give_is_rejected_with_the_most_it_can(group: str, mode: int) -> None:
     spindle = stepped((0, 0, 0))
-    with pytest.raises(UnreachableDampingError, match=rf"damping_ratio=0\.9 of mode {mode} is out of reach: ") as error:
+    with pytest.raises(UnreachableDampingError, match=rf"damping_ratio=0\.9 of mode {mode} .*loss_factor") as error:
         calibrate_damping(spindle, 0.9, mode=mode, group=group)
     most = error.value.limit
     dampers = np.geomspace(9e4, 1.5e5, 50)
@@ -259,14 +259,12 @@ def test_a_bearing_in_a_node_of_the_mode_cannot_damp_it() -> None:
     """A symmetric shaft whose mode 2 has its node at the middle bearing."""
     bearings = [Bearing(z, 1e8, group=g) for z, g in ((0.1, "ends"), (0.25, "middle"), (0.4, "ends"))]
     spindle = Spindle([Segment(0.5, 0.05)], bearings)
-    with pytest.raises(UnreachableDampingError, match=r"damping_ratio=0\.01 of mode 2 is out of reach"):
+    with pytest.raises(UnreachableDampingError, match=r"damping_ratio=0\.01 of mode 2 .*loss_factor"):
         calibrate_damping(spindle, 0.01, mode=2, group="middle")
 
 
 def test_other_damping_above_the_measured_one_is_rejected() -> None:
-    with pytest.raises(
-        UnreachableDampingError, match=r"damping_ratio=0\.004 of mode 1 leaves nothing .* 0\.00499"
-    ) as error:
+    with pytest.raises(UnreachableDampingError, match=r"damping_ratio=0\.004 of mode 1 .* 0\.00499") as error:
         calibrate_damping(stepped((0, 0, 0)), 0.004, loss_factor=0.01)
     assert error.value.limit == pytest.approx(0.005, rel=1e-3)
 
@@ -274,14 +272,14 @@ def test_other_damping_above_the_measured_one_is_rejected() -> None:
 @pytest.mark.parametrize(
     ("dampers", "arguments", "message"),
     [
-        ((0, 0, 0), {"damping_ratio": 0.0}, r"damping_ratio=0\.0 is not between 0 and 1"),
+        ((0, 0, 0), {"damping_ratio": 0.0}, r"damping_ratio=0\.0 .*0 and 1"),
         ((0, 0, 0), {"damping_ratio": math.nan}, "damping_ratio=nan"),
         ((0, 0, 0), {"damping_ratio": 1.0}, r"damping_ratio=1\.0"),
         ((0, 0, 0), {"damping_ratio": 0.1, "damping_ratio_std": -1.0}, r"damping_ratio_std=-1\.0"),
-        ((0, 0, 0), {"damping_ratio": 0.1, "mode": 0}, "mode=0 is not at least 1"),
-        ((0, 0, 0), {"damping_ratio": 0.1, "group": "tool"}, "no bearing of group 'tool' .* 'front', 'rear'"),
+        ((0, 0, 0), {"damping_ratio": 0.1, "mode": 0}, "mode=0 .*1"),
+        ((0, 0, 0), {"damping_ratio": 0.1, "group": "tool"}, "group 'tool' .* 'front', 'rear'"),
         ((0, 0, 0), {"damping_ratio": 0.1, "loss_factor": -1.0}, r"loss_factor=-1\.0"),
-        ((1, 0, 1), {"damping_ratio": 0.1}, "2 of the 3 bearings to calibrate have damping; give it to all"),
+        ((1, 0, 1), {"damping_ratio": 0.1}, "2 of 3 bearings .*damping"),
     ],
 )
 def test_bad_input_of_the_calibration_is_rejected(

@@ -56,7 +56,7 @@ def test_without_a_name_joints_stay_as_given() -> None:
 
 def test_a_frequency_that_no_joint_can_give_is_rejected_with_its_range() -> None:
     shaft = spindle([Joint(0.08, 1e8, 1e5, group="holder")])
-    with pytest.raises(UnreachableFrequencyError, match="no bearing stiffness puts mode 3 at 9999 Hz") as error:
+    with pytest.raises(UnreachableFrequencyError, match="mode 3 at 9999 Hz") as error:
         calibrate(shaft, 9999.0, mode=3, group="holder")
     rigid = natural_frequencies(replace(shaft, joints=()), 3)[-1]
     assert error.value.reachable[1] == pytest.approx(rigid, rel=1e-9)

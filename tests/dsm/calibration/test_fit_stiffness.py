@@ -202,17 +202,17 @@ TWO = natural_frequencies(shaft(), 2)
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"frequency": TWO}, r"2 measured mode\(s\) cannot give the stiffness of 3 groups \(front, rear, holder\)"),
-        ({"frequency": TWO, "groups": ["tool"]}, "group 'tool' is none .* 'front', 'rear', 'holder'"),
-        ({"frequency": TWO, "groups": []}, "no group .* was named; groups of this spindle: 'front'"),
-        ({"frequency": TWO, "groups": ["rear", "rear"]}, "group 'rear' is named 2 times"),
+        ({"frequency": TWO}, r"2 measured mode\(s\) .* 3 groups \(front, rear, holder\)"),
+        ({"frequency": TWO, "groups": ["tool"]}, "group 'tool'.* 'front', 'rear', 'holder'"),
+        ({"frequency": TWO, "groups": []}, "no group .*: 'front'"),
+        ({"frequency": TWO, "groups": ["rear", "rear"]}, "group 'rear' .* 2 times"),
         ({"frequency": [100.0, math.nan], "groups": ["rear"]}, "frequency=nan Hz"),
-        ({"frequency": [0.0, 100.0], "groups": ["rear"]}, "frequency=0 Hz is not > 0"),
-        ({"frequency": TWO[::-1], "groups": ["rear"]}, "does not rise with the number of the mode"),
-        ({"frequency": TWO, "frequency_std": [1.0], "groups": ["rear"]}, "frequency_std=.* for each of 2 modes"),
+        ({"frequency": [0.0, 100.0], "groups": ["rear"]}, "frequency=0 Hz .*> 0"),
+        ({"frequency": TWO[::-1], "groups": ["rear"]}, r"frequency=\[.* Hz .*\[1 2\]"),
+        ({"frequency": TWO, "frequency_std": [1.0], "groups": ["rear"]}, "frequency_std=.* 2 modes"),
         ({"frequency": TWO, "frequency_std": [1.0, 0.0], "groups": ["rear"]}, "frequency_std=.* > 0"),
         ({"frequency": TWO, "frequency_std": [1.0, math.nan], "groups": ["rear"]}, "frequency_std="),
-        ({"frequency": TWO, "mode": [1], "groups": ["rear"]}, r"mode=\[1\] is not one number"),
+        ({"frequency": TWO, "mode": [1], "groups": ["rear"]}, r"mode=\[1\] .* 2 modes"),
         ({"frequency": TWO, "mode": [0, 1], "groups": ["rear"]}, r"mode=\[0, 1\]"),
         ({"frequency": TWO, "mode": [2, 2], "groups": ["rear"]}, r"mode=\[2, 2\]"),
         ({"frequency": TWO, "mode": [1.0, 2.5], "groups": ["rear"]}, r"mode=\[1\.0, 2\.5\]"),
@@ -225,13 +225,13 @@ def test_bad_input_is_rejected(arguments: dict[str, Any], message: str) -> None:
 
 def test_rigid_bearings_are_rejected_by_number() -> None:
     spindle = replace(shaft(), bearings=[*shaft().bearings[:2], Bearing(0.45, math.inf, group="rear")])
-    with pytest.raises(ValueError, match=r"bearing 3: stiffness=inf .* leave its group 'rear' out"):
+    with pytest.raises(ValueError, match=r"bearing 3: stiffness=inf .* group 'rear'"):
         fit_stiffness(spindle, TWO, groups=["front", "rear"])
 
 
 def test_a_frequency_out_of_reach_is_rejected_with_its_range() -> None:
     with pytest.raises(
-        UnreachableFrequencyError, match=r"puts mode 2 at 9999 Hz: it lies between .* Hz; check"
+        UnreachableFrequencyError, match=r"front, rear .*mode 2 at 9999 Hz.* \d+\.\d to \d+\.\d Hz"
     ) as error:
         fit_stiffness(shaft(), [float(TWO[0]), 9999.0], groups=["front", "rear"])
     low, high = error.value.reachable
@@ -243,7 +243,7 @@ def test_frequencies_that_exclude_each_other_keep_the_best_estimate() -> None:
     spindle = shaft()
     low = natural_frequencies(shaft(rear=1e5), 2)[0]
     high = natural_frequencies(shaft(front=1e12, rear=1e12), 2)[1]
-    with pytest.raises(StiffnessFitError, match="no stiffness was found that fits") as error:
+    with pytest.raises(StiffnessFitError, match=r"front .* rear .* Hz") as error:
         fit_stiffness(spindle, [low, 0.99 * high], groups=["front", "rear"])
     assert error.value.best.factor.shape == (2,)
     assert np.max(np.abs(error.value.best.residual)) > 1
@@ -297,7 +297,7 @@ def test_a_second_solution_is_reported() -> None:
     found = fit_stiffness(scale_groups(truth, {"front": 0.5, "rear": 2.0}), exact, 3e-3 * exact)
     assert found.factor * [0.5, 2.0] == pytest.approx([0.466, 2.29], abs=0.01)
     assert [(remark.code, remark.about) for remark in found.remarks] == [("stiffness-ambiguous", "front, rear")]
-    assert "factors 2, 0.5" in str(found.remarks[0])
+    assert "2, 0.5" in str(found.remarks[0])
 
 
 def test_a_solution_that_fits_much_better_is_taken() -> None:
@@ -322,7 +322,7 @@ def test_an_interval_that_holds_too_little_is_reported() -> None:
     start = scale_groups(truth, dict(zip(("front", "rear"), away.tolist(), strict=True)))
     found = fit_stiffness(start, exact * (1 + 3e-3 * noise), 3e-3 * exact)
     assert codes(found) == {"stiffness-ambiguous"}
-    (held,) = re.findall(r"holds (\d+) %", str(found.remarks[0]))
+    (held,) = re.findall(r"(\d+) %", str(found.remarks[0]))
     assert int(held) < 50
 
 
@@ -346,7 +346,7 @@ def test_a_narrow_valley_next_to_a_wide_range_that_fits_too_is_reported(draws: i
     found = fit_stiffness(worn_six_and_four(1.0, 1.0), measured, 3e-3 * measured)
     assert found.factor == pytest.approx([0.61, 0.285], abs=0.01)
     assert [(remark.code, remark.about) for remark in found.remarks] == [("stiffness-ambiguous", "rear")]
-    (times,) = re.findall(r"fit \S+ to (\S+) times what was found", str(found.remarks[0]))
+    (times,) = re.findall(r"to (\S+) times", str(found.remarks[0]))
     assert 0.285 * float(times) > 0.8
 
 

@@ -115,7 +115,8 @@ def test_a_joint_that_no_mode_feels_is_open(seed: int) -> None:
     assert fit.open_groups == {HOLDER, TILTING}
     assert codes(fit) >= {"group-not-felt"}
     assert not fit.has_misfit
-    assert f"stiffness {HOLDER}          open" in str(fit)
+    (row,) = (line for line in str(fit).splitlines() if line.startswith(f"stiffness {HOLDER}  "))
+    assert "factor" not in row
     assert fit.factor[0] == pytest.approx(1.0, abs=0.01)
 
 
@@ -130,7 +131,7 @@ def test_tools_of_two_spindles_do_not_fit_one() -> None:
 @pytest.mark.parametrize("shaft", [None, [0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 2], [0, 1], [0.0, 0, 0, 1, 1, 1]])
 def test_which_spindle_must_be_named(shaft: list[int] | None) -> None:
     *two, _ = tools(np.random.default_rng(4))
-    with pytest.raises(ValueError, match="does not say for each of 6 modes on which of 2 spindles"):
+    with pytest.raises(ValueError, match=r"shaft=.* 0 to 1.* 6 modes"):
         fit_stiffness(two, **(measured(two) | {"shaft": shaft}))
 
 

@@ -100,19 +100,19 @@ def test_nothing_moves_where_a_rigid_bearing_stands() -> None:
 
 def test_refusals() -> None:
     for factor in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match=r"factor=.* is not a finite number > 0"):
+        with pytest.raises(ValueError, match=r"factor=.* > 0"):
             receptance_map(spindle(), F, [1.0, factor])
     for shape in ((0,), (2, 2)):
-        with pytest.raises(ValueError, match="factor has shape"):
+        with pytest.raises(ValueError, match=r"factor .*shape \("):
             receptance_map(spindle(), F, np.ones(shape))
-    with pytest.raises(ValueError, match="no bearing of group 'middle'"):
+    with pytest.raises(ValueError, match="group 'middle'"):
         receptance_map(spindle(), F, 1.0, group="middle")
-    with pytest.raises(ValueError, match="stiffness=inf cannot be calibrated"):
+    with pytest.raises(ValueError, match="stiffness=inf"):
         receptance_map(replace(spindle(), bearings=[*spindle().bearings, Bearing(0.2, math.inf)]), F, 1.0)
     with pytest.raises(ValueError, match="frequency=-1"):
         receptance_map(spindle(), [-1.0], 1.0)
     with pytest.raises(ValueError, match="loss_factor=-1"):
         receptance_map(spindle(), F, 1.0, loss_factor=-1.0)
-    with pytest.raises(ValueError, match="held by 1 bearing"):
+    with pytest.raises(ValueError, match="1 bearing"):
         receptance_map(replace(spindle(), bearings=spindle().bearings[:1]), F, 1.0)
     assert receptance_map(spindle(), [], FACTORS).shape == (5, 0)

@@ -27,7 +27,8 @@ def first(spindle: Spindle) -> float:
 def test_preload_left_is_the_range_of_the_radial_exponents(factor: float, low: float, high: float) -> None:
     found = calibrate(SPINDLE, first(scaled(factor)))
     assert found.remaining_preload == pytest.approx((low, high), abs=1e-3)
-    assert "if the bearings have balls (by stiffness to the power of 3.1 to 3.7)" in str(found.remaining_preload)
+    text = str(found.remaining_preload)
+    assert all(fact in text for fact in (f"{100 * low:.0f}", f"{100 * high:.0f} %", "ball", "3.1", "3.7"))
 
 
 def jones(angle: float, deflection: float) -> tuple[float, float, float]:
@@ -60,7 +61,7 @@ def test_rollers_say_nothing_of_it() -> None:
     found = calibrate(rollers, first(scaled(0.58)))
     assert found.remaining_preload is None
     assert "preload" not in str(found)
-    with pytest.raises(ValueError, match="bearing 1: rolling_elements='needles' is none of balls, rollers"):
+    with pytest.raises(ValueError, match=r"bearing 1: rolling_elements='needles' .* balls, rollers"):
         replace(SPINDLE, bearings=[replace(b, rolling_elements="needles") for b in SPINDLE.bearings])  # type: ignore[arg-type]
 
 

@@ -134,7 +134,7 @@ def test_a_pinned_beam_holds_its_energy_evenly_about_its_middle() -> None:
 
 
 def test_a_shaft_not_held_has_no_shares() -> None:
-    with pytest.raises(ValueError, match=r"held by 0 bearing\(s\)"):
+    with pytest.raises(ValueError, match=r"0 bearing\(s\)"):
         energy_shares(Spindle([Segment(0.4, 0.05)], []), 2)
 
 
@@ -192,7 +192,7 @@ def test_places_may_come_in_any_order_and_a_joint_has_two_sides() -> None:
     assert abs(modes.slope[0, 2] - modes.slope[0, 3]) > 0.1 * np.max(np.abs(modes.slope[0]))
 
 
-@pytest.mark.parametrize(("places", "message"), [([0.6], r"places holds 0\.6 m"), ([math.nan], "nan"), (0.1, "1-D")])
+@pytest.mark.parametrize(("places", "message"), [([0.6], r"places .*0\.6 m"), ([math.nan], "nan"), (0.1, "1-D")])
 def test_places_off_the_shaft_are_rejected(places: object, message: str) -> None:
     spindle = Spindle([Segment(0.5, 0.05)], [Bearing(0.1, 1e8), Bearing(0.4, 1e8)])
     with pytest.raises(ValueError, match=message):

@@ -54,7 +54,7 @@ def test_a_rigid_rotor_on_two_springs() -> None:
     assert 2 * math.pi * found.backward[:, 0] == pytest.approx(sorted([bounce, root - half]), rel=1e-5)
     # With I_p > I_d pitch stays ahead of the speed, and only bounce has a critical speed.
     assert critical_speed(rotor) == pytest.approx(bounce * 30 / math.pi, rel=1e-5)
-    with pytest.raises(ArithmeticError, match="mode 2 has no critical speed up to"):
+    with pytest.raises(ArithmeticError, match=r"mode 2 .*\d rpm"):
         critical_speed(rotor, 2)
 
 
@@ -117,10 +117,10 @@ def test_polar_inertia_of_the_shaft_is_twice_its_diametral_inertia() -> None:
 @pytest.mark.parametrize(
     ("speed", "message"),
     [
-        ([-1.0], r"speed_rpm=-1\.0 rpm is not a finite number >= 0"),
+        ([-1.0], r"speed_rpm=-1\.0 rpm .*>= 0"),
         ([math.nan], "speed_rpm=nan"),
-        ([], r"speed_rpm has shape \(0,\)"),
-        ([[1.0]], r"speed_rpm has shape \(1, 1\)"),
+        ([], r"speed_rpm .*\(0,\)"),
+        ([[1.0]], r"speed_rpm .*\(1, 1\)"),
     ],
 )
 def test_bad_speeds_are_rejected(speed: list[float], message: str) -> None:
@@ -130,9 +130,9 @@ def test_bad_speeds_are_rejected(speed: list[float], message: str) -> None:
 
 def test_what_is_not_held_has_no_whirl_map_and_no_critical_speed() -> None:
     free = replace(PLAIN, bearings=PLAIN.bearings[:1])
-    with pytest.raises(ValueError, match=r"held by 1 bearing\(s\)"):
+    with pytest.raises(ValueError, match=r"1 bearing\(s\)"):
         whirl_map(free, [1000.0], 2)
-    with pytest.raises(ValueError, match="mode=0 is not at least 1"):
+    with pytest.raises(ValueError, match=r"mode=0 .*1"):
         critical_speed(PLAIN, 0)
     with pytest.raises(ValueError, match="0 modes"):
         whirl_map(PLAIN, [1000.0], 0)

@@ -35,16 +35,16 @@ SPINDLE = Spindle(PARTS, BEARINGS)
 @pytest.mark.parametrize(
     ("segment", "message"),
     [
-        (Segment(0.0, 0.05), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
-        (Segment(0.0, 0.05, end_outer_diameter=0.06), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
+        (Segment(0.0, 0.05), r"segment 3: length=0\.0 .* > 0 \(m\)"),
+        (Segment(0.0, 0.05, end_outer_diameter=0.06), r"segment 3: length=0\.0 .* > 0 \(m\)"),
         (Segment(math.nan, 0.05), "segment 3: length=nan"),
         (Segment(0.1, -0.05), r"segment 3: outer_diameter=-0\.05"),
         (Segment(0.1, math.inf), "segment 3: outer_diameter=inf"),
         (Segment(0.1, 0.05, 0.05), r"segment 3: bore_diameter=0\.05 m is not .* outer_diameter=0\.05"),
         (Segment(0.1, 0.05, -0.01), r"segment 3: bore_diameter=-0\.01"),
         (Segment(0.1, 0.05, math.nan), "segment 3: bore_diameter=nan"),
-        (Segment(0.0, 0.05, end_outer_diameter=0.04), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
-        (Segment(0.1, 0.05, end_outer_diameter=0.0), r"segment 3: end_outer_diameter=0\.0 is not a finite number > 0"),
+        (Segment(0.0, 0.05, end_outer_diameter=0.04), r"segment 3: length=0\.0 .* > 0 \(m\)"),
+        (Segment(0.1, 0.05, end_outer_diameter=0.0), r"segment 3: end_outer_diameter=0\.0 .* > 0"),
         (Segment(0.1, 0.05, end_outer_diameter=math.nan), "segment 3: end_outer_diameter=nan"),
         (
             Segment(0.1, 0.05, 0.03, end_outer_diameter=0.02),
@@ -59,7 +59,7 @@ SPINDLE = Spindle(PARTS, BEARINGS)
         (Segment(0.1, 0.05, 0.03, mass_diameter=0.02), r"segment 3: bore_diameter=0\.03 .* mass_diameter=0\.02"),
         (
             Segment(0.1, 0.05, mass_diameter=0.06, end_outer_diameter=0.04),
-            "mass_diameter=0.06 m is for uniform segments",
+            "segment 3: mass_diameter=0.06 m .*cone",
         ),
     ],
 )
@@ -71,11 +71,11 @@ def test_segments_are_rejected_by_number(segment: Segment, message: str) -> None
 @pytest.mark.parametrize(
     ("bearing", "message"),
     [
-        (Bearing(0.6, 1e8), r"bearing 3: position=0\.6 m is off the shaft, 0 to 0\.5 m"),
+        (Bearing(0.6, 1e8), r"bearing 3: position=0\.6 m .*0 to 0\.5 m"),
         (Bearing(-0.1, 1e8), r"bearing 3: position=-0\.1 m"),
         (Bearing(math.nan, 1e8), "bearing 3: position=nan"),
-        (Bearing(0.4, 1e8), r"bearing 3: position=0\.4 m is that of bearing 2"),
-        (Bearing(0.4 + 1e-13, 1e8), r"bearing 3: position=0\.4.* m is that of bearing 2; put both into"),
+        (Bearing(0.4, 1e8), r"bearing 3: position=0\.4 m .*bearing 2"),
+        (Bearing(0.4 + 1e-13, 1e8), r"bearing 3: position=0\.4.* m .*bearing 2"),
         (Bearing(0.2, 0.0), r"bearing 3: stiffness=0\.0 .* \(N/m\)"),
         (Bearing(0.2, math.nan), "bearing 3: stiffness=nan"),
         (Bearing(0.2, 1e8, damping=-1.0), r"bearing 3: damping=-1\.0 .* \(N s/m\)"),
@@ -91,13 +91,13 @@ def test_bearings_are_rejected_by_number(bearing: Bearing, message: str) -> None
 @pytest.mark.parametrize(
     ("mass", "message"),
     [
-        (LumpedMass(0.6, 1.0), r"mass 2: position=0\.6 m is off the shaft, 0 to 0\.5 m"),
-        (LumpedMass(0.25, 1.0), r"mass 2: position=0\.25 m is that of mass 1; put both into one mass"),
-        (LumpedMass(0.3, -1.0), r"mass 2: mass=-1\.0 is not a finite number >= 0 \(kg\)"),
+        (LumpedMass(0.6, 1.0), r"mass 2: position=0\.6 m .*0 to 0\.5 m"),
+        (LumpedMass(0.25, 1.0), r"mass 2: position=0\.25 m .*mass 1"),
+        (LumpedMass(0.3, -1.0), r"mass 2: mass=-1\.0 .* >= 0 \(kg\)"),
         (LumpedMass(0.3, math.nan), "mass 2: mass=nan"),
         (LumpedMass(0.3, math.inf), "mass 2: mass=inf"),
         (LumpedMass(0.3, 1.0, -1e-3), r"mass 2: diametral_inertia=-0\.001"),
-        (LumpedMass(0.3, 1.0, 1e-3, 3e-3), r"mass 2: polar_inertia=0\.003 kg m\^2 is larger than twice"),
+        (LumpedMass(0.3, 1.0, 1e-3, 3e-3), r"mass 2: polar_inertia=0\.003 kg m\^2 .*diametral_inertia=0\.001"),
     ],
 )
 def test_masses_are_rejected_by_number(mass: LumpedMass, message: str) -> None:
@@ -108,12 +108,12 @@ def test_masses_are_rejected_by_number(mass: LumpedMass, message: str) -> None:
 @pytest.mark.parametrize(
     ("joint", "message"),
     [
-        (Joint(0.0, 1e9, 1e6), r"joint 1: position=0\.0 m is an end of the shaft"),
-        (Joint(0.5, 1e9, 1e6), r"joint 1: position=0\.5 m is an end of the shaft"),
-        (Joint(0.6, 1e9, 1e6), r"joint 1: position=0\.6 m is off the shaft"),
-        (Joint(0.4, 1e9, 1e6), r"joint 1: position=0\.4 m is that of bearing 2; move the bearing"),
-        (Joint(0.25, 1e9, 1e6), r"joint 1: position=0\.25 m is that of mass 1; move the mass"),
-        (Joint(0.3, 0.0, 1e6), r"joint 1: stiffness=0\.0 is not a finite number > 0 \(N/m\)"),
+        (Joint(0.0, 1e9, 1e6), r"joint 1: position=0\.0 m .*end"),
+        (Joint(0.5, 1e9, 1e6), r"joint 1: position=0\.5 m .*end"),
+        (Joint(0.6, 1e9, 1e6), r"joint 1: position=0\.6 m .*0 to 0\.5 m"),
+        (Joint(0.4, 1e9, 1e6), r"joint 1: position=0\.4 m .*bearing 2"),
+        (Joint(0.25, 1e9, 1e6), r"joint 1: position=0\.25 m .*mass 1"),
+        (Joint(0.3, 0.0, 1e6), r"joint 1: stiffness=0\.0 .* > 0 \(N/m\)"),
         (Joint(0.3, math.inf, 1e6), "joint 1: stiffness=inf"),
         (Joint(0.3, 1e9, math.nan), r"joint 1: rotational_stiffness=nan .* \(N m/rad\)"),
     ],
@@ -126,7 +126,7 @@ def test_joints_are_rejected_by_number(joint: Joint, message: str) -> None:
 @pytest.mark.parametrize(
     ("constants", "message"),
     [
-        ((210e9, 7850.0, 60e9), r"shear_modulus=6e\+10 Pa gives Poisson's ratio 0\.75 .* between -1 and 0\.5"),
+        ((210e9, 7850.0, 60e9), r"shear_modulus=6e\+10 Pa .*0\.75.* -1 and 0\.5"),
         ((0.0, 7850.0, 80e9), "youngs_modulus=0.0"),
         ((210e9, math.nan, 80e9), "density=nan"),
         ((210e9, 7850.0, math.inf), "shear_modulus=inf"),
@@ -140,12 +140,12 @@ def test_impossible_materials_are_rejected(constants: tuple[float, float, float]
 def test_a_spindle_of_an_impossible_shear_modulus_is_rejected() -> None:
     with pytest.raises(ValueError, match=r"shear_modulus=-1\.0"):
         Spindle(PARTS, BEARINGS, shear_modulus=-1.0)
-    with pytest.raises(ValueError, match=r"Poisson's ratio 0\.75"):
+    with pytest.raises(ValueError, match=r"Poisson.* 0\.75"):
         natural_frequencies(Spindle(PARTS, BEARINGS, theory="timoshenko", shear_modulus=60e9), 1)
 
 
 def test_too_many_segments_are_rejected() -> None:
-    with pytest.raises(ValueError, match="501 segments were given; a spindle has 1 to 500 of them"):
+    with pytest.raises(ValueError, match=r"501 segments .*1 to 500"):
         Spindle([Segment(0.001, 0.05)] * 501, BEARINGS)
 
 
@@ -165,7 +165,7 @@ def test_slender_and_stubby_shafts_get_right_modes(slenderness: float, theory: T
 
 
 def test_a_spindle_needs_segments_and_a_material() -> None:
-    with pytest.raises(ValueError, match=r"0 segments were given; a spindle has 1 to 500"):
+    with pytest.raises(ValueError, match=r"0 segments .*1 to 500"):
         Spindle([], BEARINGS)
     with pytest.raises(ValueError, match=r"youngs_modulus=-1\.0 .* \(Pa\)"):
         Spindle(PARTS, BEARINGS, youngs_modulus=-1.0)
@@ -174,7 +174,7 @@ def test_a_spindle_needs_segments_and_a_material() -> None:
 
 
 def test_an_unknown_theory_is_rejected_by_name() -> None:
-    with pytest.raises(ValueError, match="theory='rayleigh' is none of euler-bernoulli"):
+    with pytest.raises(ValueError, match=r"theory='rayleigh' .*euler-bernoulli"):
         Spindle(PARTS, BEARINGS, theory="rayleigh")  # type: ignore[arg-type]
 
 
@@ -197,7 +197,7 @@ def test_a_spindle_is_plain_frozen_data() -> None:
     ],
 )
 def test_a_shaft_that_can_move_freely_is_rejected(ask: Callable[[Spindle], object]) -> None:
-    with pytest.raises(ValueError, match=r"held by 1 bearing\(s\).* at least two"):
+    with pytest.raises(ValueError, match=r"1 bearing\(s\).*two"):
         ask(Spindle(PARTS, BEARINGS[:1]))
 
 
@@ -213,7 +213,7 @@ def test_one_bearing_is_enough_for_natural_frequencies_and_receptance() -> None:
     [
         (lambda: natural_frequencies(SPINDLE, 0), "0 modes"),
         (lambda: modal_stiffness(SPINDLE, 0), "mode=0"),
-        (lambda: modal_stiffness(SPINDLE, 1, 0.7), r"position=0\.7 m is off the shaft, which spans 0 to 0\.5 m"),
+        (lambda: modal_stiffness(SPINDLE, 1, 0.7), r"position=0\.7 m .*0 to 0\.5 m"),
         (lambda: static_stiffness(SPINDLE, math.nan), "position=nan"),
         (lambda: receptance(SPINDLE, [10.0, -1.0]), r"frequency=-1\.0 Hz"),
         (lambda: receptance(SPINDLE, [math.nan]), "frequency=nan"),
@@ -257,7 +257,7 @@ def test_no_frequencies_give_no_receptance() -> None:
     "ask", [lambda: natural_frequencies(SPINDLE, 400), lambda: calibrate(SPINDLE, 500.0, mode=200)]
 )
 def test_hundreds_of_modes_are_rejected(ask: Callable[[], object]) -> None:
-    with pytest.raises(ValueError, match=r"1.* to 100"):
+    with pytest.raises(ValueError, match=r"1.* 100"):
         ask()
 
 

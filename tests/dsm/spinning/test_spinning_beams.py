@@ -97,7 +97,7 @@ def test_one_mode_clamped_at_both_ends(spin: float) -> None:
 
 @pytest.mark.parametrize(("spin", "growing"), [(3.6, 1), (7.0, 1), (30.0, 1), (100.0, 1)])
 def test_modes_between_the_critical_speeds_of_the_planes_grow(spin: float, growing: int) -> None:
-    with pytest.raises(UnstableSpinError, match=rf"{growing} mode\(s\) grow") as caught:
+    with pytest.raises(UnstableSpinError, match=rf"^{growing} mode\(s\)") as caught:
         angular(unit_beam(4.0, CLAMPED), 4, spin)
     assert caught.value.unstable == caught.value.proved == growing
     expected = closed_form(CANTILEVER, 4.0, spin)[:4]
@@ -114,7 +114,7 @@ def test_two_modes_grow_where_the_planes_are_far_apart() -> None:
 
 @pytest.mark.parametrize("spin", [CANTILEVER[0], 2 * CANTILEVER[0]])
 def test_a_critical_speed_is_rejected(spin: float) -> None:
-    with pytest.raises(ArithmeticError, match="is a critical speed"):
+    with pytest.raises(ArithmeticError, match="critical speed"):
         angular(unit_beam(4.0, CLAMPED), 2, spin)
 
 
@@ -134,7 +134,7 @@ def test_modes_that_meet_with_opposite_energy_are_not_proved() -> None:
         return closed_form([math.pi**2], 2.0, spin)[0] - closed_form([4 * math.pi**2], 2.0, spin)[0]
 
     spin = scipy.optimize.brentq(apart, 17.0, 35.0, xtol=1e-13)
-    with pytest.raises(ArithmeticError, match="two meet"):
+    with pytest.raises(ArithmeticError, match="rounding"):
         angular(unit_beam(2.0, PINNED), 3, spin)
     assert len(angular(unit_beam(2.0, PINNED), 3, spin + 0.01)) == 3
 
@@ -148,7 +148,7 @@ def test_a_start_that_lacks_a_mode_is_not_believed(left_out: int, monkeypatch: p
         return ratio[kept], vectors[:, kept]
 
     monkeypatch.setattr("dsm.spinning.frequencies.eigh", forgetful)
-    with pytest.raises(ArithmeticError, match="cannot be proved"):
+    with pytest.raises(ArithmeticError, match="rounding"):
         angular(unit_beam(4.0, CLAMPED), 4, 2.0)
 
 
@@ -302,12 +302,12 @@ GOOD = SpinningSegment(1.0, 1.0, 2.0, 1.0)
 @pytest.mark.parametrize(
     ("message", "segments", "springs", "held"),
     [
-        ("without segments", [], [], []),
+        ("segments", [], [], []),
         ("segment 2: length=0", [GOOD, SpinningSegment(0.0, 1.0, 1.0, 1.0)], [], []),
         ("segment 1: rigidity_yy=nan", [SpinningSegment(1.0, 1.0, math.nan, 1.0)], [], []),
-        ("spring 1: position=1.1 m is off the beam", [GOOD], [SpinningSpring(1.1, 1.0)], []),
+        ("spring 1: position=1.1 m .*0 to 1 m", [GOOD], [SpinningSpring(1.1, 1.0)], []),
         ("spring 1: stiffness_y=-1", [GOOD], [SpinningSpring(0.1, 1.0, -1.0)], []),
-        ("spring 1: stiffness_x=inf .* hold the dof", [GOOD], [SpinningSpring(0.1, math.inf)], []),
+        ("spring 1: stiffness_x=inf .* dof", [GOOD], [SpinningSpring(0.1, math.inf)], []),
         ("held: position=-0.1 m", [GOOD], [], [(-0.1, "u")]),
         ("held: dof='w'", [GOOD], [], [(0.1, "w")]),
     ],
@@ -330,11 +330,11 @@ def test_rejects_what_is_no_beam(
     ids=["free", "hinge", "v slides", "no spring along v"],
 )
 def test_rejects_a_beam_that_moves_without_bending(beam: SpinningBeam) -> None:
-    with pytest.raises(ValueError, match="without bending"):
+    with pytest.raises(ValueError, match="plane"):
         spinning_frequencies(beam, 1, 10.0)
 
 
 @pytest.mark.parametrize(("count", "speed_rpm"), [(0, 1.0), (2, -1.0), (2, math.nan)])
 def test_rejects_counts_and_speeds(count: int, speed_rpm: float) -> None:
-    with pytest.raises(ValueError, match=r"modes were asked|speed_rpm="):
+    with pytest.raises(ValueError, match=r"0 modes|speed_rpm="):
         spinning_frequencies(unit_beam(4.0, CLAMPED), count, speed_rpm)

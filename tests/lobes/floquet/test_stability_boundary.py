@@ -249,14 +249,14 @@ def test_limits_over_radial_depth() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"x": None, "y": None}, "both None"),
-        ({"y": []}, "y has no modes"),
-        ({"x": [Mode(600.0, 0.02, -1e7)]}, r"stiffness -1e\+07 N/m"),
+        ({"x": None, "y": None}, "x and y .*None"),
+        ({"y": []}, "y .*modes"),
+        ({"x": [Mode(600.0, 0.02, -1e7)]}, r"600 Hz .*-1e\+07 N/m"),
         ({"x": Frf(np.arange(1.0, 9.0), np.ones(8, complex))}, r"x is an FRF.*modal.fit_modes"),
         ({"speed_rpm": 0.0}, "speed_rpm"),
         ({"depth": -1e-3}, r"depth\[0\]=-0.001"),
         ({"depth": [1e-3, math.nan]}, r"depth\[1\]=nan"),
-        ({"depth": []}, "depth has shape"),
+        ({"depth": []}, r"depth .*\(0,\)"),
     ],
 )
 def test_bad_input_of_the_chart_is_rejected(change: dict[str, Any], message: str) -> None:

@@ -119,11 +119,11 @@ def test_a_loop_that_is_never_negative_has_no_limit() -> None:
 @pytest.mark.parametrize(
     ("degrees", "said"),
     [
-        ((85, 95, 85, 96), "sums to 361 degrees"),
-        ((85, 95, 180), "3 angles for 4 teeth"),
-        ((0, 90, 90, 180), "not > 0"),
-        ((-85, 265, 85, 95), "not > 0"),
-        ((math.nan, 90, 90, 90), "not > 0"),
+        ((85, 95, 85, 96), "361 degrees.* 360"),
+        ((85, 95, 180), "3 angles for 4 "),
+        ((0, 90, 90, 180), r"\[0, 90, .*> 0"),
+        ((-85, 265, 85, 95), r"\[-85, .*> 0"),
+        ((math.nan, 90, 90, 90), r"\[nan, .*> 0"),
     ],
 )
 def test_what_is_no_pitch_is_rejected(degrees: tuple[float, ...], said: str) -> None:

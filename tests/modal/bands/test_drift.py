@@ -57,19 +57,19 @@ def test_a_drift_against_the_phase_of_a_mode_does_not_hide_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "code", "words"),
+    ("mode", "code", "facts"),
     [
-        (Mode(1.09, 0.74, 3e6), "mode-not-believed", "damping 74 %: drift has no peak either"),
-        (Mode(1.09, 0.02, 19.7), "stiffness-not-believed", "K = 20 N/m is outside 0.1 to 10000 N/um"),
-        (Mode(9e2, 0.02, -2e10), "stiffness-not-believed", "K = -20000 N/um is outside"),
-        (Mode(3990.0, 0.03, 3e7, remarks=(Remark("cut-by-edge", "", "x"),)), "mode-not-believed", "cut by the edge"),
-        (Mode(900.0, 0.03, 3e7, np.diag([1.0, 1e-3, 2e7]) ** 2), "mode-not-believed", "stiffness is hardly known"),
+        (Mode(1.09, 0.74, 3e6), "mode-not-believed", ("74 %", "drift")),
+        (Mode(1.09, 0.02, 19.7), "stiffness-not-believed", ("20 N/m", "0.1 to 10000 N/um")),
+        (Mode(9e2, 0.02, -2e10), "stiffness-not-believed", ("-20000 N/um",)),
+        (Mode(3990.0, 0.03, 3e7, remarks=(Remark("cut-by-edge", "", "x"),)), "mode-not-believed", ("3 %", "edge")),
+        (Mode(900.0, 0.03, 3e7, np.diag([1.0, 1e-3, 2e7]) ** 2), "mode-not-believed", ("3 %", "stiffness")),
     ],
 )
-def test_what_is_not_believed_is_reported_with_its_reason(mode: Mode, code: str, words: str) -> None:
+def test_what_is_not_believed_is_reported_with_its_reason(mode: Mode, code: str, facts: tuple[str, ...]) -> None:
     found = select_credible_modes([mode, TRUE, Mode(1900.0, 0.01, -3e7)])
     assert [one.frequency for one in found.modes] == [1500.0]
     assert [one.frequency for one in found.opposed] == [1900.0]
     (remark,) = found.remarks
     assert (remark.code, remark.about) == (code, f"{mode.frequency:.4g} Hz")
-    assert words in remark.text
+    assert all(fact in remark.text for fact in facts)

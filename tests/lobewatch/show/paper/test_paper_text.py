@@ -18,5 +18,5 @@ def test_a_number_has_its_significant_digits(value: float, digits: int, text: st
 
 
 def test_a_difference_is_a_share_of_the_number_of_the_paper() -> None:
-    row = Comparison("f_1", "Table 1", 1000.0, 1010.0, "Hz", 5, "")
-    assert paper_cells(row) == ("f_1", "Table 1", "1000", "1010.0", "Hz", "+1 %")
+    row = Comparison("f1", "Table 1", 1000.0, 1010.0, "Hz", 5, "")
+    assert paper_cells(row) == ("f1", "Table 1", "1000", "1010.0", "Hz", "+1 %")

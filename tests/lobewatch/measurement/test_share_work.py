@@ -95,41 +95,37 @@ def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCl
     histories = []
     for options in ([], ["--scheduler", cluster.scheduler_address]):
         said = CliRunner().invoke(app, ["rebuild", str(plant), *options], catch_exceptions=False).stdout
-        assert "a: history.rows: made anew from 2 tap test(s)" in said
-        assert "2 of 2 machines rebuilt" in said
+        assert re.search(r"a: history\.rows: .*2 tap test\(s\)", said)
+        assert "2 of 2 machines" in said
         histories.append([repr(row) for name in ("a", "b") for row in Logbook.open(plant / name).history.rows])
     assert len(histories[0]) == 3
     assert "verdicts=None" not in histories[0][0]
     assert histories[0] == histories[1]
     (plant / "b" / "machine.toml").write_text("[machine")
-    with pytest.raises(DataError, match=r"1 of 2 machines cannot be rebuilt\n.*machine\.toml"):
+    with pytest.raises(DataError, match=r"1 of 2 machines .*\n.*machine\.toml"):
         CliRunner().invoke(app, ["rebuild", str(plant)], catch_exceptions=False)
 
 
 def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ValueError, match=r"Workers\.jobs 2 and Workers\.scheduler tcp://x: give one of them"):
+    with pytest.raises(ValueError, match=r"Workers\.jobs 2 and Workers\.scheduler tcp://x"):
         Workers(2, "tcp://x")
     monkeypatch.setattr("lobewatch.measurement.share_work.SCHEDULER_TIMEOUT", 0.3)
-    with pytest.raises(DataError, match=r"Workers.scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):
+    with pytest.raises(DataError, match=r"Workers.scheduler tcp://127\.0\.0\.1:9: .*dask scheduler"):
         [*share_work(abs, [1], Workers(scheduler="tcp://127.0.0.1:9"))]
     monkeypatch.setattr("lobewatch.measurement.share_work.SCHEDULER_TIMEOUT", 10.0)
     workers = Workers(scheduler=cluster.scheduler_address)
     assert [*share_work(abs, [-1, -2], workers)] == [1, 2]
     other = CURRENT_SOFTWARE._replace(numpy="1.0")
     monkeypatch.setattr("lobewatch.measurement.share_work.CURRENT_SOFTWARE", other)
-    with pytest.raises(
-        DataError, match=r"a worker has lobewatch .*, here is lobewatch .*, numpy 1\.0, .* the same on all"
-    ):
+    with pytest.raises(DataError, match=r"worker .*lobewatch .* lobewatch .*, numpy 1\.0, "):
         [*share_work(abs, [-1], workers)]
 
 
 @pytest.mark.parametrize("address", ["", "x", "foo://h:1", "tls://", "tcp://[::1", "tcp://h:port", "inproc://x"])
 def test_what_is_no_address_of_a_scheduler_is_one_sentence(address: str) -> None:
-    with pytest.raises(
-        DataError, match=rf"^Workers.scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"
-    ):
+    with pytest.raises(DataError, match=rf"^Workers.scheduler {re.escape(address)}: .*tls://HOST:PORT"):
         scheduler_remarks(address)
-    with pytest.raises(DataError, match="is no address"):
+    with pytest.raises(DataError, match="tls://HOST:PORT"):
         [*share_work(abs, [1], Workers(scheduler=address or "/"))]
 
 
@@ -145,7 +141,7 @@ def test_who_answers_and_is_no_scheduler_is_one_sentence() -> None:
         stranger = threading.Thread(target=refuse)
         stranger.start()
         address = f"127.0.0.1:{server.getsockname()[1]}"
-        with pytest.raises(DataError, match=f"^Workers.scheduler {address}: no Dask scheduler answers there"):
+        with pytest.raises(DataError, match=rf"^Workers.scheduler {address}: .*dask scheduler"):
             [*share_work(abs, [1], Workers(scheduler=address))]
         stranger.join()
 
@@ -172,8 +168,9 @@ def test_the_remark_comes_before_the_work(tmp_path: Path, monkeypatch: pytest.Mo
     plain_machine(tmp_path / "m")
     name, *options = command
     said = CliRunner().invoke(app, [name, "m", *options, "--scheduler", "nowhere.invalid:8786"])
-    assert said.stderr.startswith("note: --scheduler nowhere.invalid:8786: unencrypted, and whoever can reach it can")
-    assert "no Dask scheduler answers there" in str(said.exception)
+    assert said.stderr.startswith("note: --scheduler nowhere.invalid:8786: ")
+    assert "tls://" in said.stderr
+    assert "dask scheduler" in str(said.exception)
 
 
 def test_a_scheduler_with_tls_as_the_page_says(tmp_path: Path) -> None:
@@ -200,7 +197,7 @@ def test_a_scheduler_with_tls_as_the_page_says(tmp_path: Path) -> None:
 
 
 def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
-    with pytest.raises(DataError, match="one of the 2 processes was ended from outside; nothing is stored; try again"):
+    with pytest.raises(DataError, match=r"2 processes .*Workers\.jobs"):
         [*share_work(os._exit, [1, 1], Workers(2))]
 
 

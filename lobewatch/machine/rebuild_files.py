@@ -128,7 +128,8 @@ def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) ->
     first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
     missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
     if len(missing) > n_fresh:
-        yield f"{JOURNAL_NAME}: lines {', '.join(map(str, missing))} damaged in both copies. {LOST_ENTRIES_ADVICE}"
+        lines = f"line{'s' if len(missing) > 1 else ''} {', '.join(map(str, missing))}"
+        yield f"{JOURNAL_NAME}: {lines} damaged in both copies. {LOST_ENTRIES_ADVICE}"
 
 
 def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:

@@ -74,7 +74,7 @@ def test_optional_keys_of_a_program_are_shown_and_right(text: str, key: str) -> 
 def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
     start = FRESH.index("# [spindle]")
     shown = "\n".join(line.removeprefix("#").removeprefix(" ") for line in FRESH[start:].splitlines())
-    text = shown.replace("Untapped tool", "# A tool")
+    text = shown.replace("A tool that is not tapped", "# A tool")
     machine = parse_machine_file(FRESH[:start] + text)
     spindle = machine.model("reference")
     assert spindle.theory == "timoshenko"

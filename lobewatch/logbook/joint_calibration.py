@@ -260,9 +260,9 @@ def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...
 
 def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
     if joint_fit.grouping is not split_tilting_groups:
-        shared = "bearings share a factor and " if joint_fit.grouping is merge_groups else ""
-        kept = f"{shared}joint stiffnesses keep their ratio"
-        text = f"only {joint_fit.fit.mode.size} modes, so {kept}. Other tools are not predicted"
+        shared = "bearings share a factor, " if joint_fit.grouping is merge_groups else ""
+        kept = f"{shared}joint stiffnesses keep their ratio and other tools are not predicted"
+        text = f"only {joint_fit.fit.mode.size} modes, so {kept}"
         cure = "Measure more modes with a wider [mode] band_hz or a harder hammer tip"
         yield Remark("factors-shared", "", text, cure)
 

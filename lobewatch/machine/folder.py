@@ -127,7 +127,7 @@ def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
         with open_regular_file(f"{folder}/{entry.file}") as file:
             size = os.fstat(file.fileno()).st_size
             if size != entry.size:
-                return f"{size} bytes, but {entry.size} bytes when written"
+                return f"{size} bytes instead of {entry.size} bytes"
             digest = hashlib.sha256(file.read()).hexdigest()
         if digest != entry.sha256:
             return "changed since it was written (SHA-256 differs)"
@@ -150,7 +150,7 @@ def hash_file(path: Path) -> str:
 
 def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
     """Return the remark on a tap test with a damaged file."""
-    text = f"{fault}. Results use the other tap tests"
+    text = f"{fault}, so it is not used"
     if is_given_up:
         return Remark("tap-lost", entry.file, text)
     cure = f"Restore it from a backup, or run {format_command('rebuild', folder)} to continue without it"

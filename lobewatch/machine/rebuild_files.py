@@ -34,7 +34,7 @@ def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Rem
     cuts, given_up = journal_entries.read_committed_cuts(reading), journal_entries.read_given_up_ids(reading)
     mend = format_command("rebuild", folder)
     for recording, fault in _find_damaged_recordings(folder, cuts):
-        text = f"{fault}. Its stored result stays in use"
+        text = f"{fault}, but its stored result is used"
         if recording.id in given_up:
             yield Remark("cut-lost", recording.file, text)
         else:
@@ -65,7 +65,7 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
             _move_to_damaged(folder, folder / lost.file)
         if lost.id not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=lost.id))
-            yield f"{lost.file}: lost. Its stored result stays in use."
+            yield f"{lost.file}: lost, but its stored result is used"
 
 
 def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[tuple[RecordingFile, str]]:

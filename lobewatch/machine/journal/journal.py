@@ -264,7 +264,7 @@ def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
     if not taps_here or sanitize_id_part(machine) in names:
         return ""
     lists = f"lists {len(missing)} tap test{'s' if len(missing) > 1 else ''} of {', '.join(names)}"
-    return f"belongs to another machine. It {lists}, but taps/ holds {len(taps_here)} of {machine}"
+    return f"belongs to another machine, because it {lists} and taps/ holds {len(taps_here)} of {machine}"
 
 
 def _read_machine_name(folder: Path) -> str:

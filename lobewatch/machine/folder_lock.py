@@ -94,7 +94,7 @@ class FolderLock:
             cure = "You can only read this folder. Copy it to a place with write access"
             if error.errno not in PERMISSION_ERRNOS:
                 cure = "This drive cannot lock files. Mount it with locks, or copy the folder to another drive"
-            raise OSError(error.errno, join_sentences(error.strerror, cure), str(self._folder)) from error
+            raise OSError(error.errno, join_sentences(error.strerror or "", cure), str(self._folder)) from error
 
     def _wait(self, handle: int, patience: float) -> None:
         deadline = time.monotonic() + patience

@@ -110,9 +110,9 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 _DAQ_EXAMPLE = "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200"
-_FIXING_TEXT = f"Accelerometer on the tool: mass (g), mounting ({', '.join(MOUNTINGS)})"
+_FIXING_TEXT = f"Mass of the accelerometer (g) and mounting on the tool ({', '.join(MOUNTINGS)})"
 DAQ_QUESTION = SetupQuestion(
-    "daq", "DAQ: port, with driver and sample rate (Hz) if necessary", _DAQ_EXAMPLE, _current_port, _set_port
+    "daq", "Port of the DAQ, with driver and sample rate (Hz) if necessary", _DAQ_EXAMPLE, _current_port, _set_port
 )
 
 
@@ -231,24 +231,22 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
-_TOOL_TEXT = f"Tapped tool: flutes, diameter (mm), helix angle (deg), stick-out (mm), {_TOOL_MATERIALS_TEXT}"
-_MATERIAL_TEXT = "Workpiece material (names: lobes.materials_by_name), or Kt and Kr (N/mm2)"
+_TOOL_TEXT = (
+    f"Flutes, diameter (mm), helix (deg), stick-out (mm) and material ({_TOOL_MATERIALS_TEXT}) of the tapped tool"
+)
+_MATERIAL_TEXT = "Workpiece material (lobes.materials_by_name lists all), or Kt and Kr (N/mm2)"
 _MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
-_PROGRAM_TEXT = "First program: speed (rpm), axial depth ap (mm), radial depth ae (mm), feed per tooth (mm)"
-_SENSOR_TEXT = "{}: DAQ input, sensitivity (mV/{}, see calibration sheet), range (V)"
-_DRIVE_TEXT = "Spindle motor: power (kW), torque (N m)"
+_PROGRAM_TEXT = "Speed (rpm), axial depth ap, radial depth ae and feed per tooth (mm) of the first program"
+_SENSOR_TEXT = "DAQ input, sensitivity from the calibration sheet (mV/{}), range (V)"
+_DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor"
 _EXAMPLE_TOOL = "4 20 30 80 coated carbide"
 SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     SetupQuestion("name", "Name of the machine", "mill-3", _current_name, _set_name),
-    SetupQuestion(
-        "speeds", "Spindle: lowest speed (rpm), highest speed (rpm)", "1000 18000", _current_speeds, _set_speeds
-    ),
+    SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)", "1000 18000", _current_speeds, _set_speeds),
     SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     DAQ_QUESTION,
-    _sensor_question(
-        "hammer", "force", f"{_SENSOR_TEXT.format('Hammer', 'N')}. Without force sensor: none", "0 2.25 5"
-    ),
-    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("Accelerometer", "g"), "1 10 5"),
+    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('N')}. Enter none without a force sensor.", "0 2.25 5"),
+    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("g"), "1 10 5"),
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
     SetupQuestion("tool", _TOOL_TEXT, _EXAMPLE_TOOL, _current_tool, _set_tool),
     SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),

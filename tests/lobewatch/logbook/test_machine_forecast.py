@@ -257,10 +257,10 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
     new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
     left = [(worn / new) ** (1 / exponent) for exponent in (0.27, 0.32)]
     assert preload_in_trend(shop) == pytest.approx(left, rel=1e-3)
-    share = f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %"
-    assert share in " ".join(run("trend", shop.path).stdout.split())
+    percent = f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %"
+    assert percent in " ".join(run("trend", shop.path).stdout.split())
     run("report", shop.path)
-    assert share in (shop.path / "report.html").read_text("utf-8")
+    assert percent in (shop.path / "report.html").read_text("utf-8")
 
 
 def printed_of(shop: Shop, tap_id: str) -> str:

@@ -102,8 +102,8 @@ def _make_chart(
     machine = logbook.machine
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
-        names = ", ".join(cuts) or "none"
-        raise DataError(f"compare_lobes.cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {names}")
+        known = f"Its cuts: {', '.join(map(repr, cuts)) or 'none'}."
+        raise DataError(f"compare_lobes.cut {cut!r} is not a cut of tool {assembly.tool!r}. {known}")
     assembly = assembly.check()
     frfs = _read_frfs(logbook, assembly) if source is lobe_chart.DynamicsSource.FRF else None
     x, y = frfs or (assembly.x, assembly.y)
@@ -115,9 +115,8 @@ def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
     """Read or predict the FRFs in x and y. A missing direction gets the FRF of the other."""
     place = logbook.machine.tap.position_mm
     if place > 0 and (not assembly.predicted or assembly.tool == logbook.machine.tap.tool):
-        text = f"needs an FRF at the tool tip, but [tap] position_mm = {place:g} lays it beside the tip"
-        cure = "use DynamicsSource.MODES, which the model carries to the tip"
-        raise DataError(f"DynamicsSource.FRF {text}; {cure}")
+        text = f"DynamicsSource.FRF needs an FRF at the tool tip, but [tap] position_mm = {place:g}"
+        raise DataError(f"{text}. Use DynamicsSource.MODES, which the model transfers to the tip.")
     read = _predict_frf if assembly.predicted else _read_assembly_frf
     frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
     other = frfs[assembly.directions[0]]
@@ -146,9 +145,9 @@ def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> 
 def _no_pocket_remark(now: lobe_chart.LobeChart, machine: Machine) -> Remark:
     if len(now.assembly.directions) == 1:
         gap, cure = now.assembly.missing_direction
-        return Remark(NO_POCKET_CODE, now.name, f"no speed and depth can be called safe: {gap}", cure)
-    text = f"no safe speed and depth found in {CutRange.of(machine, now.table).text}"
-    return Remark(NO_POCKET_CODE, now.name, text, "choose another tool or a narrower cut")
+        return Remark(NO_POCKET_CODE, now.name, f"no stable pocket, because {gap}", cure)
+    text = f"no stable pocket in {CutRange.of(machine, now.table).text}"
+    return Remark(NO_POCKET_CODE, now.name, text, "Choose another tool or a smaller radial depth")
 
 
 def _find_pocket_shifts(then: lobe_chart.LobeChart | None, now: lobe_chart.LobeChart) -> list[PocketShift]:

@@ -213,8 +213,8 @@ def calibrate_joints(
     """
     machine = logbook.machine
     if not any(joint.group for joint in machine.model(tools[0]).joints):
-        cure = 'give the joint between tool and spindle one, such as group = "holder" in joints of machine.toml'
-        raise DataError(f"no joint of [spindle] has a group: nothing but bearings could be found; {cure}")
+        cure = 'Add one in machine.toml, such as group = "holder" for the joint between tool and spindle.'
+        raise DataError(f"no joint of [spindle] has a group. {cure}")
     taps = tool_modes.find_tapped_tools(logbook, tools, direction, mode)
     try:
         joint_fit = fit_joints(taps, machine.tap.position_mm / 1e3)
@@ -260,15 +260,16 @@ def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...
 
 def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
     if joint_fit.grouping is not split_tilting_groups:
-        shared = "all bearings share a factor, and " if joint_fit.grouping is merge_groups else ""
-        kept = f"{shared}all stiffnesses of the joint keep their given ratio"
-        text = f"{joint_fit.fit.mode.size} modes are too few: {kept}; other tools are not predicted"
-        yield Remark("factors-shared", "", text, "measure more modes: a wider [mode] band_hz, a harder hammer tip")
+        shared = "bearings share a factor, " if joint_fit.grouping is merge_groups else ""
+        kept = f"{shared}joint stiffnesses keep their ratio and other tools are not predicted"
+        text = f"only {joint_fit.fit.mode.size} modes, so {kept}"
+        cure = "Measure more modes with a wider [mode] band_hz or a harder hammer tip"
+        yield Remark("factors-shared", "", text, cure)
 
 
 def _time_gap_remarks(taps: Sequence[tool_modes.TappedTool], machine: Machine) -> Iterator[Remark]:
     times = [tap.time for tap in taps]
     days = (max(times) - min(times)) / timedelta(days=1)
     if days > machine.machine.tap_interval_days:
-        text = f"{days:.0f} days lie between them, in which the bearings may have changed"
-        yield Remark("taps-apart", ", ".join(tap.tool for tap in taps), text, "tap all of them on one day")
+        text = f"tapped {days:.0f} days apart, so the bearings may have changed"
+        yield Remark("taps-apart", ", ".join(tap.tool for tap in taps), text, "Tap all of them on one day")

@@ -35,8 +35,8 @@ class MachineForecast:
             if tool in (None, series.tool) and direction in (None, series.direction):
                 return series
         known = [(series.tool, series.direction) for series in self.status.series]
-        names = "; ".join(f"SeriesStatus.tool {name} SeriesStatus.direction {axis}" for name, axis in known)
-        raise DataError(f"tool {tool or 'any'}, direction {direction or 'any'}: no such series; there are: {names}")
+        names = ", ".join(f"SeriesStatus.tool {name} SeriesStatus.direction {axis}" for name, axis in known)
+        raise DataError(f"no series of tool {tool or 'any'}, direction {direction or 'any'}. Choose one of: {names}.")
 
 
 def forecast_machine(logbook: Logbook, now: datetime | None = None) -> MachineForecast:

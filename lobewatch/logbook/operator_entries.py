@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import msgspec
 
 from acquisition import check_name
+from acquisition.errors import join_sentences
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.store_recordings import group_by_message
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
@@ -27,7 +28,7 @@ def acknowledge_alarms(
     now = datetime.now(UTC)
     end = None if until is None else until.astimezone(UTC)
     if end is not None and end <= now:
-        raise ValueError(f"acknowledge_alarms.until {until}: is past; give the day on which it is to ring again")
+        raise ValueError(f"acknowledge_alarms.until {until} is in the past. Give the date of the next reminder.")
     check_name(note, "note")
     check_name(operator, "operator")
     status, baseline = logbook.status(now), logbook.history.baseline
@@ -59,7 +60,7 @@ def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) 
     if edits is not None:
         reasons = logbook.edit_modes([tap.id], edits)
         if reasons:
-            raise ValueError(f"{reasons[tap.id]}; nothing is kept")
+            raise ValueError(join_sentences(reasons[tap.id], "Nothing was stored"))
     tap = logbook.files.by_id[tap.id]
     logbook.folder.read(tap)
     return fit_file_modes(logbook.folder.path / tap.file, by_hand=tap.by_hand, sensor=logbook.machine.tap.sensor)
@@ -68,4 +69,4 @@ def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) 
 def store_edits(logbook: Logbook, tap_ids: Sequence[str], edits: ModeEdits) -> str:
     """Store edits of the modes of tap tests. Return a text on the tap tests that the edits do not fit."""
     reasons = logbook.edit_modes(tap_ids, edits) if edits else {}
-    return "\n".join(["stored without:", *group_by_message(reasons.items())]) if reasons else ""
+    return "\n".join(["stored without these edits:", *group_by_message(reasons.items())]) if reasons else ""

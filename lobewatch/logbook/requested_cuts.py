@@ -72,14 +72,14 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
     machine = logbook.machine
     if any(value is not None for value in cut.values()):
         if names:
-            text = "evaluate_requested.names has its own speed, depth and tool; give either it or the options of a cut"
-            raise ValueError(text)
+            cure = "Give either evaluate_requested.names or the options of a cut."
+            raise ValueError(f"evaluate_requested.names already sets speed, depth and tool. {cure}")
         requested = requested_cut.build_requested_program(machine, cut)
         logbook.newest_tap()
         return RequestedVerdicts([logbook.verdict_for(requested)], [])
     if not machine.all_programs:
         fields = "ProgramTable.speed_rpm, ProgramTable.depth_mm, ProgramTable.tool and ProgramTable.material"
-        text = f"no [[program]] to check; add one for each cut that the shop runs, or give {fields}"
+        text = f"no [[program]] to check. Add one for each cut of the shop, or give {fields}."
         raise DataError(f"{logbook.folder.toml}: {text}")
     by_name = {table.name: table for table in machine.all_programs}
     chosen = [requested_cut.find_by_name(by_name, name).name for name in names] or list(by_name)

@@ -78,36 +78,37 @@ def find_tapped_tools(
 
 def _check_tools(tools: Sequence[str], mode: Sequence[int]) -> None:
     if len(tools) < 2:
-        text = "joint and bearings need the taps of two tools at least; name another one"
-        raise ValueError(f"calibrate_joints.tools {tools[0]}: {text}")
+        raise ValueError(f"calibrate_joints.tools {tools[0]} is only one tool. Name at least two tapped tools.")
     for tool in tools:
         if tools.count(tool) > 1:
-            text = "name another tool, or give the same one at another stick-out a [[tool]] and a name of its own"
-            raise ValueError(f"calibrate_joints.tools {tool}: named {tools.count(tool)} times; {text}")
+            cure = "Name another tool, or give this one at another stick-out its own [[tool]]."
+            raise ValueError(f"calibrate_joints.tools {tool} is named {tools.count(tool)} times. {cure}")
     if mode and len(mode) != len(tools):
         numbers = f"{len(mode)} calibrate_joints.mode for {len(tools)} calibrate_joints.tools"
-        raise ValueError(f"{numbers}; give one for each, or none")
+        raise ValueError(f"{numbers}. Give one for each tool, or none.")
 
 
 def _find_newest_row(rows: Sequence[HistoryRow], tool: str, direction: str | None) -> HistoryRow:
     matching = [row for row in rows if row.tool == tool and direction in (None, row.direction)]
     if matching:
         return matching[-1]
-    tapped = sorted({f"{row.tool}, {row.direction}" for row in rows})
+    tapped = sorted({f"{row.tool!r} in {row.direction}" for row in rows})
     where = "" if direction is None else f" in direction {direction}"
-    raise DataError(f"tool {tool!r} was never tapped{where}; tapped are: {'; '.join(tapped) or 'none'}; tap it first")
+    raise DataError(f"tool {tool!r} was never tapped{where}. Tap it, or choose from: {', '.join(tapped) or 'none'}.")
 
 
 def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> TappedTool:
     measurement, machine = logbook.measurement(row.tap_id), logbook.machine
     if measurement.followed is None:
-        raise DataError(f"{row.tap_id}: no mode is followed in the newest test of tool {row.tool!r}; tap it again")
+        raise DataError(f"{row.tap_id}: no followed mode in the newest test of tool {row.tool!r}. Tap it again.")
     if not measurement.followed.has_stiffness:
-        text = "no force was measured: K, by which modes are told apart, is not known"
-        raise DataError(f"{row.tap_id}: {text}; tap tool {row.tool!r} with a hammer that measures its force")
+        text = "K is unknown, because no force was measured"
+        raise DataError(f"{row.tap_id}: {text}. Tap tool {row.tool!r} with a hammer that measures force.")
     if questions := find_open_questions(measurement.remarks):
         codes = ", ".join(remark.code for remark in questions)
-        raise DataError(f"{row.tap_id}: the newest test of tool {row.tool!r} is in question ({codes}); answer first")
+        raise DataError(
+            f"{row.tap_id}: open questions on the newest test of tool {row.tool!r} ({codes}). Answer them first."
+        )
     low, high = machine.mode.band_hz or (0.0, math.inf)
     in_band = [mode for mode in measurement.modes if low <= mode.frequency <= high]
     scatter = tap_scatter_of(logbook.assembly(row.tool, row.tap_id), row.direction, machine.doubt)

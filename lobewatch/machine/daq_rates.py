@@ -178,12 +178,12 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
     try:
         entries = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=list[StoredDevice])
         if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
-            raise ValueError("altered since it was written")
+            raise ValueError("changed since it was written")
         return entries
     except FileNotFoundError:
         return []
     except ValueError as error:
-        raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
+        raise DataError(f"{path}: {error}. Delete this file, then lobewatch measures the sample rate again.") from error
 
 
 def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:

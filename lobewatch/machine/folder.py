@@ -88,11 +88,11 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
         whole = [tap for path in extra if (tap := read_unverified_tap(path)) and tap.id == path.stem]
         taps = [*_sort_by_time([*taps, *whole])]
     else:
-        cure = f"{format_command('verify', folder)} says what it is and what to do"
-        text = "not in the journal, does not count"
+        cure = f"Run {format_command('verify', folder)} for details"
+        text = "not in the journal and not used"
         remarks += [unlisted_file_remark(path, text, cure) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
-            text = f"{len(extra) - MAX_LISTED_FILES} more files that are not in the journal, they do not count"
+            text = f"{len(extra) - MAX_LISTED_FILES} more files, not in the journal and not used"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     lines = reading.other_entries
     acknowledged = tuple(msgspec.convert(line, Acknowledgement) for line in lines if line["kind"] == "ack")
@@ -127,16 +127,16 @@ def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
         with open_regular_file(f"{folder}/{entry.file}") as file:
             size = os.fstat(file.fileno()).st_size
             if size != entry.size:
-                return f"{size} bytes, not {entry.size} as when it was written"
+                return f"{size} bytes instead of {entry.size} bytes"
             digest = hashlib.sha256(file.read()).hexdigest()
         if digest != entry.sha256:
-            return "altered since it was written (SHA-256 differs)"
+            return "changed since it was written (SHA-256 differs)"
     except FileNotFoundError:
-        return "named in the journal but missing"
+        return "missing, but listed in the journal"
     except OSError as error:
         if error.errno in (errno.EMFILE, errno.ENFILE):  # not a fault of this file
             raise
-        return f"cannot be read ({error.strerror})"
+        return f"unreadable ({error.strerror})"
     return ""
 
 
@@ -150,16 +150,23 @@ def hash_file(path: Path) -> str:
 
 def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
     """Return the remark on a tap test with a damaged file."""
-    text = f"{fault}; results are those of the other tap tests"
+    text = f"{fault}, so it is not used"
     if is_given_up:
         return Remark("tap-lost", entry.file, text)
-    cure = f"put it back from a backup; without one, {format_command('rebuild', folder)} goes on without it"
+    cure = f"Restore it from a backup, or run {format_command('rebuild', folder)} to continue without it"
     return Remark("tap-damaged", entry.file, text, cure)
 
 
 def missing_journal_remark(folder: Path, count: int) -> Remark:
     """Return the remark on tap files without a journal."""
-    return journal_damage_remark(Journal(folder).path, f"is missing beside {count} tap file{'s' if count > 1 else ''}")
+    return journal_damage_remark(Journal(folder).path, f"missing next to {count} tap file{'s' if count > 1 else ''}")
+
+
+def restore_toml_advice(folder: Path) -> str:
+    """Return the remedy for a missing machine.toml next to tap tests."""
+    return (
+        f"Restore it from a backup, or run {format_command('rebuild', folder)} to use the copy in the newest tap test"
+    )
 
 
 def has_known_origin(folder: Path, entry: TapEntry) -> bool:
@@ -197,7 +204,7 @@ class MachineFolder:
         Raises
         ------
         DataError
-            If this is no machine folder, or its name is no UTF-8.
+            If this is no machine folder, or its name is not UTF-8.
         """
         self.path = to_folder_path(path)
         """Path of the folder."""
@@ -208,13 +215,12 @@ class MachineFolder:
         self.spool = self.path / "spool"
         """Folder of the hits of tests in progress."""
         if format_path(path) != str(path):
-            raise DataError(f"{format_path(path)}: the name of the folder is no UTF-8; rename it")
+            raise DataError(f"{format_path(path)}: the folder name is not UTF-8. Rename the folder.")
         if not self.toml.exists() and list_tap_files(self.path):
-            mend = f"{format_command('rebuild', self.path)} takes the copy in the newest of them"
-            raise DataError(f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, {mend}")
+            raise DataError(f"{self.toml}: missing next to tap tests. {restore_toml_advice(self.path)}.")
         if not self.toml.exists():
-            cure = f"make a machine folder with: folder_files.make_machine_folder {self.path}"
-            raise DataError(f"{self.path}: no machine.toml in it; {cure}")
+            cure = f"Run folder_files.make_machine_folder {self.path} to create a machine folder."
+            raise DataError(f"{self.path}: no machine.toml. {cure}")
 
     @property
     def toml_text(self) -> str:

@@ -13,9 +13,9 @@ WATCHED_FILES = ("machine.toml", "journal.jsonl", "journal.copy.jsonl", "taps")
 
 
 def to_folder_path(name: Path | str) -> Path:
-    """Return the path of a named folder; FileNotFoundError for an empty name, mostly a slip."""
+    """Return the path of a named folder; FileNotFoundError for an empty name, usually a mistake."""
     if not str(name):
-        raise FileNotFoundError("the name of the folder is empty; give the machine folder, or . for the current one")
+        raise FileNotFoundError("the folder name is empty. Give the machine folder, or . for the current one.")
     return Path(name)
 
 
@@ -76,7 +76,7 @@ def make_machine_text(folder: Path, template: str) -> str:
     check_name(name, "folder")
     toml = folder / "machine.toml"
     if toml.exists():
-        raise DataError(f"{toml}: is there already; choose another folder or edit that file")
+        raise DataError(f"{toml}: already exists. Choose another folder, or edit that file.")
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
     quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
     return text.replace('"MACHINE_NAME"', quoted)

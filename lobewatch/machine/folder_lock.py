@@ -16,7 +16,7 @@ import msgspec
 from filelock import lock_descriptor
 
 from acquisition import DataError
-from acquisition.errors import PERMISSION_ERRNOS
+from acquisition.errors import PERMISSION_ERRNOS, join_sentences
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, make_folder, read_regular_file
 
 LOCK_NAME, LOCK_HOLDER_NAME = ".lock", ".lock.holder"
@@ -91,10 +91,10 @@ class FolderLock:
         except (FileNotFoundError, NotADirectoryError) as error:
             raise type(error)(error.errno, error.strerror, str(self._folder)) from error
         except OSError as error:
-            cure = "not written; copy it to where you may write"
+            cure = "You can only read this folder. Copy it to a place with write access"
             if error.errno not in PERMISSION_ERRNOS:
-                cure = "but not locked for writing; mount that drive with locks, or copy the folder to another one"
-            raise OSError(error.errno, f"{error.strerror}: it can be read, {cure}", str(self._folder)) from error
+                cure = "This drive cannot lock files. Mount it with locks, or copy the folder to another drive"
+            raise OSError(error.errno, join_sentences(error.strerror or "", cure), str(self._folder)) from error
 
     def _wait(self, handle: int, patience: float) -> None:
         deadline = time.monotonic() + patience
@@ -104,7 +104,7 @@ class FolderLock:
                 with contextlib.suppress(OSError, msgspec.MsgspecError):  # it has not written its name yet
                     content = read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE)
                     holder = msgspec.json.decode(content, type=LockHolder)
-                raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done")
+                raise BusyError(f"{self._folder}: {holder} is writing here. Wait until it is done.")
             time.sleep(LOCK_POLL_INTERVAL)
 
 
@@ -159,4 +159,4 @@ class DiskReserve:
     def _full(self) -> DataError:
         free = shutil.disk_usage(self._folder).free
         needed = f"a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
-        return DataError(f"{self._folder}: {free / 1e6:.0f} MB free on this disk; {needed}: make room")
+        return DataError(f"{self._folder}: {free / 1e6:.0f} MB free, but {needed}. Make room on this disk.")

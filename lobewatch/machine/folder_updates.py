@@ -43,15 +43,14 @@ def add_event(
     with folder.locked():
         now, entries = datetime.now(UTC), folder.journal.read().entries
         if not text.strip():
-            raise ValueError('the event has no text; say what was done, such as "bearings replaced"')
+            raise ValueError('the event has no text. Describe the work, such as "bearings replaced".')
         check_name(text, "event")
         time = now if date is None else _to_utc(date)
         if time - now > timedelta(days=1):
-            raise ValueError(f"MaintenanceEvent.time {date}: lies in the future; give the day on which it was done")
+            raise ValueError(f"MaintenanceEvent.time {date} is in the future. Give the date of the work.")
         same = [event.id for event in lines.read_events(entries) if (event.time, event.text) == (time, text)]
         if same:
-            listing = "MachineFolder.contents lists all events"
-            raise ValueError(f"{text!r} of {date} is there already, as {same[0]}; {listing}")
+            raise ValueError(f"event {text!r} of {date} already exists as {same[0]}")
         if new_baseline and date is not None and date.time() == datetime.min.time():
             _refuse_tapped_day(folder.taps(), time)
         number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
@@ -65,16 +64,15 @@ def _to_utc(date: datetime) -> datetime:
     try:
         return date.astimezone(UTC)
     except (OverflowError, ValueError) as error:
-        raise ValueError(f"MaintenanceEvent.time {date}: is out of range; give a date after 1970-01-01") from error
+        raise ValueError(f"MaintenanceEvent.time {date} is out of range. Give a date after 1970-01-01.") from error
 
 
 def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
     tapped = [tap.created for tap in taps if begin <= tap.created < begin + timedelta(days=1)]
     if tapped:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
-        cure = f"such as MaintenanceEvent.time {tapped[-1].astimezone():%Y-%m-%d}T12:00:00"
-        problem = f"tapped on that day at {clock}; give the time of the new baseline too"
-        raise ValueError(f"{begin.astimezone():%Y-%m-%d}: {problem}, {cure}")
+        day, cure = f"{begin.astimezone():%Y-%m-%d}", "Give the time of the new baseline too"
+        raise ValueError(f"{day}: tap tests at {clock}. {cure}, such as MaintenanceEvent.time {day}T12:00:00.")
 
 
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:
@@ -82,7 +80,7 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEve
     with folder.locked():
         events = {event.id: event for event in lines.read_events(folder.journal.read().entries)}
         if event_id not in events:
-            raise ValueError(f"{event_id}: no such event; there are {', '.join(events) or 'none'}")
+            raise ValueError(f"no event {event_id}. Existing events: {', '.join(events) or 'none'}.")
         folder.journal.append(make_entry("event", withdraws=event_id))
     return events[event_id]
 
@@ -96,9 +94,9 @@ def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.Exclud
     with folder.locked():
         entry = _find_entry(folder, name)
         if entry.excluded:
-            raise ValueError(f"{entry.id}: excluded already, for {entry.excluded!r}")
+            raise ValueError(f"{entry.id} is already excluded, for {entry.excluded!r}")
         if not reason.strip():
-            raise ValueError(f"{entry.id}: no reason; say why it does not count with exclude_entry.reason")
+            raise ValueError(f"{entry.id}: the reason is missing. Give it with exclude_entry.reason.")
         check_name(reason, "reason")
         folder.journal.append(make_entry("exclude", tap=entry.id, reason=reason))
     return entry
@@ -109,7 +107,7 @@ def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
     with folder.locked():
         entry = _find_entry(folder, name)
         if not entry.excluded:
-            raise ValueError(f"{entry.id}: is not excluded; it counts already")
+            raise ValueError(f"{entry.id} is not excluded")
         folder.journal.append(make_entry("include", tap=entry.id))
     return entry
 
@@ -175,7 +173,7 @@ def resolve_cutting_time(at: datetime | None, now: datetime) -> datetime:
     """Return the time of a cut (UTC): now for None, local time without a zone; ValueError for the future."""
     when = now if at is None else at.astimezone(UTC)
     if when - now > timedelta(days=1):
-        raise ValueError(f"CutEntry.at {at}: lies in the future; give the day on which it was cut")
+        raise ValueError(f"CutEntry.at {at} is in the future. Give the date of the cut.")
     return when
 
 
@@ -184,15 +182,14 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
         return
     option = f"CutEntry.chatter_frequency_hz {frequency:g}"
     if word == "stable":
-        raise ValueError(f"{option}: a stable cut has none; leave it out, or say CutEntry.has_chatter")
+        raise ValueError(f"{option} contradicts a stable cut. Leave it out, or give CutEntry.has_chatter.")
     if not 0 < frequency < 1e5:
-        raise ValueError(f"{option}: is not above 0 and below 100000; give what was heard, in Hz")
+        raise ValueError(f"{option} is not between 0 and 100000. Give the chatter frequency in Hz.")
     tooth = setting.tooth_frequency
     times = round(frequency / tooth)
     if times and abs(frequency - times * tooth) <= TOOTH_FREQUENCY_TOLERANCE * frequency:
-        cure = "give the frequency of the chatter beside it, or leave CutEntry.chatter_frequency_hz out"
-        every = f"the tooth passing frequency of {tooth:g} Hz, which every cut sounds with"
-        raise ValueError(f"{option}: is {times} times {every}; {cure}")
+        cure = "Give the frequency of the chatter, or leave the option out."
+        raise ValueError(f"{option} is {times} times the tooth passing frequency {tooth:g} Hz. {cure}")
 
 
 def find_contradicting_cuts(cut: CutEntry, earlier: Sequence[CutEntry]) -> list[CutEntry]:
@@ -206,9 +203,9 @@ def find_contradicting_cuts(cut: CutEntry, earlier: Sequence[CutEntry]) -> list[
 def check_program_name(machine: Machine, name: str) -> None:
     """Raise ValueError for an empty name or the name of another program."""
     if not name.strip():
-        raise ValueError("ProgramTable.name: the name is empty; give the program a name")
+        raise ValueError("ProgramTable.name is empty. Give the program a name.")
     if name in (REFERENCE_CUT, *(program.name for program in machine.all_programs)):
-        raise ValueError(f"ProgramTable.name {name}: a program of that name is in machine.toml; choose another name")
+        raise ValueError(f"ProgramTable.name {name!r} is already in machine.toml. Choose another name.")
 
 
 def save_program(folder: MachineFolder, program: ProgramTable) -> None:
@@ -239,8 +236,8 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
     for key in keys:
         statements = [question.statement for question in questions if key in (question.key, question.statement)]
         if not statements:
-            listed = "; ".join(question.statement for question in questions) or "none"
-            raise ValueError(f"accept_settings.keys {key}: nothing is asked about it; open questions: {listed}")
+            listed = ", ".join(question.statement for question in questions) or "none"
+            raise ValueError(f"accept_settings.keys {key} answers no open question. Open questions: {listed}.")
         accepted += statements
     known = [*folder.machine.machine.accepted, *dict.fromkeys(accepted)]
     write_machine_file(folder.path, edit_toml(folder.toml_text, TablePath("machine"), {"accepted": known}))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import DataError, Remark, read_tap
+from acquisition.errors import join_sentences
 from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
 from acquisition.files.cut_file import read_cut_signal
 from lobewatch.machine import folder as contents
@@ -23,9 +24,8 @@ from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
-LOST_ENTRIES_HINT = "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: "
-LOST_ENTRIES_HINT += "enter them again (folder_updates.add_event, exclude_entry, MachineFolder.accept, "
-LOST_ENTRIES_HINT += "folder_updates.store_cut)"
+LOST_ENTRIES_ADVICE = "Enter lost events, exclusions, accepted questions and cuts judged by ear again "
+LOST_ENTRIES_ADVICE += "(folder_updates.add_event, exclude_entry, MachineFolder.accept, folder_updates.store_cut)."
 """Advice on entries that no copy of the journal has."""
 
 
@@ -34,14 +34,15 @@ def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Rem
     cuts, given_up = journal_entries.read_committed_cuts(reading), journal_entries.read_given_up_ids(reading)
     mend = format_command("rebuild", folder)
     for recording, fault in _find_damaged_recordings(folder, cuts):
-        text = f"{fault}; what was heard in it counts"
+        text = f"{fault}, but its stored result is used"
         if recording.id in given_up:
             yield Remark("cut-lost", recording.file, text)
         else:
-            cure = f"put it back from a backup; without one, {mend} goes on without it"
+            cure = f"Restore it from a backup, or run {mend} to continue without it"
             yield Remark("cut-damaged", recording.file, text, cure)
     for path in _list_unlisted_cuts(folder, cuts):
-        yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal, does not count", f"{mend} looks into it")
+        cure = f"Run {mend} to enter it or to set it aside"
+        yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal and not used", cure)
 
 
 def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
@@ -64,7 +65,7 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
             _move_to_damaged(folder, folder / lost.file)
         if lost.id not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=lost.id))
-            yield f"{lost.file}: lost; what was heard in it goes on to count"
+            yield f"{lost.file}: lost, but its stored result is used"
 
 
 def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[tuple[RecordingFile, str]]:
@@ -106,7 +107,7 @@ def rebuild_files(path: Path) -> list[str]:
         fresh = _enter_unlisted_taps(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
             journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
-            report.append(f"{JOURNAL_NAME}: written anew with {len(reading.entries) + len(fresh)} lines")
+            report.append(f"{JOURNAL_NAME}: rewritten with {len(reading.entries) + len(fresh)} lines")
             report += _report_missing_lines(reading.entries, len(fresh))
         else:
             for entry in fresh:
@@ -121,13 +122,14 @@ def rebuild_files(path: Path) -> list[str]:
 def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
     """Yield lines that no copy of the journal has; n_fresh: newly entered tap tests in their place."""
     if not entries:
-        yield f"{JOURNAL_NAME}: nothing of it or of its copy could be read; {LOST_ENTRIES_HINT}"
+        yield f"{JOURNAL_NAME}: unreadable, and so is its copy. {LOST_ENTRIES_ADVICE}"
         return
     numbers = {entry["number"] for entry in entries if "number" in entry}
     first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
     missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
     if len(missing) > n_fresh:
-        yield f"{JOURNAL_NAME}: of lines {', '.join(map(str, missing))} neither copy is sound; {LOST_ENTRIES_HINT}"
+        lines = f"line{'s' if len(missing) > 1 else ''} {', '.join(map(str, missing))}"
+        yield f"{JOURNAL_NAME}: {lines} damaged in both copies. {LOST_ENTRIES_ADVICE}"
 
 
 def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
@@ -142,9 +144,9 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
             aside.unlink()
-            yield f"{entry.file}: given its name back"
+            yield f"{entry.file}: restored under its own name"
         else:
-            yield f"{aside.relative_to(folder).as_posix()}: put there, a copy of {entry.file}"
+            yield f"{aside.relative_to(folder).as_posix()}: set aside, a copy of {entry.file}"
 
 
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
@@ -174,7 +176,7 @@ def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
             _move_to_damaged(folder, folder / entry.file)
         if name not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=name))
-            yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
+            yield f"{entry.file}: lost and no longer used. Restore it from a backup to use it again."
 
 
 def _is_temporarily_unreadable(path: Path) -> bool:
@@ -197,9 +199,9 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
             atomic_write(toml, text.encode())
-            yield f"machine.toml: the copy in {entry.file}"
+            yield f"machine.toml: restored from the copy in {entry.file}"
             return
-    raise DataError(f"{toml}: is missing, and no tap test has a copy; put it back from a backup")
+    raise DataError(f"{toml}: missing, and no tap test has a copy. Restore it from a backup.")
 
 
 def _repair_devices_file(folder: Path) -> Iterator[str]:
@@ -207,13 +209,13 @@ def _repair_devices_file(folder: Path) -> Iterator[str]:
     try:
         read_stored_devices(machine)
     except DataError:
-        yield f"{_set_aside(folder, folder / 'daq.json')}; the rates of DAQs are measured anew"
+        yield join_sentences(_set_aside(folder, folder / "daq.json"), "lobewatch measures the DAQ sample rates again")
 
 
 def _set_aside(folder: Path, path: Path) -> str:
-    """Move a file to the folder for damaged files, and say so."""
+    """Move a file to the folder for damaged files, and report it."""
     aside = _move_to_damaged(folder, path)
-    return f"{path.relative_to(folder).as_posix()}: put into {aside.relative_to(folder).as_posix()}"
+    return f"{path.relative_to(folder).as_posix()}: moved to {aside.relative_to(folder).as_posix()}"
 
 
 def _move_to_damaged(folder: Path, path: Path) -> Path:

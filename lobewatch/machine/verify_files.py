@@ -28,8 +28,8 @@ DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged"
 LOBEWATCH_FILES = {journal.JOURNAL_NAME, journal.JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml"}
 LOBEWATCH_FILES |= {"history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "taps", "cuts", "spool"}
 """Files and folders in a machine folder that are verified, or made again if they are deleted."""
-DELETION_ADVICE = "delete it when you do not need it"
-ALTERED_TEXT = "altered or cut short since it was written"
+DELETION_ADVICE = "Delete it if you do not need it"
+ALTERED_TEXT = "changed or truncated since it was written"
 """Fault of a file with a wrong checksum."""
 
 
@@ -71,9 +71,8 @@ def verify(path: Path) -> Verification:
         If this is no machine folder.
     """
     if not (path / "machine.toml").is_file() and contents.list_tap_files(path):
-        mend = format_command("rebuild", path)
-        cure = f"put it back from a backup; without one, {mend} takes the copy in the newest tap test"
-        missing = Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure)
+        advice = contents.restore_toml_advice(path)
+        missing = Remark("file-damaged", "machine.toml", "missing next to tap tests", advice)
         return Verification((missing,), (), 0)
     folder = MachineFolder(path)
     entered = enter_orphaned_taps(folder)
@@ -115,7 +114,7 @@ def _verify_taps(
     for name, fault in faults.items():
         entry, path = committed[name], folder / committed[name].file
         namesake = by_content.get(contents.hash_file(path))
-        text = f"it is {namesake.file} under another name" if namesake else fault
+        text = f"contains {namesake.file}" if namesake else fault
         yield contents.tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
         original = by_content.get(contents.hash_file(path))
@@ -126,21 +125,21 @@ def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is
     """Return the remark on a tap file without a line; original: committed tap test with the same content."""
     mend, entry = format_command("rebuild", folder), read_unverified_tap(path) if original is None else None
     if original is not None and is_needed:
-        said = f"it is {original.file} under another name", f"{mend} gives it its name back"
+        finding = f"contains {original.file}", f"Run {mend} to rename it"
     elif original is not None:
-        said = f"a copy of {original.file}", f"{mend} puts it out of the way"
+        finding = f"copy of {original.file}", f"Run {mend} to set it aside"
     elif entry is None:
-        said = "no whole tap file, and not in the journal", f"{mend} puts it out of the way"
+        finding = "incomplete tap file, not in the journal", f"Run {mend} to set it aside"
     elif entry.id != path.stem:
-        said = f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in"
+        finding = f"contains tap test {entry.id}", f"Run {mend} to rename it and enter it in the journal"
     elif contents.has_known_origin(folder, entry):
-        cure = f"{format_command('verify', folder)} enters it where nobody else writes"
-        text = "not entered in the journal by the program that wrote it"
+        cure = f"Run {format_command('verify', folder)} again when no other program writes"
+        text = "not yet in the journal"
         return Remark("not-entered", f"taps/{path.name}", text, cure)
     else:
-        cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
-        said = "a whole tap file that is not in the journal", cure
-    return contents.unlisted_file_remark(path, *said)
+        cure = f"Run {mend} to enter it, or remove it from taps/ if it belongs to another machine"
+        finding = "complete tap file, not in the journal", cure
+    return contents.unlisted_file_remark(path, *finding)
 
 
 def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
@@ -148,8 +147,8 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
     try:
         _ = folder.machine
     except (ValueError, OSError) as error:
-        mend = "rebuild_files.rebuild_files then takes the copy in the newest tap test"
-        cure = f"correct it; without a way to, move it away: {mend}"
+        mend = format_command("rebuild", folder.path)
+        cure = f"Correct it, or move it away and run {mend} to use the copy in the newest tap test"
         yield Remark("file-damaged", "machine.toml", format_error(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
@@ -169,11 +168,11 @@ def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
     fault = ""
     try:
         if folder.history_path.exists() and read_rows(folder.history_path).is_damaged:
-            fault = "altered since it was written"
+            fault = "changed since it was written"
     except OSError as error:
         fault = format_error(error).removeprefix(f"{folder.history_path}: ")
     if fault:
-        cure = f"{format_command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
+        cure = f"Run {format_command('rebuild', folder.path)} to write it again"
         yield Remark("file-damaged", folder.history_path.name, fault, cure)
 
 
@@ -185,17 +184,17 @@ def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
-    known = {"report.html": ("a report is not verified", f"{format_command('report', folder)} writes it anew")}
-    known["history.h5"] = "no cache any more, or an export", DELETION_ADVICE
+    known = {"report.html": ("reports are not verified", f"Run {format_command('report', folder)} to write it again")}
+    known["history.h5"] = "old cache, or an export", DELETION_ADVICE
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield Remark("set-aside", path.name, "left over or set aside", DELETION_ADVICE)
+            yield Remark("set-aside", path.name, "left over, or set aside", DELETION_ADVICE)
         elif path.name not in LOBEWATCH_FILES:
-            yield Remark("not-verified", path.name, *known.get(path.name, ("no file of lobewatch",)))
+            yield Remark("not-verified", path.name, *known.get(path.name, ("not a file of lobewatch",)))
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
-            yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
+            yield Remark("not-verified", f"taps/{path.name}", "not a tap file", "Remove it from taps/")
 
 
 def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
@@ -220,22 +219,22 @@ def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
     """Verify a file or the folder of an interrupted test."""
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
     if path.is_dir():
-        cure = f"put it back from a backup, or {tap} goes on with the others{_deletion_hint(path)}"
+        cure = f"Restore it from a backup, or run {tap} to continue with the others. {_deletion_advice(path)}"
         yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
     elif path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
-        cure = f"{tap} sets it aside and goes on with the others{_deletion_hint(path.parent)}"
+        cure = f"Run {tap} to set it aside and continue with the others. {_deletion_advice(path.parent)}"
         yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):
-        cure = f"{tap} sets it aside and chooses the set-up anew{_deletion_hint(path.parent)}"
+        cure = f"Run {tap} to set it aside and choose the setup again. {_deletion_advice(path.parent)}"
         yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.suffix == ".tmp":
-        yield Remark("set-aside", about, "half written", f"{tap} removes it")
+        yield Remark("set-aside", about, "incomplete", f"Run {tap} to remove it")
     elif path.suffix == ".damaged":
-        yield Remark("set-aside", about, "a damaged file of an interrupted test", DELETION_ADVICE)
+        yield Remark("set-aside", about, "damaged file of an interrupted test", DELETION_ADVICE)
 
 
-def _deletion_hint(test: Path) -> str:
-    return f"; a test of more than 12 hours ago is not gone on with: delete {test} where you do not need it"
+def _deletion_advice(test: Path) -> str:
+    return f"Delete {test} if the test is older than 12 hours, because it cannot be continued"
 
 
 def _is_valid_setup(path: Path) -> bool:

@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 
 import acquisition
 from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest, inspect_file
+from acquisition.errors import join_sentences
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
@@ -19,10 +20,9 @@ from lobewatch.machine import Machine, MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
 
-DATE_REQUEST = (
-    'when it was recorded (Description.date 2024-05-01, or Description.date_pattern "%Y%m%d" for a date in its name)'
-)
-_MISSING_PREFIX = "it does not say: "
+DATE_REQUEST = 'Give the recording date with Description.date 2024-05-01 or Description.date_pattern "%Y%m%d"'
+CHANGING_FILE_TEXT = "changed while it was read. Wait until it is completely written."
+"""Error of a file that another program still writes."""
 _DATE_PART_PATTERNS = {
     "%Y": r"\d{4}",
     "%y": r"\d{2}",
@@ -74,7 +74,7 @@ def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:
         kinds = ", ".join(sorted(extensions))
-        raise DataError(f"{folder}: none of the {len(files)} files in this folder is a recording (looked for {kinds})")
+        raise DataError(f"{folder}: no recording among {len(files)} files. Supported: {kinds}.")
     found = set(recordings)
     return recordings, [file for file in files if file not in found]
 
@@ -119,12 +119,10 @@ def read_tap_test(
     recording = inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
     after = at.stat()
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns) or after.st_size != len(content):
-        raise DataError(f"{file}: it changes while it is read; wait until it is written")
+        raise DataError(f"{file}: {CHANGING_FILE_TEXT}")
     created = _find_date(file, description, recording.created)
     if created is None:
-        separator = "; " if recording.problems else ""
-        prefix = ", " if _MISSING_PREFIX in recording.problems else f"{separator}{_MISSING_PREFIX}"
-        raise DataError(f"{file}: {recording.problems}{prefix}{DATE_REQUEST}")
+        raise DataError(f"{file}: {join_sentences(recording.problems or 'no recording date', DATE_REQUEST)}")
     _reject_windowed(recording.require_valid())
     about = _build_circumstances(context, recording, description, check_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
@@ -136,15 +134,16 @@ def read_tap_test(
 def _reject_windowed(recording: Recording) -> None:
     """Reject a window: a tap test does not store it, so its damping would count as that of the spindle."""
     if recording.window is not None:
-        text = f"the response is under a window ({format_window(recording.window)}), which adds damping"
-        raise DataError(f"{recording.path}: {text}; export it without; fit_file_modes takes an exponential one off")
+        text = f"the response has a window ({format_window(recording.window)}), which adds damping"
+        cure = "Export it without, or correct an exponential window with fit_file_modes."
+        raise DataError(f"{recording.path}: {text}. {cure}")
 
 
 def _find_date(file: Path, description: Description, in_file: datetime | None) -> datetime | None:
     if not description.date_pattern:
         return description.date or in_file
     if description.date is not None:
-        raise ValueError("Description.date and Description.date_pattern: give one of them")
+        raise ValueError("both Description.date and Description.date_pattern given. Give only one.")
     return parse_date_in_name(file, description.date_pattern)
 
 
@@ -156,7 +155,9 @@ def _build_circumstances(
     except ValueError as error:
         if description.direction:
             raise
-        raise DataError(f"{recording.path}: its {error} (Description.direction)") from error
+        raise DataError(
+            f"{recording.path}: {join_sentences(str(error), 'Give it with Description.direction')}"
+        ) from error
     machine = context.machine
     tool = description.tool or recording.tool or machine.tap.tool
     conditions = machine.tap.conditions(tool) if recording.conditions is None else recording.conditions
@@ -202,7 +203,7 @@ def parse_date_in_name(file: Path, pattern: str) -> datetime:
     unknown = [directive for directive in directives if directive not in _DATE_PART_PATTERNS]
     if unknown or not directives:
         names = ", ".join(_DATE_PART_PATTERNS)
-        raise ValueError(f"Description.date_pattern {pattern!r}: give it with {names}, such as %Y%m%d")
+        raise ValueError(f"Description.date_pattern {pattern!r} is invalid. Use {names}, such as %Y%m%d.")
     text = file.absolute().as_posix() if "/" in pattern else file.name
     for parts in (_FIXED_WIDTH_PATTERNS, _DATE_PART_PATTERNS):
         pieces = (parts.get(piece, re.escape(piece)) for piece in re.split(r"(%.)", pattern))
@@ -211,7 +212,7 @@ def parse_date_in_name(file: Path, pattern: str) -> datetime:
                 return datetime.strptime(match[0], pattern).astimezone()
             except (ValueError, OverflowError, OSError):
                 continue
-    raise ValueError(f"{file}: no date like Description.date_pattern {pattern!r} in {text!r}")
+    raise ValueError(f"{file}: no date matches Description.date_pattern {pattern!r} in {text!r}")
 
 
 def check_time(file: Path, time: datetime) -> datetime:
@@ -219,8 +220,8 @@ def check_time(file: Path, time: datetime) -> datetime:
     try:
         created = time.astimezone()
     except (OverflowError, ValueError, OSError) as error:
-        raise ValueError(f"{file}: recorded on {time}: out of range; give Description.date from year 2 on") from error
+        raise ValueError(f"{file}: recording date {time} is out of range. Give it with Description.date.") from error
     if is_in_future(created, datetime.now(UTC)):
-        text = "in the future; give the day with Description.date, or set the clock right"
-        raise ValueError(f"{file}: recorded on {created:%Y-%m-%d}, {text}")
+        cure = "Give the date with Description.date, or correct the clock."
+        raise ValueError(f"{file}: recording date {created:%Y-%m-%d} is in the future. {cure}")
     return created

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from acquisition import DataError, Description
+from acquisition.errors import join_sentences
 from lobewatch.logbook.recordings import prepare_taps
 from lobewatch.logbook.recordings.prepare_taps import TapDraft
+from lobewatch.logbook.recordings.recorded_files import CHANGING_FILE_TEXT
 from lobewatch.machine import MachineFolder
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
@@ -161,7 +163,7 @@ def _prepare_files(
         if isinstance(result, str):
             faults[digest] = result
         elif result.digest != digest:
-            faults[digest] = "it changes while it is read; wait until it is written"
+            faults[digest] = CHANGING_FILE_TEXT
         else:
             ready.append(result)
         progress("read", number, len(new))
@@ -172,8 +174,7 @@ def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = Fa
     """Format the reasons for rejected files of n, and whether the others are stored."""
     lines = group_by_message((str(file), why) for file, why in rejected.items())
     if len(rejected) == n:
-        return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
-    rest = "the others are stored" if stored else "nothing is stored; store_recordings.keep_going stores the others"
-    if len(rejected) == 1:
-        return f"{lines[0]} (1 of {n} files; {rest})"
-    return "\n".join([f"{len(rejected)} of {n} files cannot be used; {rest}", *lines])
+        return "\n".join([f"none of the {n} files can be used. Nothing was stored.", *lines])
+    nothing = "so nothing was stored. Use store_recordings.keep_going to store the others."
+    summary = f"{len(rejected)} of {n} files cannot be used, {'the others were stored' if stored else nothing}"
+    return join_sentences(lines[0], summary) if len(rejected) == 1 else "\n".join([summary, *lines])

@@ -84,7 +84,7 @@ class CutEntry:
 
     def __post_init__(self) -> None:
         if self.word not in get_args(CutVerdict):
-            raise ValueError(f"word={self.word!r} is none of {', '.join(get_args(CutVerdict))}")
+            raise ValueError(f"word={self.word!r} is not one of {', '.join(get_args(CutVerdict))}")
 
     @property
     def is_usable(self) -> bool:
@@ -161,8 +161,8 @@ def find_excludable_entry(name: str, taps: Sequence[TapEntry], cuts: Sequence[Cu
         return matches[0]
     if matches:
         examples = f"({matches[0].id}, {matches[1].id}, ...)"
-        raise ValueError(f"{name}: part of {len(matches)} tap tests {examples}; give one whole")
-    raise ValueError(f"{name!r}: no such tap test in {path}; MachineFolder.contents {path} lists all {len(taps)}")
+        raise ValueError(f"{name!r} matches {len(matches)} tap tests {examples}. Give the whole name.")
+    raise ValueError(f"no tap test {name!r} in {path}. Run MachineFolder.contents {path} to list all {len(taps)}.")
 
 
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -23,6 +23,7 @@ from typing import Any
 import msgspec
 
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
+from acquisition.errors import join_sentences
 from acquisition.file_io import atomic_write, read_regular_file, sync_folder
 from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX
 from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
@@ -197,7 +198,8 @@ class Journal:
     def refuse_damage(self, reading: JournalReading) -> None:
         """Raise DataError if the journal is damaged."""
         if reading.damage:
-            raise DataError(f"{self.path.parent}: {'; '.join(map(str, reading.damage))}; nothing is written before")
+            findings = ", ".join(remark.finding for remark in reading.damage)
+            raise DataError(join_sentences(f"{self.path.parent}: nothing written, {findings}", reading.damage[0].cure))
 
     def rewrite(self, entries: list[JournalEntry]) -> None:
         """Write both files with these entries in a new chain, and keep the old files."""
@@ -220,29 +222,29 @@ class Journal:
     def _find_journal_damage(self, journal: JournalFileState, copy: JournalFileState) -> Iterator[Remark]:
         missing = len(copy.chain) - len(journal.chain)
         if not journal.exists and copy.exists:
-            yield journal_damage_remark(self.path, "is missing beside its copy")
+            yield journal_damage_remark(self.path, "missing next to its copy")
         elif journal.first_broken_line:
             yield journal_damage_remark(self.path, f"line {journal.first_broken_line} is damaged")
         elif missing > 0:
-            lines = "its last line is" if missing == 1 else f"its last {missing} lines are"
+            lines = "last line" if missing == 1 else f"last {missing} lines"
             yield journal_damage_remark(self.path, f"{lines} missing")
         elif journal.line_ending != b"\n" and (missing == 0 or journal.line_ending):
-            yield journal_damage_remark(self.path, f"the end of its line {len(journal.chain)} is damaged")
+            yield journal_damage_remark(self.path, f"end of line {len(journal.chain)} is damaged")
         elif copy.chain != journal.chain[: len(copy.chain)]:
-            yield journal_damage_remark(self.path, f"it is not the journal that {JOURNAL_COPY_NAME} is a copy of")
+            yield journal_damage_remark(self.path, f"does not match {JOURNAL_COPY_NAME}")
 
     def _find_copy_damage(self, journal: JournalFileState, copy: JournalFileState) -> Iterator[Remark]:
         behind = len(journal.chain) - len(copy.chain)
         if copy.first_broken_line:
             yield journal_damage_remark(self.copy_path, f"line {copy.first_broken_line} is damaged")
         elif copy.line_ending != b"\n" and (behind == 0 or copy.line_ending):
-            yield journal_damage_remark(self.copy_path, f"the end of its line {len(copy.chain)} is damaged")
+            yield journal_damage_remark(self.copy_path, f"end of line {len(copy.chain)} is damaged")
         elif _are_one_batch(journal.chain[len(copy.chain) :]):
             return
         elif not copy.exists and behind > 1 and any("number" in json.loads(line) for line in journal.chain[:-1]):
-            yield journal_damage_remark(self.copy_path, "is missing")
+            yield journal_damage_remark(self.copy_path, "missing")
         elif copy.exists and behind > 1:
-            yield journal_damage_remark(self.copy_path, f"its last {behind} lines are missing")
+            yield journal_damage_remark(self.copy_path, f"last {behind} lines missing")
 
 
 def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
@@ -261,8 +263,8 @@ def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
     names = sorted(set(map(parse_machine_name, missing)))
     if not taps_here or sanitize_id_part(machine) in names:
         return ""
-    lists = f"lists {len(missing)} tap test{'s' if len(missing) > 1 else ''} of {', '.join(names)}, none of them here"
-    return f"is that of another machine: it {lists}, while taps/ holds {len(taps_here)} of {machine}"
+    lists = f"lists {len(missing)} tap test{'s' if len(missing) > 1 else ''} of {', '.join(names)}"
+    return f"belongs to another machine, because it {lists} and taps/ holds {len(taps_here)} of {machine}"
 
 
 def _read_machine_name(folder: Path) -> str:
@@ -302,7 +304,7 @@ def _back_up_bytes(path: Path, content: bytes, why: str) -> None:
 
 def journal_damage_remark(path: Path, fault: str) -> Remark:
     """Return the remark on a damaged journal file."""
-    return Remark("journal-damaged", path.name, fault, f"mend it with {format_command('rebuild', path.parent)}")
+    return Remark("journal-damaged", path.name, fault, f"Run {format_command('rebuild', path.parent)} to repair it")
 
 
 def format_command(name: str, folder: Path) -> str:

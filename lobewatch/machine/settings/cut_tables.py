@@ -111,14 +111,15 @@ class CutTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         least, most = self.radial_mm
         if least > most:
-            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise; give [least, greatest]")
+            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise. Give [smallest, largest].")
         if most > self.tool_diameter_mm:
             raise ValueError(f"radial_depth_mm={most:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}")
         missing = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
         if len(missing) == 2 or (missing == {True} and self.material is None):
-            raise ValueError("give material, or both tangential_n_per_mm2 and radial_n_per_mm2, or all three")
+            cure = "Give material, or both tangential_n_per_mm2 and radial_n_per_mm2, or all three."
+            raise ValueError(f"cutting coefficients are incomplete. {cure}")
         if self.feed not in (*FEED_ANGLES, "both"):
-            raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
+            raise ValueError(f'unknown feed {self.feed!r}. Give "x", "y" or "both".')
         convert_pitch(self.pitch_deg, self.teeth)
 
 
@@ -181,9 +182,8 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         """
         tool = self.tool_diameter_mm / 2
         if radius_mm < tool:
-            problem = f"is tighter than the tool, whose radius is {tool:g} mm"
-            cure = "give the radius that is left in the corner, or a smaller tool"
-            raise ValueError(f"corner_radius_mm={radius_mm:g} {problem}: {cure}")
+            cure = "Give the radius left in the part, or a smaller tool."
+            raise ValueError(f"corner_radius_mm={radius_mm:g} is smaller than the tool radius {tool:g} mm. {cure}")
         return (1 - math.cos(corner_engagement(tool, self.radial_mm[1], radius_mm))) / 2
 
     @property
@@ -210,7 +210,8 @@ class MaterialTable(TomlTable, frozen=True):
         first, second = ("tangential_n_per_mm2", "radial_n_per_mm2"), ("specific_force_n_per_mm2", "force_angle_deg")
         counts = [sum(getattr(self, key) is not None for key in pair) for pair in (first, second)]
         if sorted(counts) != [0, 2]:
-            raise ValueError(f"give either {' and '.join(first)}, or {' and '.join(second)}")
+            cure = f"Give either {' and '.join(first)}, or {' and '.join(second)}."
+            raise ValueError(f"cutting coefficients do not fit together. {cure}")
 
     def build(self) -> CuttingCoefficients:
         """Build the coefficients in SI units."""

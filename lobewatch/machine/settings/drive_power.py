@@ -111,24 +111,24 @@ def build_power_reading(
 
     Raises ValueError for a power that is implausible or tells nothing about Kt.
     """
-    option = f"build_power_reading.power_kw {power_kw:g}"
+    option, cure = f"build_power_reading.power_kw {power_kw:g}", "Give the power of the cut minus that in air, in kW."
     if not (math.isfinite(power_kw) and power_kw > 0):
-        raise ValueError(f"{option}: is not above 0; give what the drive shows more than in air, in kW")
+        raise ValueError(f"{option} is not above 0. {cure}")
     if table.feed_per_tooth_mm is None:
-        raise ValueError(f"{option}: says nothing without feed_per_tooth_mm; write it into machine.toml")
+        raise ValueError(f"{option} needs feed_per_tooth_mm. Add it to machine.toml.")
     if len(table.immersions) > 1:
-        unknown = "of a cut whose radial depth changes on its way nobody knows at which it was"
-        raise ValueError(f"{option}: {unknown}; leave it out, or read it in a cut with one radial depth")
+        unknown = "cannot be used, because the radial depth changes during the cut"
+        raise ValueError(f"{option} {unknown}. Leave it out, or read it in a cut with one radial depth.")
     if power_kw > machine.drive.power_kw:
-        raise ValueError(f"{option}: is more than power_kw={machine.drive.power_kw:g} of [drive]; give kW")
+        raise ValueError(f"{option} is above power_kw={machine.drive.power_kw:g} of [drive]. {cure}")
     cut, edge = machine.build_cut(table), machine.coefficients(table).tangential_edge
     diameter, feed = table.tool_diameter_mm / 1e3, table.feed_per_tooth_mm / 1e3
     reading = PowerReading(1e3 * power_kw, cut, depth, diameter, feed, edge)
     expected_kw = reading.expected_power(speed_rpm) / 1e3
     low, high = expected_kw / MAX_POWER_RATIO, expected_kw * MAX_POWER_RATIO
     if not low <= power_kw <= high:
-        expected = f"{low:.2g} to {high:.2g} kW are to be expected; give kW, less what is shown in air"
-        raise ValueError(f"{option}: with the Kt of {cut.tangential / 1e6:.0f} N/mm2 in machine.toml {expected}")
+        expected = f"{low:.2g} to {high:.2g} kW expected with Kt {cut.tangential / 1e6:.0f} N/mm2"
+        raise ValueError(f"{option} is outside {expected}. {cure}")
     return reading
 
 
@@ -181,9 +181,9 @@ class CutRange:
         """Allowed speeds in words."""
         spindle = self.machine.speed
         if self.is_empty:
-            return f"{spindle.low_rpm:g}..{spindle.high_rpm:g} rpm, of which the tool bears none"
+            return f"{spindle.low_rpm:g}..{spindle.high_rpm:g} rpm, all outside the tool limits"
         is_whole = (self.low_rpm, self.high_rpm) == (spindle.low_rpm, spindle.high_rpm)
-        return f"{self.low_rpm:g}..{self.high_rpm:g} rpm{'' if is_whole else ', which the tool bears'}"
+        return f"{self.low_rpm:g}..{self.high_rpm:g} rpm{'' if is_whole else ' within the tool limits'}"
 
     def depth_limits(self, speed_rpm: Floats) -> Floats:
         """Return the largest depth (mm) that tool and drive allow at each speed (rpm)."""

@@ -12,6 +12,7 @@ from typing import Any
 import msgspec
 
 from acquisition import DataError
+from acquisition.errors import join_sentences
 from dsm import Spindle, change_tool
 from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
 from lobewatch.machine.settings import cut_tables as cutting
@@ -64,7 +65,7 @@ class Machine(toml.TomlTable, frozen=True):
     material: tuple[cutting.MaterialTable, ...] = ()
     """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
-    """Cut that is watched besides the programs: [reference_cut]."""
+    """Cut for comparison over the years: [reference_cut]."""
     all_programs: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
     """All [[program]] tables, those without a speed or depth included."""
     spindle: SpindleTable | None = None
@@ -78,14 +79,14 @@ class Machine(toml.TomlTable, frozen=True):
         names, low, high = [program.name for program in self.all_programs], self.speed.low_rpm, self.speed.high_rpm
         for i, program in enumerate(self.all_programs, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
-                raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
+                raise ValueError(f"program {i}: duplicate name {program.name!r}. Program names must be unique.")
             if not (math.isnan(program.speed_rpm) or low <= program.speed_rpm <= high):
                 speed = f"speed_rpm={program.speed_rpm:g}"
                 raise ValueError(f"program {i}: {speed} is outside [speed] {low:g}..{high:g} rpm")
         names = [material.name for material in self.material]
         for i, name in enumerate(names, 1):
             if fold_material_name(name) in map(fold_material_name, names[: i - 1]):
-                raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
+                raise ValueError(f"material {i}: duplicate name {name!r}. Material names must be unique.")
         if self.reference_cut:
             self.coefficients(self.reference_cut)
         for i, program in enumerate(self.all_programs, 1):
@@ -119,8 +120,8 @@ class Machine(toml.TomlTable, frozen=True):
         by_name, name = {**materials_by_name(), **own}, fold_material_name(table.material)
         if name not in by_name:
             near = nearest_material_name(table.material, by_name)
-            cure = f"is {near!r} meant? lobes.materials_by_name lists those that are known; or add a [[material]]"
-            raise ValueError(f"material={table.material!r} is not known; {cure}")
+            cure = f"Did you mean {near!r}? List all names with lobes.materials_by_name, or add a [[material]]."
+            raise ValueError(f"unknown material {table.material!r}. {cure}")
         known = by_name[name]
         if table.tangential_n_per_mm2 is None:
             return known
@@ -202,36 +203,36 @@ class Machine(toml.TomlTable, frozen=True):
         try:
             cutting.convert_pitch(self.pitch_deg(program), program.teeth)
         except ValueError as error:
-            raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
+            raise ValueError(f"{place}, pitch_deg of tool {tool.name!r}: {error}") from error
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
             flutes = f"flute_length_mm={tool.flute_length_mm:g} of tool {tool.name!r}"
             raise ValueError(f"{place}: depth_mm={program.depth_mm:g} is deeper than {flutes}")
 
     def _check_hammer(self) -> None:
         if self.tap.hammer == "force" and {channel.quantity for channel in self.daq.channel} == {"acceleration"}:
-            cure = 'add that of the hammer, or hammer = "none" to [tap]'
-            raise ValueError(f"daq: a [[daq.channel]] of acceleration alone; {cure}")
+            cure = 'Add that of the hammer, or set hammer = "none" in [tap].'
+            raise ValueError(f"daq: no [[daq.channel]] measures force. {cure}")
 
     def _check_tools(self) -> None:
         names = [tool.name for tool in self.tool]
         for i, tool in enumerate(self.tool, 1):
             if tool.name in names[: i - 1]:
-                raise ValueError(f"tool {i}: name={tool.name!r} stands twice; give each tool its own")
+                raise ValueError(f"tool {i}: duplicate name {tool.name!r}. Tool names must be unique.")
             if not tool.segments:
                 continue
             if tool.name == self.tap.tool:
-                problem = f"segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]"
-                raise ValueError(f"tool {i}: {problem}; leave them out here, or give another name")
+                problem = f"[spindle] already has the segments of {tool.name!r}, the tool of [tap]"
+                raise ValueError(f"tool {i}: {problem}. Remove them here, or rename this tool.")
             if self.spindle is None or self.spindle.tool_length_mm is None:
-                part = f"the part of the shaft that is {self.tap.tool!r}"
-                raise ValueError(f"tool {i}: needs [spindle] tool_length_mm, {part}")
+                cure = f"Give the length of {self.tap.tool!r} on the shaft."
+                raise ValueError(f"tool {i}: tool_length_mm is missing in [spindle]. {cure}")
             try:
                 self.model(tool.name)
             except ValueError as error:
-                raise ValueError(f"tool {i}: {error} (here in SI units)") from error
+                raise ValueError(f"tool {i}, in SI units: {error}") from error
         length = self.spindle.build().length * 1e3 if self.spindle else math.inf
         if self.tap.position_mm > length:
-            raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is off the shaft, 0 to {length:g} mm")
+            raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is outside the shaft, 0 to {length:g} mm")
 
     def model(self, tool: str) -> Spindle:
         """Build the spindle model with a tool, in SI units.
@@ -247,7 +248,7 @@ class Machine(toml.TomlTable, frozen=True):
             Without [spindle], or without a shape of the tool.
         """
         if self.spindle is None:
-            raise DataError("no model: add a [spindle] table (make_machine_folder.template shows one)")
+            raise DataError("no spindle model. Add a [spindle] table, as in make_machine_folder.template.")
         spindle = self.spindle.build()
         if tool == self.tap.tool:
             return spindle
@@ -271,7 +272,7 @@ class Machine(toml.TomlTable, frozen=True):
             if tool.name == name:
                 return tool
         names = ", ".join(map(repr, [self.tap.tool, *(tool.name for tool in self.modelled_tools)]))
-        raise DataError(f"tool {name!r} has no model; modelled are {names}: add a [[tool]] table with its segments")
+        raise DataError(f"tool {name!r} has no model. Choose {names}, or add a [[tool]] table with its segments.")
 
     def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
         """Return the reference cut and the programs of a tool by name, for each feed direction and engagement.
@@ -316,7 +317,7 @@ def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
         toml.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{toml.suggest_decimal_point(text)}") from error
+        raise DataError(f"{name}: {join_sentences(str(error), toml.suggest_decimal_point(text))}") from error
     except msgspec.ValidationError as error:
         raise DataError(f"{name}: {toml.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:

@@ -52,8 +52,8 @@ class Broker(NamedTuple):
         if not self.user or self.password or not os.environ.get(PASSWORD_VARIABLE):
             return ""
         host = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
-        cure = f"set it to {self.host_port} if this broker may have it"
-        return f"{PASSWORD_VARIABLE} is not used: {PASSWORD_HOST_VARIABLE} is {host}; {cure}"
+        cure = f"Set it to {self.host_port} to use the password there."
+        return f"{PASSWORD_VARIABLE} is not used, because {PASSWORD_HOST_VARIABLE} is {host}. {cure}"
 
 
 class NotifyTable(TomlTable, frozen=True):
@@ -75,8 +75,8 @@ class NotifyTable(TomlTable, frozen=True):
 def parse_broker(address: str) -> Broker:
     """Parse mqtt://[user[:password]@]host[:port][/prefix]; ValueError for any other text."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
-    allowed = "give mqtt://HOST, mqtt://USER@HOST:PORT/PREFIX, or mqtts:// where it is encrypted"
-    refusal = f"mqtt={hidden!r} is no address of a broker; {allowed}"
+    allowed = "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption."
+    refusal = f"mqtt={hidden!r} is not the address of a broker. {allowed}"
     url = urlsplit(address)
     try:
         port = url.port

@@ -70,14 +70,13 @@ def find_cut_setting(
     table = find_by_name(machine.cut_tables, program)
     for name, key, value, unit in (("speed", "speed_rpm", speed_rpm, "rpm"), ("depth", "depth_mm", depth_mm, "mm")):
         if value is not None and not _is_positive(value):
-            cure = f"give the {name} that was cut with, in {unit}"
-            raise ValueError(f"ProgramTable.{key} {value:g}: is not above 0; {cure}")
+            raise ValueError(f"ProgramTable.{key} {value:g} is not above 0. Give the {name} of the cut in {unit}.")
     preset = table if isinstance(table, ProgramTable) else None
     speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
     if speed is None or depth is None:
         missing = f"ProgramTable.{'speed_rpm' if speed is None else 'depth_mm'}"
-        raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
+        raise ValueError(f"{missing} is missing. Give it, because the {REFERENCE_CUT} has no value of its own.")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
     program_name, tool = (preset.name, preset.tool) if preset else (None, machine.tap.tool)
@@ -93,12 +92,11 @@ def choose_cut(
 ) -> CutSetting:
     """Return the setting of a program, or of a cut with speed (rpm) and depth (mm); ValueError unless one is named."""
     if bool(program) == bool(cut):
-        names = ", ".join(map(repr, machine.cut_tables)) or "none: add a [[program]] to machine.toml"
-        both = f"{'both' if cut else 'neither'} of choose_cut.program and choose_cut.cut"
-        raise ValueError(f"{both}: say which cut it is; there are {names}")
+        both, neither = "both choose_cut.program and", "neither choose_cut.program nor"
+        raise ValueError(f"{both if cut else neither} choose_cut.cut given. {_choose_one_of(machine.cut_tables)}.")
     if cut and (speed is None or depth is None):
-        key, cure = "speed_rpm" if speed is None else "depth_mm", "choose_cut.program with those of its own"
-        raise ValueError(f"choose_cut.cut {cut}: ProgramTable.{key} is missing; give speed and depth, or {cure}")
+        key = "speed_rpm" if speed is None else "depth_mm"
+        raise ValueError(f"choose_cut.cut {cut} needs ProgramTable.{key}. Give it, or use choose_cut.program.")
     return find_cut_setting(machine, program or cut, speed, depth, power_kw)
 
 
@@ -110,10 +108,14 @@ def find_by_name(tables: Mapping[str, NamedTable], name: str) -> NamedTable:
     """Return the table of a name or of its only match by prefix; ValueError if there is none or several."""
     matches = [key for key in tables if key == name] or [key for key in tables if key.startswith(name)]
     if len(matches) != 1:
-        names = ", ".join(map(repr, matches or tables)) or "none: add a [[program]] to machine.toml"
-        why = "may be several: say more of its name" if matches else "is not in machine.toml"
-        raise ValueError(f"program {name!r} {why}; there are {names}")
+        problem = f"matches {len(matches)} names" if matches else "is not in machine.toml"
+        raise ValueError(f"program {name!r} {problem}. {_choose_one_of(matches or tables)}.")
     return tables[matches[0]]
+
+
+def _choose_one_of(names: Collection[str]) -> str:
+    """Return the remedy for a missing or unknown name."""
+    return f"Choose one of {', '.join(map(repr, names))}" if names else "Add a [[program]] to machine.toml"
 
 
 def build_requested_program(machine: Machine, values: Mapping[str, Any]) -> ProgramTable:
@@ -123,7 +125,7 @@ def build_requested_program(machine: Machine, values: Mapping[str, Any]) -> Prog
     missing or invalid.
     """
     complete = _complete_values(machine, values)
-    _refuse_missing(machine, complete, REQUIRED_CUT_KEYS)
+    _reject_missing(machine, complete, REQUIRED_CUT_KEYS)
     table = ProgramTable(name=f"{complete['speed_rpm']:g} rpm, {complete['depth_mm']:g} mm", **complete)
     machine.coefficients(table)
     return table
@@ -136,7 +138,7 @@ def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> tu
     """
     excluded = (*SETTING_KEYS, *ENGAGEMENT_KEYS)
     complete = {key: value for key, value in _complete_values(machine, values).items() if key not in excluded}
-    _refuse_missing(machine, complete, [key for key in REQUIRED_CUT_KEYS if key not in excluded])
+    _reject_missing(machine, complete, [key for key in REQUIRED_CUT_KEYS if key not in excluded])
     diameter, radial, direction = complete["tool_diameter_mm"], values.get("radial_depth_mm"), values.get("direction")
     engagement = {"radial_depth_mm": radial or diameter, "direction": direction or "down"}
     name = f"{complete['tool']}, " + (f"{radial:g} of {diameter:g} mm" if radial else f"slot of {diameter:g} mm")
@@ -145,8 +147,8 @@ def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> tu
     machine.coefficients(table)
     deepest, depth = table.deepest_mm, values.get("depth_mm")
     if depth is not None and depth > deepest:
-        of = "the flutes" if table.flute_length_mm else "one diameter, which counts where no flute_length_mm is known"
-        raise ValueError(f"ProgramTable.depth_mm {depth:g}: is deeper than {of}; give up to {deepest:g} mm")
+        of = "the flutes" if table.flute_length_mm else "one diameter, the limit without flute_length_mm"
+        raise ValueError(f"ProgramTable.depth_mm {depth:g} is deeper than {of}. Give up to {deepest:g} mm.")
     return table, direction is None
 
 
@@ -157,7 +159,7 @@ def find_common_speed(machine: Machine, tool: str) -> float | None:
 
 
 def _complete_values(machine: Machine, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Add what the [[tool]] says, and what all programs of the tool have in common."""
+    """Add the values of the [[tool]], and those that all programs of the tool have in common."""
     given = {key: value for key, value in values.items() if value is not None}
     _check_numbers(machine, given)
     programs = machine.all_programs
@@ -172,34 +174,34 @@ def _complete_values(machine: Machine, values: Mapping[str, Any]) -> dict[str, A
     return common | {key: value for key, value in by_key.items() if value is not None} | {"tool": tool} | given
 
 
-def _refuse_missing(machine: Machine, values: Mapping[str, Any], required: Collection[str]) -> None:
+def _reject_missing(machine: Machine, values: Mapping[str, Any], required: Collection[str]) -> None:
     replaced = {"material"} if values.keys() >= COEFFICIENT_KEYS else set()
     missing = [f"ProgramTable.{key}" for key in required if key not in values and key not in replaced]
     if missing:
-        why = _explain_missing(machine, values.get("tool"))
-        raise ValueError(f"{', '.join(missing)}: missing, and {why}; give them")
+        raise ValueError(f"missing: {', '.join(missing)}. {_complete_missing(machine, values.get('tool'))}")
 
 
 def _check_numbers(machine: Machine, given: Mapping[str, Any]) -> None:
     for key in (*REQUIRED_CUT_KEYS, "feed_per_tooth_mm"):
         value = given.get(key)
         if isinstance(value, int | float) and not _is_positive(value):
-            raise ValueError(f"ProgramTable.{key} {value:g}: is not above 0")
+            raise ValueError(f"ProgramTable.{key} {value:g} is not above 0")
     speed, speeds = given.get("speed_rpm", machine.speed.low_rpm), machine.speed
     if not speeds.low_rpm <= speed <= speeds.high_rpm:
         limits = f"{speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
-        raise ValueError(f"ProgramTable.speed_rpm {speed:g}: is outside [speed] {limits}")
+        raise ValueError(f"ProgramTable.speed_rpm {speed:g} is outside [speed] {limits}")
 
 
-def _explain_missing(machine: Machine, tool: str | None) -> str:
+def _complete_missing(machine: Machine, tool: str | None) -> str:
+    """Return the remedy for missing values, with the reason why no program gives them."""
     if tool is None:
-        return "no tool is named whose programs could say them"
+        return "Give them, or name a tool with programs."
     with_programs = {program.tool for program in machine.all_programs}
     names = {machine.tap.tool, *(table.name for table in machine.tool), *with_programs}
     if tool not in names:
         near = difflib.get_close_matches(tool, names, n=1)
-        others = f"is {near[0]!r} meant?" if near else f"it knows {', '.join(map(repr, sorted(names)))}"
-        return f"machine.toml knows no tool {tool!r} ({others})"
+        known = f"Did you mean {near[0]!r}?" if near else f"Known tools: {', '.join(map(repr, sorted(names)))}."
+        return f"Tool {tool!r} is not in machine.toml. {known}"
     if tool in with_programs:
-        return f"the programs of tool {tool!r} do not agree on them"
-    return f"no program runs with tool {tool!r}"
+        return f"Give them, because the programs of tool {tool!r} differ."
+    return f"Give them, because no program uses tool {tool!r}."

@@ -42,8 +42,10 @@ RADIAL_DEPTH_RATIO_RANGE = RatioRange(0.005, 1.0)
 """Radial depth of cut ae over diameter."""
 CUTTING_SPEED_RANGE = RatioRange(3.0, 6000.0, "m/min at the edge")
 """Cutting speed (m/min), as a ratio to 1 m/min."""
-GYRATION_RADIUS_RANGE = RatioRange(5.0, 500.0, "mm from the axis")
+GYRATION_RADIUS_RANGE = RatioRange(5.0, 500.0, "mm radius of gyration")
 """Radius of gyration of a lumped mass (mm), as a ratio to 1 mm."""
+LIKELY_MISTAKES = "(radius, inch or another tool?)"
+"""Usual mistakes in a dimension of a tool."""
 TEMPLATE_COEFFICIENTS, TEMPLATE_BEARING_STIFFNESS = (700.0, 250.0), 500.0
 """Kt and Kr (N/mm2), and bearing stiffness (N/um), of the template of machine.toml."""
 
@@ -81,7 +83,7 @@ class ImplausibleSetting(NamedTuple):
     @property
     def remark(self) -> Remark:
         """Question about the number, with its remedy."""
-        cure = f"correct it in machine.toml, or, where it is right: folder_updates.accept_settings {self.key}"
+        cure = f"Correct it in machine.toml, or confirm it with folder_updates.accept_settings {self.key}"
         return Remark(self.fault.value, self.location, f"{self.key} = {self.value} {self.reason}", cure)
 
 
@@ -108,7 +110,7 @@ def find_template_bearings(machine: Machine) -> ImplausibleSetting | None:
     template, key = TEMPLATE_BEARING_STIFFNESS, "bearing_stiffness_n_per_um"
     if machine.spindle is None or machine.spindle.bearing_stiffness_n_per_um != template:
         return None
-    why = "is what a new machine.toml holds, and no tap test has found it yet: all of the model rests on it"
+    why = "is the default of a new machine.toml, not yet calibrated by a tap test"
     question = ImplausibleSetting(SettingFault.TEMPLATE_VALUE, "[spindle]", key, f"{template:g}", why)
     return next(iter(_remove_accepted(machine, [question])), None)
 
@@ -140,8 +142,8 @@ def _check_machine(machine: Machine) -> Iterator[ImplausibleSetting]:
     if math.isfinite(drive.power_kw) and math.isfinite(drive.torque_nm):
         corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi  # speed with full power and full torque
         if not 50 <= corner <= 2 * machine.speed.high_rpm:
-            meeting = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm"
-            why = f"{meeting}, where [speed] ends at {machine.speed.high_rpm:g}"
+            limits = f"outside 50 to {2 * machine.speed.high_rpm:g} rpm"
+            why = f"with torque_nm = {drive.torque_nm:g} gives a base speed of {corner:.3g} rpm, {limits}"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, "[drive]", "power_kw", f"{drive.power_kw:g}", why)
 
 
@@ -177,7 +179,7 @@ def _check_cut(cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
         yield from _check_radial_coefficient(cut, place)
         if (cut.tangential_n_per_mm2, cut.radial_n_per_mm2) == TEMPLATE_COEFFICIENTS:
             kt, kr = TEMPLATE_COEFFICIENTS
-            why = f"with radial_n_per_mm2 = {kr:g} is what a new machine.toml holds: nobody has given it"
+            why = f"with radial_n_per_mm2 = {kr:g} is the default of a new machine.toml, not of your material"
             yield ImplausibleSetting(SettingFault.TEMPLATE_VALUE, place, "tangential_n_per_mm2", f"{kt:g}", why)
     for radial in dict.fromkeys(cut.radial_mm):
         yield from _check_ratio(place, "radial_depth_mm", radial, diameter, RADIAL_DEPTH_RATIO_RANGE)
@@ -201,7 +203,7 @@ def _check_same_tool(machine: Machine, program: ProgramTable, place: str) -> Ite
     for key in ("tool_diameter_mm", "teeth"):
         value = getattr(program, key)
         for other in [other for other in same_tool if getattr(other, key) != value][:1]:
-            why = f"where {other.name!r} of the same tool has {getattr(other, key):g}: a radius, an inch, another tool?"
+            why = f"differs from {getattr(other, key):g} of {other.name!r} with the same tool {LIKELY_MISTAKES}"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
 
 
@@ -215,7 +217,7 @@ def _check_program_tool(program: ProgramTable, tool: ToolTable, place: str) -> I
         tool_key = key.removeprefix("tool_")
         value, tool_value = getattr(program, key), getattr(tool, tool_key)
         if None not in (value, tool_value) and value != tool_value:
-            why = f"where {tool_key} of [[tool]] {tool.name!r} is {tool_value:g}: a radius, an inch, another tool?"
+            why = f"differs from {tool_key} = {tool_value:g} of [[tool]] {tool.name!r} {LIKELY_MISTAKES}"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
 
 
@@ -243,7 +245,8 @@ def _check_parts(place: str, parts: Sequence[TomlTable]) -> Iterator[Implausible
             inertia = getattr(part, key)
             radius = math.sqrt(inertia / mass)
             if inertia and not GYRATION_RADIUS_RANGE.holds(radius):
-                why = f"with {mass:g} kg lies at {radius:.3g} {GYRATION_RADIUS_RANGE.unit}"
+                low, high, unit = GYRATION_RADIUS_RANGE
+                why = f"with {mass:g} kg is {radius:.3g} {unit}, outside {low:g} to {high:g}"
                 yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, f"{place} {i}", key, f"{inertia:g}", why)
 
 
@@ -274,5 +277,5 @@ def _check_ranges(table: TomlTable, place: str) -> Iterator[ImplausibleSetting]:
 def _check_ratio(place: str, key: str, value: float, over: float, limits: RatioRange) -> Iterator[ImplausibleSetting]:
     """Yield a number whose ratio to another one is outside its plausible range."""
     if value and not limits.holds(value / over):
-        why = f"is {value / over:.3g} {limits.unit}, not {limits.low:g} to {limits.high:g}"
+        why = f"is {value / over:.3g} {limits.unit}, outside {limits.low:g} to {limits.high:g}"
         yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, place, key, f"{value:g}", why)

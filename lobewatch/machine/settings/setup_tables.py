@@ -42,7 +42,7 @@ class SensorLoading:
         if sensor_g is None:
             return cls(mounting=mounting)
         if not (isfinite(sensor_g) and 0 <= sensor_g <= MAX_SENSOR_MASS_G):
-            raise ValueError(f"a sensor of {sensor_g:g} g: give its mass in g, 0 to {MAX_SENSOR_MASS_G:g}")
+            raise ValueError(f"sensor mass {sensor_g:g} g is outside 0 to {MAX_SENSOR_MASS_G:g} g")
         std = hypot(SENSOR_MASS_STD_RATIO * sensor_g, CABLE_MASS_STD_RATIO * cable_g)
         return cls(1e-3 * (sensor_g + CABLE_MASS_SHARE * cable_g), 1e-3 * std, mounting)
 
@@ -93,10 +93,10 @@ class TapTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self.conditions(self.tool)
         if self.hammer == "none" and self.trigger_n is not None:
-            problem = 'with hammer="none": no force triggers; leave it out, trial hits choose'
-            raise ValueError(f"trigger_n={self.trigger_n:g} {problem}")
+            cure = "Remove it, so that trial hits set the trigger."
+            raise ValueError(f'trigger_n={self.trigger_n:g} cannot be used with hammer="none". {cure}')
         if self.cable_mass_g and self.sensor_mass_g is None:
-            raise ValueError(f"cable_mass_g={self.cable_mass_g:g} without sensor_mass_g; give both")
+            raise ValueError(f"cable_mass_g={self.cable_mass_g:g} needs sensor_mass_g. Give both.")
 
     @property
     def quantity(self) -> ChannelQuantity:
@@ -130,7 +130,7 @@ class ModeTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
-            raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
+            raise ValueError(f"band_hz={list(self.band_hz)} does not rise. Give [lowest, highest] in Hz.")
 
 
 class LimitsTable(TomlTable, frozen=True):
@@ -154,11 +154,11 @@ class SpeedTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         if not self.low_rpm < self.high_rpm:
-            cure = "give the lowest, then the highest"
+            cure = "Give the lowest speed, then the highest."
             if self.low_rpm == self.high_rpm:
                 around = f"{0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
-                cure = f"of a spindle of one speed give what is around it, {around}"
-            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}; {cure}")
+                cure = f"For a spindle with one speed, give {around}."
+            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}. {cure}")
 
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -186,9 +186,9 @@ class ChannelTable(TomlTable, frozen=True):
             raise ValueError("give exactly one of sensitivity_mv_per_n (force) and sensitivity_mv_per_g (acceleration)")
         value = self.sensitivity_mv_per_n if self.quantity == "force" else self.sensitivity_mv_per_g
         if value is None:
-            raise ValueError(f"quantity={self.quantity!r} needs {key}, not the other sensitivity")
+            raise ValueError(f"quantity={self.quantity!r} needs {key} instead")
         if value == 0:
-            raise ValueError(f"{key}=0 is not the sensitivity of any sensor; take it from its calibration sheet")
+            raise ValueError(f"{key}=0 is not a sensitivity. Take it from the calibration sheet.")
 
     def build(self) -> SensorInput:
         """Build the sensor input in SI units: volts per N or per m/s^2."""
@@ -222,7 +222,7 @@ class PrintingTable(TomlTable, frozen=True):
         try:
             start = bytes.fromhex(self.frame_start)
         except ValueError:
-            text = f'frame_start="{self.frame_start}" is no row of bytes in hexadecimal; write it as in "AA BB"'
+            text = f'frame_start="{self.frame_start}" is not hexadecimal. Write bytes as in "AA BB".'
             raise ValueError(text) from None
         frame = FrameFormat(start, self.counter, self.checksum) if start else None
         return OutputFormat(self.adc_bits, frame, self.baud_rate)

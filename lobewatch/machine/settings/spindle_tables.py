@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
+from acquisition.errors import join_sentences
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobes import ToolMaterial
 from lobewatch.machine.settings.cut_tables import ValueRange, convert_pitch
@@ -40,8 +41,8 @@ class SegmentTable(TomlTable, frozen=True):
         _check_wall(bore, self.end_outer_mm or self.outer_mm, "end_bore_mm", "end_outer_mm")
         _check_wall(self.bore_mm, self.mass_outer_mm or math.inf, "bore_mm", "mass_outer_mm")
         if self.material and self.material not in MATERIALS:
-            hint = suggest_spelling(self.material, MATERIALS)
-            raise ValueError(f"material={self.material!r} is none of {', '.join(MATERIALS)}{hint}")
+            allowed, hint = f"Allowed: {', '.join(MATERIALS)}", suggest_spelling(self.material, MATERIALS)
+            raise ValueError(join_sentences(f"unknown material {self.material!r}", allowed, hint))
 
     def build(self) -> Segment:
         """Build the segment in SI units."""
@@ -136,16 +137,16 @@ class SpindleTable(TomlTable, frozen=True):
         for kind, parts in kinds.items():
             for i, part in enumerate(parts, 1):
                 if part.position_mm > length:
-                    place = f"position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
+                    place = f"position_mm={part.position_mm:g} is outside the shaft, 0 to {length:g} mm"
                     raise ValueError(f"{kind} {i}: {place}")
         first = min(bearing.position_mm for bearing in self.bearings)
         if self.tool_length_mm is not None and self.tool_length_mm > first:
-            problem = f"reaches beyond the first bearing, at {first:g} mm; give the length of the tool alone"
-            raise ValueError(f"tool_length_mm={self.tool_length_mm:g} {problem}")
+            problem = f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing at {first:g} mm"
+            raise ValueError(f"{problem}. Give the length of the tool only.")
         try:
             self.build()
         except ValueError as error:
-            raise ValueError(f"{error} (here in SI units)") from error
+            raise ValueError(f"in SI units: {error}") from error
 
     def build(self) -> Spindle:
         """Build the spindle in SI units."""
@@ -187,10 +188,10 @@ class ToolTable(TomlTable, frozen=True):
         for key in ("cutting_speed_m_min", "feed_per_tooth_mm"):
             value = getattr(self, key)
             if isinstance(value, tuple) and value[0] > value[1]:
-                cure = "give [least, greatest], or the greatest alone"
-                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] does not rise; {cure}")
+                cure = "Give [smallest, largest], or only the largest."
+                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] does not rise. {cure}")
         if self.masses and not self.segments:
-            raise ValueError("masses without segments; give the shape of the tool too, or leave the masses out")
+            raise ValueError("masses need segments. Add the shape of the tool, or remove the masses.")
 
     def build(self, spindle: Spindle) -> Spindle:
         """Build the tool as a free shaft in SI units, with defaults of the spindle."""

@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 from msgspec import Meta, Struct
 
 from acquisition import DataError, check_name
+from acquisition.errors import join_sentences
 from acquisition.file_io import read_regular_file
 
 Positive = Annotated[float, Meta(gt=0, le=1e12)]
@@ -24,10 +25,10 @@ PositiveOrInfinite = Annotated[float, Meta(gt=0)]
 
 
 class Plausible(NamedTuple):
-    """Plausible range of a number in the unit of its key; 0 and infinity stand for "none" and are not asked about.
+    """Plausible range of a number in the unit of its key; 0 and infinity stand for "none" and raise no question.
 
-    All ranges are chosen: what shops have, with a margin, and where possible less than a factor of 1000
-    wide, so that a value wrong by 1000 is outside. docs/plausible.md says which slips are not seen.
+    All ranges are chosen: common shop values with a margin, and less than a factor of 1000 wide if possible, so that
+    a value wrong by 1000 is outside. docs/plausible.md lists the mistakes that they cannot detect.
     """
 
     low: float
@@ -53,40 +54,56 @@ def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
                     check_control_characters(inner, f"{place}{key.removesuffix('s')} {i}: ")
 
 
-HELIX_HINT = "give the angle from the axis, 0 up to 90 deg; left-hand flutes cut alike, without a sign"
+HELIX_HINT = "Give 0 to below 90 deg from the axis, also for left-hand flutes"
 """Remedy for a helix angle outside its range."""
+TYPE_NAMES = {"int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false"}
+TYPE_NAMES |= {"array": "a list", "object": "a table", "date": "a date"}
+"""Plain names of the types in msgspec errors."""
 
 
 def explain_validation_error(message: str, tables: Mapping[str, Any], root: type[TomlTable]) -> str:
-    """Rewrite a msgspec validation error with its place first and with what to write instead."""
+    """Rewrite a msgspec validation error with its place first and with its remedy."""
     text, _, place = message.partition(" - at `$")
-    place = place.rstrip("`")
+    place, hints = place.rstrip("`"), [""]
     where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
     unknown, choice = re.search(r"unknown field `(\w+)`", text), re.search(r"Invalid enum value (.+)", text)
     if unknown:
         keys = _find_table_type(place, root).__struct_encode_fields__
-        text = f"unknown key {unknown[1]!r}{suggest_spelling(unknown[1], keys)}"
+        text, hints = f"unknown key {unknown[1]!r}", [suggest_spelling(unknown[1], keys)]
     elif choice:
         parent, _, key = place.rpartition(".")
         kinds = _iterate_types(_find_field_type(_find_table_type(parent, root), key))
         allowed = [kind for kind in kinds if isinstance(kind, str)]
-        text = f"{choice[1]} is none of {', '.join(map(repr, allowed))}{suggest_spelling(choice[1], allowed)}"
+        text = f"unknown value {choice[1]}"
+        hints = [f"Allowed: {', '.join(map(repr, allowed))}", suggest_spelling(choice[1], allowed)]
     elif re.match(r"Expected `\w+` [<>]", text):
-        hint = f"; {HELIX_HINT}" if place.endswith(".helix_deg") else ""
-        text = f"{text}, not {_find_value(tables, place)}{hint}"
+        hints = [HELIX_HINT if place.endswith(".helix_deg") else ""]
+        text = f"{text}, not {_find_value(tables, place)}"
+    text = join_sentences(_name_types(text), *hints)
     return f"{where.replace('.', ' ')}: {text}" if where else text
 
 
+def _name_types(text: str) -> str:
+    """Rewrite the types and the missing key of a msgspec error in plain words."""
+    text = re.sub(r"^Object missing required field `(\w+)`", r"missing key '\1'", text)
+    text = re.sub("^Expected", "expected", text)
+    return re.sub(r"`([a-z |]+)`", _join_type_names, text)
+
+
+def _join_type_names(match: re.Match[str]) -> str:
+    return " or ".join(TYPE_NAMES.get(kind, kind) for kind in match[1].split(" | ") if kind != "null")
+
+
 def suggest_decimal_point(text: str) -> str:
-    """Return a hint at a decimal comma, the usual cause of invalid TOML; empty without one."""
+    """Return the remedy for a decimal comma, the usual cause of invalid TOML; empty without one."""
     match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
-    return f"; write {match[1]}.{match[2]} with a point" if match else ""
+    return f"Write {match[1]}.{match[2]} with a decimal point" if match else ""
 
 
 def suggest_spelling(word: str, words: Iterable[str]) -> str:
-    """Return a hint at the nearest of some words; empty without one."""
+    """Return a question with the nearest of some words; empty without one."""
     near = difflib.get_close_matches(word.strip("'"), list(words), n=1)
-    return f"; is {near[0]!r} meant?" if near else ""
+    return f"Did you mean {near[0]!r}?" if near else ""
 
 
 def _find_table_type(place: str, root: type[TomlTable]) -> type[TomlTable]:
@@ -139,7 +156,7 @@ def read_toml_text(path: Path) -> str:
     try:
         return read_regular_file(path, MAX_TOML_BYTES).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        raise DataError(f"{path}: no UTF-8 text at byte {error.start}; save it as UTF-8") from error
+        raise DataError(f"{path}: invalid UTF-8 at byte {error.start}. Save the file as UTF-8.") from error
 
 
 def parse_toml_tables(text: str) -> dict[str, Any]:
@@ -151,7 +168,7 @@ def parse_toml_tables(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError as error:
         line = "" if dotted is None else f" in line {text.count(chr(10), 0, dotted.start()) + 1}"
-        raise ValueError(f"tables or arrays are nested too deep{line}; machine.toml needs four levels") from error
+        raise ValueError(f"tables or lists are nested too deeply{line}. machine.toml needs four levels.") from error
 
 
 TomlValue = str | bool | int | float | list[str] | None
@@ -185,7 +202,7 @@ def edit_toml(text: str, place: TablePath, values: Mapping[str, TomlValue]) -> s
     with contextlib.suppress(tomllib.TOMLDecodeError):
         if tomllib.loads(edited) == wanted:
             return edited
-    raise DataError(f"machine.toml: [{place.name}] is written in a way that only a person can edit; edit it by hand")
+    raise DataError(f"machine.toml: [{place.name}] has a layout that lobewatch cannot edit. Edit it by hand.")
 
 
 def _set_values(tables: dict[str, Any], place: TablePath, values: Mapping[str, TomlValue]) -> dict[str, Any]:

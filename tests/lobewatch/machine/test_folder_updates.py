@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -49,7 +50,7 @@ def signal() -> CutSignal:
 def test_a_program_is_found_by_how_its_name_begins() -> None:
     tables: dict[str, Any] = {"A": 1, "A: slot": 2, "B: rib": 3, "B: slot": 4}
     assert [find_by_name(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
-    with pytest.raises(ValueError, match="'B' may be several: say more of its name; there are 'B: rib', 'B: slot'"):
+    with pytest.raises(ValueError, match=r"'B' .*'B: rib', 'B: slot'"):
         find_by_name(tables, "B")
 
 
@@ -82,7 +83,7 @@ def test_the_power_of_a_cut_is_in_its_line_with_the_kt_that_it_says(shop: Shop) 
     rate = 4 * 215 * 1.5e-3 * 0.02
     watts = 1.1 * rate * (1.4e9 * 1e-4 + 42e3 * np.pi / 2)
     result = run(shop, "observe", "--program", "A", "--stable", "--power", watts / 1e3)
-    assert f"; {watts / 1e3:.4g} kW say Kt 1540 N/mm2, machine.toml 1400" in result.stdout
+    assert re.search(rf"{watts / 1e3:.4g} kW .*Kt 1540 N/mm2.* 1400", result.stdout)
     (cut,) = shop.logbook.cuts
     assert cut.power is not None
     assert (cut.power.watts, cut.power.tangential) == pytest.approx((watts, 1.54e9))
@@ -95,7 +96,7 @@ def test_the_power_of_a_cut_is_in_its_line_with_the_kt_that_it_says(shop: Shop) 
     (listed,) = json.loads(run(shop, "history", "--json").stdout)["cuts"]
     assert listed["power_kw"] == pytest.approx(watts / 1e3)
     assert listed["tangential_by_power_n_per_mm2"] == pytest.approx(1540)
-    assert "kW say Kt 1540 N/mm2" in run(shop, "history").stdout
+    assert "Kt 1540 N/mm2" in run(shop, "history").stdout
 
 
 def test_a_line_from_before_there_was_any_power_is_read_as_it_was(shop: Shop) -> None:
@@ -119,61 +120,61 @@ def test_a_kte_that_is_known_counts_in_its_ratio_to_kt(shop: Shop) -> None:
 
 
 @pytest.mark.parametrize(
-    ("power", "said"),
+    ("power", "facts"),
     [
-        ("0", "--power 0: is not above 0"),
-        ("nan", "--power nan: is not above 0"),
-        ("5300", "--power 5300: is more than power_kw=15 of [drive]"),
-        ("14.9", "--power 14.9: with the Kt of 700 N/mm2 in machine.toml 0.66 to 11 kW are to be expected"),
-        ("0.65", "--power 0.65: with the Kt of 700 N/mm2"),
+        ("0", "--power 0 .*above 0.* kW"),
+        ("nan", "--power nan .*above 0.* kW"),
+        ("5300", r"--power 5300 .*power_kw=15 of \[drive\]"),
+        ("14.9", "--power 14.9 .*0.66 to 11 kW .*700 N/mm2"),
+        ("0.65", "--power 0.65 .*0.66 to 11 kW .*700 N/mm2"),
     ],
 )
-def test_a_power_that_cannot_be_is_rejected_and_not_kept(shop: Shop, power: str, said: str) -> None:
+def test_a_power_that_cannot_be_is_rejected_and_not_kept(shop: Shop, power: str, facts: str) -> None:
     shop.edit(*FEED)
     shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 700")
     shop.edit("[reference_cut]", "[drive]\npower_kw = 15\n\n[reference_cut]")
     result = run(shop, "observe", "--program", "A", "--stable", "--power", power)
-    assert said in with_option_names(str(result.exception))
+    assert re.search(facts, with_option_names(str(result.exception)))
     assert shop.logbook.cuts == ()
 
 
 @pytest.mark.parametrize(
-    ("radial", "more", "said"),
+    ("radial", "more", "facts"),
     [
-        ("20", "", "says nothing without feed_per_tooth_mm; write it into machine.toml"),
-        ("[5, 20]", "feed_per_tooth_mm = 0.1", "whose radial depth changes on its way"),
-        ("10", "feed_per_tooth_mm = 0.1\ncorner_radius_mm = 12", "whose radial depth changes on its way"),
+        ("20", "", r"--power 3 .*feed_per_tooth_mm.* machine\.toml"),
+        ("[5, 20]", "feed_per_tooth_mm = 0.1", "--power 3 .*radial depth"),
+        ("10", "feed_per_tooth_mm = 0.1\ncorner_radius_mm = 12", "--power 3 .*radial depth"),
     ],
 )
-def test_a_power_that_says_nothing_of_kt_is_rejected(shop: Shop, radial: str, more: str, said: str) -> None:
+def test_a_power_that_says_nothing_of_kt_is_rejected(shop: Shop, radial: str, more: str, facts: str) -> None:
     shop.run(("A", 12900, 1.5), more=more)
     shop.edit("radial_depth_mm = 20\ndirection", f"radial_depth_mm = {radial}\ndirection")
     result = run(shop, "observe", "--program", "A", "--stable", "--power", "3.0")
-    assert said in with_option_names(str(result.exception))
+    assert re.search(facts, with_option_names(str(result.exception)))
     assert shop.logbook.cuts == ()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "facts"),
     [
-        (("--program", "A", "--stable", "--speed", 0), "--speed 0: is not above 0"),
-        (("--program", "A", "--stable", "--depth", 0), "--depth 0: is not above 0"),
-        (("--program", "A", "--stable", "--depth", "nan"), "--depth nan"),
-        (("--program", "A"), "neither of --stable and --chatter"),
-        (("--program", "A", "--stable", "--chatter"), "both of --stable and --chatter"),
-        (("--program", "A", "--stable", "--frequency", 1650), "a stable cut has none"),
-        (("--program", "A", "--chatter", "--frequency", -5), "--frequency -5"),
-        (("--program", "A", "--chatter", "--speed", 12000, "--frequency", 1601), "2 times the tooth passing"),
-        (("--program", "Q", "--stable"), "program 'Q' is not in machine.toml; there are 'reference cut', 'A', 'B'"),
-        (("--program", "A", "--stable", "--date", "2126-01-01"), "lies in the future"),
+        (("--program", "A", "--stable", "--speed", 0), "--speed 0 .*above 0.* rpm"),
+        (("--program", "A", "--stable", "--depth", 0), "--depth 0 .*above 0.* mm"),
+        (("--program", "A", "--stable", "--depth", "nan"), "--depth nan .*above 0.* mm"),
+        (("--program", "A"), "--stable .*--chatter"),
+        (("--program", "A", "--stable", "--chatter"), "--stable .*--chatter"),
+        (("--program", "A", "--stable", "--frequency", 1650), "--frequency 1650 .*--chatter"),
+        (("--program", "A", "--chatter", "--frequency", -5), "--frequency -5 .*0 and 100000.* Hz"),
+        (("--program", "A", "--chatter", "--speed", 12000, "--frequency", 1601), "1601 .*2 times .* 800 Hz"),
+        (("--program", "Q", "--stable"), r"'Q' .*machine\.toml.* 'reference cut', 'A', 'B'"),
+        (("--program", "A", "--stable", "--date", "2126-01-01"), "--date 2126-01-01 .*future"),
     ],
 )
 def test_what_cannot_be_is_rejected_in_a_sentence_and_not_kept(
-    shop: Shop, arguments: tuple[object, ...], said: str
+    shop: Shop, arguments: tuple[object, ...], facts: str
 ) -> None:
     result = run(shop, "observe", *arguments)
     assert result.exit_code != 0
-    assert said in with_option_names(str(result.exception))
+    assert re.search(facts, with_option_names(str(result.exception)))
     assert not (shop.path / "journal.jsonl").exists()
 
 
@@ -200,16 +201,16 @@ def test_a_cut_is_taken_out_and_back_and_listed_each_time(shop: Shop) -> None:
     assert (listed["id"], listed["speed_rpm"], listed["depth_mm"]) == ("c1", 12000.0, 1.5)
     (row,) = csv.DictReader(io.StringIO(run(shop, "history", "--csv").stdout))
     assert row["kind"] == "cut"
-    assert "chatter at 1650 Hz, by ear" in row["text"]
-    assert "A at 12000 rpm, 1.5 mm: chatter at 1650 Hz, by ear" in run(shop, "history").stdout
+    assert "1650 Hz" in row["text"]
+    assert re.search("A at 12000 rpm, 1.5 mm: .*1650 Hz", run(shop, "history").stdout)
 
 
 def test_excluding_a_cut_that_is_none_or_twice_is_rejected(shop: Shop) -> None:
     store_cut(shop.folder, heard(shop))
     exclude_entry(shop.folder, "c1", "no")
-    with pytest.raises(ValueError, match="c1: excluded already"):
+    with pytest.raises(ValueError, match=r"c1 .*'no'"):
         exclude_entry(shop.folder, "c1", "no")
-    with pytest.raises(ValueError, match="no such tap test"):
+    with pytest.raises(ValueError, match=r"'c2' .*MachineFolder.contents"):
         include_entry(shop.folder, "c2")
 
 
@@ -240,7 +241,8 @@ def test_a_damaged_recording_is_named_and_mended_and_its_verdict_goes_on_to_coun
     harm(path)
     assert [(one.code, one.about) for one in verify(shop.path).damage] == [("cut-damaged", "cuts/c1.h5")]
     assert [cut.id for cut in shop.logbook.cuts] == ["c1"]
-    assert rebuild_files(shop.path) == ["cuts/c1.h5: lost; what was heard in it goes on to count"]
+    (report,) = rebuild_files(shop.path)
+    assert report.startswith("cuts/c1.h5: lost")
     assert verify(shop.path).damage == ()
     assert "cut-lost" in [one.code for one in verify(shop.path).remarks]
     assert [cut.id for cut in shop.logbook.cuts] == ["c1"]
@@ -254,7 +256,8 @@ def test_a_recording_whose_line_a_crash_has_kept_away_is_entered_by_rebuild_and_
         (shop.path / name).unlink()
     assert store_cut(shop.folder, heard(shop, 9000.0)).id == "c2"
     assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
-    assert rebuild_files(shop.path) == ["cuts/c1.h5: entered in the journal"]
+    (report,) = rebuild_files(shop.path)
+    assert report.startswith("cuts/c1.h5: ")
     assert kept in shop.logbook.cuts
     assert verify(shop.path).damage == ()
 
@@ -263,14 +266,16 @@ def test_a_foreign_file_among_the_recordings_is_put_aside(shop: Shop) -> None:
     store_cut(shop.folder, heard(shop), signal())
     (shop.path / "cuts" / "c7.h5").write_bytes((shop.path / "cuts" / "c1.h5").read_bytes())
     assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
-    assert rebuild_files(shop.path) == ["cuts/c7.h5: put into damaged/c7.h5"]
+    (report,) = rebuild_files(shop.path)
+    assert re.search(r"cuts/c7\.h5: .*damaged/c7\.h5", report)
+    assert (shop.path / "damaged" / "c7.h5").exists()
     assert verify(shop.path).damage == ()
 
 
 def test_nothing_is_kept_while_the_journal_is_damaged(shop: Shop) -> None:
     store_cut(shop.folder, heard(shop))
     (shop.path / "journal.jsonl").write_bytes(b"{}\n")
-    with pytest.raises(DataError, match="damaged"):
+    with pytest.raises(DataError, match=r"journal\.jsonl: .*line 1 .*lobewatch rebuild"):
         store_cut(MachineFolder(shop.path), heard(shop), signal())
     assert not (shop.path / "cuts").exists()
 

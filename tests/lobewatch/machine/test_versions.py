@@ -48,7 +48,7 @@ def test_a_newer_version_is_rejected_in_a_sentence(folder: MachineFolder) -> Non
     path = folder.path / "taps" / "tap_1.h5"
     with h5py.File(path, "r+") as file:
         file.attrs["version"] = 9
-    with pytest.raises(DataError, match="a tap file of version 9, this lobewatch reads up to 2; update lobewatch"):
+    with pytest.raises(DataError, match=r"version 9.* 2\b"):
         read_tap(path)
 
 
@@ -59,12 +59,12 @@ def test_a_tap_of_a_newer_version_is_left_out_and_reported(
 
     def newer(path: Path) -> TapTest:
         if path.name == "tap_1.h5":
-            raise DataError(f"{path}: a tap file of version 9, this lobewatch reads up to 2; update lobewatch")
+            raise DataError(f"{path}: version 9")
         return read(path)
 
     monkeypatch.setattr("lobewatch.machine.folder.read_tap", newer)
     logbook = Logbook.open(folder.path)
     assert [row.tap_id for row in logbook.history.rows] == ["tap_0", "tap_2"]
     (remark,) = [one for one in logbook.remarks if one.code == "tap-unreadable"]
-    assert str(remark).startswith("taps/tap_1.h5: a tap file of version 9")
+    assert str(remark).startswith("taps/tap_1.h5: version 9")
     assert verify(folder.path).damage == ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -25,11 +26,10 @@ def test_a_date_in_a_name_is_found(name: str, pattern: str, date: str) -> None:
     assert parse_date_in_name(Path(name), pattern).replace(tzinfo=None).isoformat() == date
 
 
-@pytest.mark.parametrize(("pattern", "text"), [("%Q", "give it with %Y, %y"), ("%Y%m%d", "no date like")])
-def test_a_name_without_a_date_and_a_pattern_without_a_directive_are_rejected(pattern: str, text: str) -> None:
-    with pytest.raises(ValueError, match=text) as error:
+@pytest.mark.parametrize(("pattern", "fact"), [("%Q", "%Y, %y"), ("%Y%m%d", "tap.csv")])
+def test_a_name_without_a_date_and_a_pattern_without_a_directive_are_rejected(pattern: str, fact: str) -> None:
+    with pytest.raises(ValueError, match=rf"Description\.date_pattern '{pattern}' .*{fact}"):
         parse_date_in_name(Path("tap.csv"), pattern)
-    assert "Description.date_pattern" in str(error.value)
 
 
 def test_files_of_a_folder_are_recordings_or_skipped(tmp_path: Path) -> None:
@@ -37,11 +37,14 @@ def test_files_of_a_folder_are_recordings_or_skipped(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text, "utf-8")
     assert find_recordings([tmp_path]) == ([tmp_path / "a.csv"], [tmp_path / "b.pdf"])
     assert find_recordings([tmp_path / "a.csv", tmp_path / "*.pdf"])[0] == [tmp_path / "a.csv", tmp_path / "b.pdf"]
-    with pytest.raises(DataError, match="no file matches"):
+    with pytest.raises(DataError, match=r"\*\.mat: "):
         find_recordings([tmp_path / "*.mat"])
 
 
 def test_equal_messages_are_grouped_and_many_files_counted() -> None:
     assert group_by_message([(name, "bad") for name in "abcde"]) == ["a, b, c and 2 more: bad"]
-    text = format_rejections({Path("a"): "bad"}, 2)
-    assert text == "a: bad (1 of 2 files; nothing is stored; store_recordings.keep_going stores the others)"
+    assert re.match(r"a: bad\. 1 of 2 files .*store_recordings\.keep_going", format_rejections({Path("a"): "bad"}, 2))
+    assert "keep_going" not in format_rejections({Path("a"): "bad"}, 2, stored=True)
+    lines = format_rejections({Path("a"): "bad", Path("b"): "worse"}, 2).splitlines()
+    assert lines[1:] == ["a: bad", "b: worse"]
+    assert re.search(r"\b2 files", lines[0])

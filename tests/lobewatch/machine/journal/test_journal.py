@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -66,9 +67,7 @@ def test_nothing_is_written_to_a_damaged_journal_and_nothing_of_it_changed(
     path = folder.path / "journal.jsonl"
     content = path.read_bytes()[:-1] + b"\x0b"
     path.write_bytes(content)
-    with pytest.raises(
-        DataError, match=r"journal\.jsonl: the end of its line 3 is damaged; mend it with lobewatch reb"
-    ):
+    with pytest.raises(DataError, match=r"journal\.jsonl: .*line 3 .*lobewatch rebuild"):
         as_it_is(folder).commit(make_tap(3))
     assert path.read_bytes() == content
     assert not (folder.path / "taps" / "tap_3.h5").exists()
@@ -80,8 +79,8 @@ def test_tap_files_without_any_journal_are_read_and_no_baseline_is_begun(
     for name in NAMES:
         (folder.path / name).unlink()
     assert ids(folder) == ["tap_0", "tap_1", "tap_2"]
-    assert "journal.jsonl: is missing beside 3 tap files" in told(folder)
-    with pytest.raises(DataError, match="is missing beside 3 tap files"):
+    assert re.search(r"^journal\.jsonl: missing .* 3 tap files", told(folder))
+    with pytest.raises(DataError, match=r"journal\.jsonl: missing .* 3 tap files"):
         as_it_is(folder).commit(make_tap(3))
 
 
@@ -143,20 +142,20 @@ def write_without_numbers(path: Path, lines: list[dict[str, object]]) -> None:
 @pytest.mark.quick
 def test_a_missing_copy_is_named(folder: MachineFolder) -> None:
     (folder.path / NAMES[1]).unlink()
-    assert "journal.copy.jsonl: is missing" in told(folder)
+    assert "journal.copy.jsonl: missing" in told(folder)
 
 
 def test_a_file_of_another_size_or_missing_or_altered_is_left_out_and_named(folder: MachineFolder) -> None:
     path = folder.path / "taps" / "tap_1.h5"
     content = path.read_bytes()
-    for damaged, said in ((content[:-1], "bytes, not"), (content[:-1] + b"?", "SHA-256 differs"), (None, "missing")):
+    for damaged, fact in ((content[:-1], f"{len(content)} bytes"), (content[:-1] + b"?", "SHA-256"), (None, "missing")):
         if damaged is None:
             path.unlink()
         else:
             path.write_bytes(damaged)
         assert ids(folder) == ["tap_0", "tap_2"]
         assert "taps/tap_1.h5: " in told(folder)
-        assert said in told(folder)
+        assert fact in told(folder)
     path.write_bytes(content)
     assert told(folder) == ""
 
@@ -177,7 +176,7 @@ def test_lines_of_one_write_may_all_be_missing_from_the_copy_but_no_other(folder
     copy.write_bytes(before)
     assert not told(folder)
     copy.write_bytes(before[: line_ends(copy)[1] + 1])
-    assert "journal.copy.jsonl: its last 4 lines are missing" in told(folder)
+    assert re.search(r"journal\.copy\.jsonl: .*4 lines", told(folder))
     copy.write_bytes(before)
     as_it_is(folder).journal.append({"kind": "note", "text": "brings the copy up"})
     assert copy.read_bytes() == journal.read_bytes()
@@ -207,8 +206,7 @@ def test_a_journal_of_another_machine_is_named_and_mended(tmp_path: Path, make_t
     known = ids(mine)
     for name in NAMES:
         (mine.path / name).write_bytes((other.path / name).read_bytes())
-    wrong = "journal.jsonl: is that of another machine: it lists 2 tap tests of mill-7, none of them here, "
-    assert f"{wrong}while taps/ holds 2 of mill 3" in told(mine)
+    assert re.search(r"journal\.jsonl: .*another machine.* 2 tap tests of mill-7.* 2 of mill 3", told(mine))
     assert ids(mine) == known
     assert as_it_is(mine).contents().events == ()
     with pytest.raises(DataError, match=r"another machine.*lobewatch rebuild"):

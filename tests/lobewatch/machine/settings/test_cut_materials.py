@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -57,21 +55,33 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "facts"),
     [
-        ('material = "ours"', 'material = "our"', "material='our' is not known; is 'ours' meant"),
-        ('material = "ours"', "", "give material, or both"),
-        ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give material, or both"),
-        ('material = "ours"', "tangential_n_per_mm2 = 1", "give material, or both"),
-        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobes.materials_by_name lists those"),
-        ('material = "ours"', 'material = "4140"', "is 'AISI 4140' meant"),
-        ("tangential_n_per_mm2 = 800\n", "", "give either tangential_n_per_mm2 and radial_n_per_mm2"),
-        ("radial_n_per_mm2 = 200", "radial_n_per_mm2 = 200\nforce_angle_deg = 60", "give either tangential"),
+        ('material = "ours"', 'material = "our"', "'our'.* 'ours'"),
+        ('material = "ours"', "", "material, or both tangential_n_per_mm2 and radial_n_per_mm2"),
+        (
+            'material = "ours"',
+            'material = "ours"\nradial_n_per_mm2 = 1',
+            "material, or both tangential_n_per_mm2 and radial_n_per_mm2",
+        ),
+        (
+            'material = "ours"',
+            "tangential_n_per_mm2 = 1",
+            "material, or both tangential_n_per_mm2 and radial_n_per_mm2",
+        ),
+        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo5'.* '42CrMo4'.*lobes.materials_by_name"),
+        ('material = "ours"', 'material = "4140"', "'4140'.* 'AISI 4140'"),
+        ("tangential_n_per_mm2 = 800\n", "", "tangential_n_per_mm2 and radial_n_per_mm2, or specific"),
+        (
+            "radial_n_per_mm2 = 200",
+            "radial_n_per_mm2 = 200\nforce_angle_deg = 60",
+            "tangential_n_per_mm2 and radial_n_per_mm2, or specific",
+        ),
         ("helix_deg = 30", "helix_deg = 90", "helix_deg"),
         ("teeth = 2", "teeth = 2\nfeed_per_tooth_mm = 0", "feed_per_tooth_mm"),
         ("[reference_cut]", "[drive]\npower_kw = 0\n[reference_cut]", "drive power_kw"),
     ],
 )
-def test_bad_materials_are_reported_with_their_place(old: str, new: str, message: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(message)):
+def test_bad_materials_are_reported_with_their_place(old: str, new: str, facts: str) -> None:
+    with pytest.raises(ValueError, match=facts):
         parse_machine_file(EXAMPLE.replace(old, new))

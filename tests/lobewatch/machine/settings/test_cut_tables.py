@@ -68,7 +68,7 @@ def test_the_pitch_of_a_tool_is_that_of_its_programs_unless_they_say_otherwise()
     assert machine.build_cut(machine.reference_cut).pitch == ()
     changed = parse_machine_file(text.replace("[85, 95, 85, 95]", "[84, 96, 84, 96]"))
     assert hash_programs(machine) != hash_programs(changed)
-    with pytest.raises(DataError, match=r"program 2: .*4 angles for 3 flutes.*of tool 'long end mill'"):
+    with pytest.raises(DataError, match=r"program 2, pitch_deg of tool 'long end mill': .*4 angles for 3 "):
         parse_machine_file(
             text.replace(f"{tool}\nteeth = 4", f"{tool}\nteeth = 3").replace("[80, 100, 80, 100]", "[80, 140, 140]")
         )

@@ -92,7 +92,7 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
     short = machine.model("end mill 12")
     assert short.length == pytest.approx(spindle.length - 0.010)
     assert short.bearings[0].position == pytest.approx(0.150)
-    with pytest.raises(DataError, match="'end mill 13' has no model; modelled are 'reference', 'end mill 12'"):
+    with pytest.raises(DataError, match=r"'end mill 13' .*'reference', 'end mill 12'"):
         machine.model("end mill 13")
 
 
@@ -111,100 +111,79 @@ def test_programs_belong_to_their_tool() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "facts"),
     [
-        ("trigger_n = 20", "triger_n = 20", "tap: unknown key 'triger_n'; is 'trigger_n' meant?"),
-        ("direction =", 'feet = "x"\ndirection =', "reference_cut: unknown key 'feet'; is 'feed' meant?"),
-        ("direction =", "speed_rpm = 1\ndirection =", "reference_cut: unknown key 'speed_rpm'"),
-        ("bearing_stiffness_n_per_um", "helix_deg", "spindle: unknown key 'helix_deg'"),
-        ("outer_mm = 31.5", "outter_mm = 31.5", "spindle segment 1: unknown key 'outter_mm'; is 'outer_mm' meant?"),
-        ("bore_mm = 30.0", "bore_mm = 78.0", "spindle segment 7: bore_mm=78 is not smaller than outer_mm=78"),
-        ("length_mm = 26.5", "length_mm = 0", "spindle segment 1 length_mm: "),
-        ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: Expected `float` > 0.0, not -3"),
-        ("length_mm = 26.5", 'length_mm = "26.5"', "spindle segment 1 length_mm: Expected `float`, got `str`"),
-        ("length_mm = 26.5", "length_mm = 26,5", "write 26.5 with a point"),
+        ("trigger_n = 20", "triger_n = 20", "tap: .*'triger_n'.* 'trigger_n'"),
+        ("direction =", 'feet = "x"\ndirection =', "reference_cut: .*'feet'.* 'feed'"),
+        ("direction =", "speed_rpm = 1\ndirection =", "reference_cut: .*'speed_rpm'"),
+        ("bearing_stiffness_n_per_um", "helix_deg", "spindle: .*'helix_deg'"),
+        ("outer_mm = 31.5", "outter_mm = 31.5", "spindle segment 1: .*'outter_mm'.* 'outer_mm'"),
+        ("bore_mm = 30.0", "bore_mm = 78.0", "spindle segment 7: bore_mm=78 .*outer_mm=78"),
+        ("length_mm = 26.5", "length_mm = 0", "spindle segment 1 length_mm: .*> 0.0.* 0$"),
+        ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: .*number > 0.0.* -3$"),
+        ("length_mm = 26.5", 'length_mm = "26.5"', "spindle segment 1 length_mm: .*number.* text"),
+        ("length_mm = 26.5", "length_mm = 26,5", r".*at line \d+.* 26\.5 "),
         ("length_mm = 26.5", "length_mm = nan", "length_mm"),
-        ("teeth = 4", "pitch_deg = [85, 95, 85, 96]\nteeth = 4", "reference_cut: pitch [85, 95, 85, 96] sums to 361"),
-        ("teeth = 4", "pitch_deg = [120, 120, 120]\nteeth = 4", "3 angles for 4 flutes"),
-        ("teeth = 4", "helix_deg = -30\nteeth = 4", "reference_cut helix_deg: Expected `float` >= 0.0, not -30"),
-        ("radial_depth_mm = 20 ", "radial_depth_mm = [12, 4] ", "radial_depth_mm=[12, 4] does not rise"),
-        (
-            "radial_depth_mm = 20 ",
-            "radial_depth_mm = [4] ",
-            "reference_cut radial_depth_mm: Expected `array` of length",
-        ),
-        (
-            "radial_depth_mm = 20 ",
-            "radial_depth_mm = [4, 21] ",
-            "radial_depth_mm=21 is larger than tool_diameter_mm=20",
-        ),
-        (
-            "speed_rpm = 12600",
-            "speed_rpm = 12600\ncorner_radius_mm = 9",
-            "program 1: corner_radius_mm=9 is tighter than",
-        ),
+        ("teeth = 4", "pitch_deg = [85, 95, 85, 96]\nteeth = 4", r"reference_cut: .*\[85, 95, 85, 96\].* 361"),
+        ("teeth = 4", "pitch_deg = [120, 120, 120]\nteeth = 4", "3 angles for 4 "),
+        ("teeth = 4", "helix_deg = -30\nteeth = 4", "reference_cut helix_deg: .*>= 0.0.* -30.* 90 deg"),
+        ("radial_depth_mm = 20 ", "radial_depth_mm = [12, 4] ", r"radial_depth_mm=\[12, 4\] .*smallest, largest"),
+        ("radial_depth_mm = 20 ", "radial_depth_mm = [4] ", "reference_cut radial_depth_mm: .*list.* 2"),
+        ("radial_depth_mm = 20 ", "radial_depth_mm = [4, 21] ", "radial_depth_mm=21 .*tool_diameter_mm=20"),
+        ("speed_rpm = 12600", "speed_rpm = 12600\ncorner_radius_mm = 9", "program 1: corner_radius_mm=9 .* 10 mm"),
         (
             "speed_rpm = 12600",
             'speed_rpm = 12600\nwear = "blunt"',
-            "program 1 wear: 'blunt' is none of 'new', 'used', 'worn'",
+            "program 1 wear: .*'blunt'.* 'new', 'used', 'worn'",
         ),
-        ('name = "long end mill"', 'name = "T"\npitch_deg = [90, 90]', "tool 1: pitch [90, 90] sums to 180 degrees"),
-        ("position_mm = 166", "position_mm = 16600", "bearing 1: position_mm=16600 is off the shaft, 0 to 672 mm"),
-        ("radial_depth_mm = 20 ", "radial_depth_mm = 25 ", "reference_cut: radial_depth_mm=25 is larger"),
-        ('direction = "down"', 'direction = "climb"', "direction: 'climb' is none of 'up', 'down'"),
-        (
-            "speed_rpm = 12600",
-            "speed_rpm = 12600\nhelix_deg = -30",
-            "program 1 helix_deg: Expected `float` >= 0.0, not -30; give the angle from the axis, 0 up to 90 deg",
-        ),
+        ('name = "long end mill"', 'name = "T"\npitch_deg = [90, 90]', r"tool 1: .*\[90, 90\].* 180 deg"),
+        ("position_mm = 166", "position_mm = 16600", "bearing 1: position_mm=16600 .*0 to 672 mm"),
+        ("radial_depth_mm = 20 ", "radial_depth_mm = 25 ", "reference_cut: radial_depth_mm=25 .*=20"),
+        ('direction = "down"', 'direction = "climb"', "direction: .*'climb'.* 'up', 'down'"),
+        ("speed_rpm = 12600", "speed_rpm = 12600\nhelix_deg = -30", "program 1 helix_deg: .* -30.* 90 deg"),
         (
             'name = "long end mill"',
             'name = "long end mill"\ntool_material = "carbid"',
-            "tool 1 tool_material: 'carbid' is none of 'HSS', 'carbide', 'coated carbide', 'PCD', 'CBN'; is 'carb",
+            "tool 1 tool_material: .*'carbid'.* 'HSS', 'carbide', 'coated carbide', 'PCD', 'CBN'.* 'carbide'",
         ),
-        ("band_hz = [1200, 2200]", "band_hz = [2200, 1200]", "mode: band_hz=[2200.0, 1200.0] does not rise"),
-        ("speed_rpm = 12600", "speed_rpm = 126000", "program 1: speed_rpm=126000 is outside [speed] 3000..24000 rpm"),
-        ("high_rpm = 24000", "high_rpm = 500", "speed: low_rpm=3000 is not below high_rpm=500"),
-        ("hits = 10", "hits = 1", "tap hits: Expected `int` >= 3"),
-        ("B: slot at 6 200 rpm", "A: slot at 12 600 rpm", "program 2: name='A: slot at 12 600 rpm' stands twice"),
+        ("band_hz = [1200, 2200]", "band_hz = [2200, 1200]", r"mode: band_hz=\[2200.0, 1200.0\] .*lowest, highest"),
+        ("speed_rpm = 12600", "speed_rpm = 126000", r"program 1: speed_rpm=126000 .*\[speed\] 3000..24000 rpm"),
+        ("high_rpm = 24000", "high_rpm = 500", "speed: low_rpm=3000 .*high_rpm=500"),
+        ("high_rpm = 24000", "high_rpm = 3000", "speed: low_rpm=3000 .*high_rpm=3000.* 2970 and 3030"),
+        ("hits = 10", "hits = 1", "tap hits: .*whole number >= 3.* 1$"),
+        ("B: slot at 6 200 rpm", "A: slot at 12 600 rpm", "program 2: .*'A: slot at 12 600 rpm'.* unique"),
         ('name = "MACHINE_NAME"', 'name = ""', "machine name: "),
-        ("[machine]", "[machin]", "unknown key 'machin'; is 'machine' meant?"),
-        ("[machine]", "[machine", "at line 2"),
+        ("[machine]", "[machin]", "'machin'.* 'machine'"),
+        ("[machine]", "[machine", ".*at line 2"),
         (
             'theory = "euler-bernoulli"',
             'theory = "rayleigh"',
-            "spindle theory: 'rayleigh' is none of 'euler-bernoulli', 'timoshenko'",
+            "spindle theory: .*'rayleigh'.* 'euler-bernoulli', 'timoshenko'",
         ),
-        ("outer_mm = 31.5", 'material = "carbid", outer_mm = 31.5', "spindle segment 1: material='carbid' is none of"),
-        ("outer_mm = 31.5", "end_bore_mm = 40, outer_mm = 31.5", "segment 1: end_bore_mm=40 is not smaller than"),
-        ("outer_mm = 31.5", "mass_outer_mm = -1, outer_mm = 31.5", "spindle segment 1 mass_outer_mm: "),
-        ("position_mm = 203.5 ", "position_mm = 166 ", "bearing 2: position=0.166 m"),
         (
-            "tool_length_mm = 93.5",
-            "tool_length_mm = 935",
-            "tool_length_mm=935 reaches beyond the first bearing, at 166 mm",
+            "outer_mm = 31.5",
+            'material = "carbid", outer_mm = 31.5',
+            "spindle segment 1: .*'carbid'.* steel, .*'carbide'",
         ),
-        ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
-        ('name = "long end mill"', 'name = "reference"', "tool 1: segments of 'reference', which is [tap] tool"),
-        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: Expected `float` > 0.0, not 0"),
-        ("band_hz = [1200, 2200]", "band_hz = [1200, -1]", "mode band_hz 2: Expected `float` > 0.0, not -1"),
-        (
-            "mass_outer_mm = 18.0",
-            "mass_outer_mm = 18.0, end_outer_mm = 16",
-            "tool 1: segment 1: mass_diameter=0.018 m",
-        ),
-        ("position_mm = 0 ", "position_mm = 5000 ", "tap: position_mm=5000 is off the shaft, 0 to 672 mm"),
-        ("tool_length_mm = 93.5", "tool_length_mm = 200", "tool_length_mm=200 reaches beyond the first bearing"),
-        ("high_rpm = 24000", "high_rpm = inf", "speed high_rpm: Expected `float` <= 1"),
-        ("depth_mm = 2.5", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
+        ("outer_mm = 31.5", "end_bore_mm = 40, outer_mm = 31.5", "segment 1: end_bore_mm=40 .*end_outer_mm=31.5"),
+        ("outer_mm = 31.5", "mass_outer_mm = -1, outer_mm = 31.5", "spindle segment 1 mass_outer_mm: .* -1$"),
+        ("position_mm = 203.5 ", "position_mm = 166 ", "bearing 2: position=0.166 m .*bearing 1"),
+        ("tool_length_mm = 93.5", "tool_length_mm = 935", "tool_length_mm=935 .* 166 mm"),
+        ("tool_length_mm = 93.5", "", r"tool 1: tool_length_mm .*\[spindle\].*'reference'"),
+        ('name = "long end mill"', 'name = "reference"', r"tool 1: .*segments of 'reference'.* \[tap\]"),
+        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: .*> 0.0.* 0$"),
+        ("band_hz = [1200, 2200]", "band_hz = [1200, -1]", "mode band_hz 2: .*> 0.0.* -1$"),
+        ("mass_outer_mm = 18.0", "mass_outer_mm = 18.0, end_outer_mm = 16", "tool 1.*segment 1: .*0.018 m"),
+        ("position_mm = 0 ", "position_mm = 5000 ", "tap: position_mm=5000 .*0 to 672 mm"),
+        ("tool_length_mm = 93.5", "tool_length_mm = 200", "tool_length_mm=200 .* 166 mm"),
+        ("high_rpm = 24000", "high_rpm = inf", "speed high_rpm: .*<= 1"),
+        ("depth_mm = 2.5", "depth_mm = inf", "program 1 depth_mm: .*<= 1"),
     ],
 )
-def test_every_mistake_is_reported_with_its_place(old: str, new: str, message: str) -> None:
+def test_every_mistake_is_reported_with_its_place(old: str, new: str, facts: str) -> None:
     assert old in EXAMPLE
-    with pytest.raises(DataError) as caught:
+    with pytest.raises(DataError, match=rf"^machine\.toml: (.* )?{facts}") as caught:
         parse_machine_file(EXAMPLE.replace(old, new, 1))
-    assert str(caught.value).startswith("machine.toml: ")
-    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -224,27 +203,27 @@ def test_control_characters_in_names_are_rejected_with_their_place(old: str, pla
     with pytest.raises(DataError) as caught:
         parse_machine_file(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
     assert str(caught.value).startswith(f"machine.toml: {place}")
-    assert "holds the control character '\\" in str(caught.value)
+    assert "control character '\\" in str(caught.value)
     assert str(caught.value).isprintable()
 
 
 def test_control_characters_in_a_material_are_rejected() -> None:
     material = '[[material]]\nname = "soft\\u001b"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
-    with pytest.raises(DataError, match=r"material 1: name='soft.*' holds the control character"):
+    with pytest.raises(DataError, match=r"material 1: name='soft.*control character"):
         parse_machine_file(f"{EXAMPLE}\n{material}")
 
 
 def test_materials_have_names_of_their_own() -> None:
     material = '[[material]]\nname = "my steel"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
     assert len(parse_machine_file(f"{EXAMPLE}\n{material}").material) == 1
-    with pytest.raises(DataError, match="material 2: name='my steel' stands twice"):
+    with pytest.raises(DataError, match=r"material 2: .*'my steel'"):
         parse_machine_file(f"{EXAMPLE}\n{material}{material}")
 
 
 def test_a_file_that_is_no_text_is_rejected(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_bytes(EXAMPLE.replace("SURROGATE", "SURROGÄTE").encode("latin-1"))
-    with pytest.raises(DataError, match="no UTF-8 text"):
+    with pytest.raises(DataError, match=r"machine\.toml: .*UTF-8 at byte \d+"):
         read_machine_file(path)
 
 

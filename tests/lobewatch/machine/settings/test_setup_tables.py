@@ -51,56 +51,53 @@ def test_channels_are_converted_at_the_door() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "facts"),
     [
-        ("input = 2", "input = 8", "daq: input=8 is none of 0 to 7"),
-        ("input = 2", "input = 3", "daq: channel 2: input=3 is that of channel 1"),
-        ("input = 2\n", "", "daq channel 1: Object missing required field `input`"),
-        ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' needs sensitivity_mv_per_g"),
-        ('"force"', '"temperature"', "daq channel 1 quantity: 'temperature' is none of 'force', 'acceleration'"),
-        ("sensitivity_mv_per_n = 2.25\n", "", "daq channel 1: give exactly one of sensitivity_mv_per_n"),
+        ("input = 2", "input = 8", "daq: input=8 .*0 to 7"),
+        ("input = 2", "input = 3", "daq: channel 2: input=3 .*channel 1"),
+        ("input = 2\n", "", "daq channel 1: .*'input'"),
+        ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' .*sensitivity_mv_per_g"),
+        ('"force"', '"temperature"', "daq channel 1 quantity: .*'temperature'.* 'force', 'acceleration'"),
+        ("sensitivity_mv_per_n = 2.25\n", "", "daq channel 1: .*sensitivity_mv_per_n .*sensitivity_mv_per_g"),
         (
             "sensitivity_mv_per_n = 2.25",
             "sensitivity_mv_per_n = 2\nsensitivity_mv_per_g = 1",
-            "daq channel 1: give exactly",
+            "daq channel 1: .*sensitivity_mv_per_n .*sensitivity_mv_per_g",
         ),
-        ("sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_n = 0", "daq channel 1: sensitivity_mv_per_n=0 is not the"),
+        ("sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_n = 0", "daq channel 1: sensitivity_mv_per_n=0"),
         ("sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_n = nan", "daq channel 1 sensitivity_mv_per_n: "),
-        ("sensitivity_mv_per_n", "sensitivity_v_per_n", "unknown key 'sensitivity_v_per_n'; is 'sensitivity_mv_per_n'"),
+        ("sensitivity_mv_per_n", "sensitivity_v_per_n", "'sensitivity_v_per_n'.* 'sensitivity_mv_per_n'"),
         ("gain = 10", "gain = -1", "daq channel 2 gain: "),
         ("range_v = 0.5", "range_v = 0", "daq channel 2 range_v: "),
-        ('"x"', '"z"', "daq channel 2 direction: 'z' is none of "),
+        ('"x"', '"z"', "daq channel 2 direction: .*'z'"),
         ("2026-01-15", '"last spring"', "daq channel 2 calibration_date: "),
         ("skew_us = 6.5", "skew_us = inf", "daq channel 2 skew_us: "),
         (
             'driver = "dataq"',
             'driver = "ni"',
-            "daq: driver='ni' is none of taps, dataq, lines, audio, nidaqmx, mcc172, uldaq, ljm; correct the name",
+            "daq: .*'ni'.* taps, dataq, lines, audio, nidaqmx, mcc172, uldaq, ljm",
         ),
-        ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
-        ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
+        ('driver = "dataq"', "", "daq: channel: .*TAPS/1"),
+        ('driver = "dataq"', "loss_detection = false", "daq: channel: .*TAPS/1"),
     ],
 )
-def test_every_mistake_is_reported_with_its_table_and_key(old: str, new: str, message: str) -> None:
+def test_every_mistake_is_reported_with_its_table_and_key(old: str, new: str, facts: str) -> None:
     assert old in DAQ
-    with pytest.raises(DataError) as caught:
+    with pytest.raises(DataError, match=facts) as caught:
         parse_machine_file(HEAD + DAQ.replace(old, new, 1))
-    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection() -> None:
-    with pytest.raises(
-        DataError, match=r"needs two \[\[daq.channel\]\], one of force and one of acceleration; here are no"
-    ):
+    with pytest.raises(DataError, match=r"\[\[daq.channel\]\].* force .*acceleration"):
         parse_machine_file(HEAD + '[daq]\ndriver = "dataq"\n')
-    with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
+    with pytest.raises(DataError, match=r"daq: loss_detection=false.* TAPS/1"):
         parse_machine_file(HEAD + "[daq]\nloss_detection = false\n")
-    with pytest.raises(DataError, match="daq: digital_clock=true: a TAPS/1 device numbers its scans"):
+    with pytest.raises(DataError, match=r"daq: digital_clock=true.* TAPS/1"):
         parse_machine_file(HEAD + "[daq]\ndigital_clock = true\n")
     clock = HEAD + DAQ.replace('driver = "dataq"', 'driver = "dataq"\ndigital_clock = true')
     assert parse_machine_file(clock).daq.settings.digital_clock
-    with pytest.raises(DataError, match="daq: digital_clock=true: the clock stands in the digital word"):
+    with pytest.raises(DataError, match="daq: digital_clock=true"):
         parse_machine_file(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
 
 
@@ -109,16 +106,16 @@ BOARD = HEAD + '[tap]\nhammer = "none"\n[daq]\ndriver = "lines"\nsample_rate_hz 
 
 
 @pytest.mark.parametrize(
-    ("axes", "message"),
+    ("axes", "facts"),
     [
-        ([(0, ""), (1, ""), (2, "")], "3 channels of acceleration: each that is tapped along needs its own direction"),
-        ([(0, 'direction = "x"'), (1, 'direction = "x"')], "2 channels of acceleration: each that is tapped along"),
-        ([(0, 'direction = "x"'), (1, ""), (1, "")], "channel 3: input=1 is that of channel 2"),
-        ([(0, 'direction = "x"'), (1, ""), (3, "")], "the numbers after the counter are the inputs 0, 1 and 2"),
+        ([(0, ""), (1, ""), (2, "")], "3 channels of acceleration.* direction"),
+        ([(0, 'direction = "x"'), (1, 'direction = "x"')], "2 channels of acceleration.* direction"),
+        ([(0, 'direction = "x"'), (1, ""), (1, "")], "channel 3: input=1 .*channel 2"),
+        ([(0, 'direction = "x"'), (1, ""), (3, "")], "inputs 0, 1 and 2"),
     ],
 )
-def test_axes_that_cannot_be_classified_apart_are_rejected(axes: list[tuple[int, str]], message: str) -> None:
-    with pytest.raises(DataError, match=message):
+def test_axes_that_cannot_be_classified_apart_are_rejected(axes: list[tuple[int, str]], facts: str) -> None:
+    with pytest.raises(DataError, match=facts):
         parse_machine_file(BOARD + "".join(AXIS.format(*axis) for axis in axes))
 
 
@@ -127,19 +124,19 @@ def test_three_axes_are_read_and_need_the_hammer_to_be_none() -> None:
         AXIS.format(i, f'direction = "{name}"' if name else "") for i, name in enumerate(("x", "y", ""))
     )
     assert [channel.direction for channel in parse_machine_file(text).daq.channel] == ["x", "y", ""]
-    with pytest.raises(DataError, match="of acceleration alone; add that of the hammer"):
+    with pytest.raises(DataError, match=r"daq: .*force.*hammer"):
         parse_machine_file(text.replace('hammer = "none"', ""))
 
 
 def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     dummy = HEAD + '[daq]\ndriver = "dummy"\n'
-    with pytest.raises(DataError, match=r"daq: driver='dummy' is none of taps, dataq, .*ljm; correct the name"):
+    with pytest.raises(DataError, match=r"daq: .*'dummy'.* taps, dataq, .*ljm"):
         parse_machine_file(dummy)
     monkeypatch.syspath_prepend(PLUGIN)
     assert parse_machine_file(dummy).daq.driver == "dummy"
-    with pytest.raises(DataError, match="daq: sample_rate_hz=1000 is not 25600, the only rate of a dummy device"):
+    with pytest.raises(DataError, match=r"daq: sample_rate_hz=1000 .*25600"):
         parse_machine_file(dummy + "sample_rate_hz = 1000\n")
-    with pytest.raises(DataError, match=r"daq: channel: a dummy device names its own sensors: leave \[\[daq.channel"):
+    with pytest.raises(DataError, match=r"daq: channel: a dummy device .*\[\[daq.channel"):
         parse_machine_file(HEAD + DAQ.replace('"dataq"', '"dummy"'))
 
 

@@ -172,20 +172,18 @@ def test_the_drive_counts_with_the_greatest_feed_of_the_tool_where_the_program_h
 
 
 @pytest.mark.parametrize(
-    ("more", "message"),
+    ("more", "facts"),
     [
-        ("cutting_speed_m_min = [200, 90]", "cutting_speed_m_min=[200, 90] does not rise; give [least, greatest]"),
-        ("feed_per_tooth_mm = -0.1", "feed_per_tooth_mm: Expected `float` > 0.0, not -0.1"),
-        ("max_speed = 3", "unknown key 'max_speed'; is 'max_speed_rpm' meant?"),
-        ("masses = [{ position_mm = 1, mass_kg = 1 }]", "masses without segments"),
+        ("cutting_speed_m_min = [200, 90]", r"cutting_speed_m_min=\[200, 90\] .*smallest, largest"),
+        ("feed_per_tooth_mm = -0.1", "feed_per_tooth_mm: .*> 0.0.* -0.1"),
+        ("max_speed = 3", "'max_speed'.* 'max_speed_rpm'"),
+        ("masses = [{ position_mm = 1, mass_kg = 1 }]", "masses .*segments"),
         ("pitch_deg = [90, 90, 90]\nteeth = 4", "pitch"),
     ],
 )
-def test_a_mistake_in_a_tool_is_reported(more: str, message: str) -> None:
-    with pytest.raises(DataError) as caught:
+def test_a_mistake_in_a_tool_is_reported(more: str, facts: str) -> None:
+    with pytest.raises(DataError, match=f"tool 1.*{facts}"):
         machine(tool(more))
-    assert message in str(caught.value)
-    assert "tool 1" in str(caught.value)
 
 
 @pytest.mark.parametrize(("key", "value"), [("teeth", 5), ("diameter_mm", 9), ("flute_length_mm", 50)])
@@ -194,12 +192,12 @@ def test_a_program_that_contradicts_its_tool_is_asked_about(key: str, value: flo
     read = machine(program(feed=flutes), tool(f"{key} = {value}"))
     (asked,) = find_all_questions(read)
     assert asked.fault == "settings-contradict"
-    assert f"{key} of [[tool]] 'reference' is {value}" in asked.reason
+    assert f"{key} = {value} of [[tool]] 'reference'" in asked.reason
     assert find_all_questions(machine(program(feed=flutes), tool("teeth = 4\ndiameter_mm = 18\n" + flutes))) == []
 
 
 def test_a_cut_deeper_than_the_flutes_of_its_tool_is_rejected() -> None:
-    with pytest.raises(DataError, match="program 1: depth_mm=2 is deeper than flute_length_mm=1 of tool 'reference'"):
+    with pytest.raises(DataError, match=r"program 1: depth_mm=2 .*flute_length_mm=1 .*'reference'"):
         machine(program(), tool("flute_length_mm = 1"))
 
 

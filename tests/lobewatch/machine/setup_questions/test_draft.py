@@ -15,9 +15,9 @@ TEMPLATE = resources.files("sim_data").joinpath("new_machine.toml").read_text("u
 
 def test_numbers_are_read_with_units_and_decimal_commas() -> None:
     assert parse_numbers("15 kW, 40,5 Nm", ("power in kW", "torque in N m")) == [15.0, 40.5]
-    with pytest.raises(ValueError, match="what is 'horses'"):
+    with pytest.raises(ValueError, match=r"'horses'.* power in kW"):
         parse_numbers("15 horses", ("power in kW",))
-    with pytest.raises(ValueError, match="1 number; wanted are"):
+    with pytest.raises(ValueError, match=r"'15' .*1 number.* power in kW, torque in N m"):
         parse_numbers("15", ("power in kW", "torque in N m"))
 
 
@@ -29,5 +29,5 @@ def test_an_answer_changes_only_its_own_table() -> None:
     assert question.read_current(answered) == "15 40"
     assert answered.table("speed") == draft.table("speed")
     assert len({question.name for question in SETUP_QUESTIONS}) == len(SETUP_QUESTIONS) == 10
-    with pytest.raises(ValueError, match="no such question"):
+    with pytest.raises(ValueError, match=r"color.* name, speeds, drive"):
         find_setup_question("color")

@@ -43,7 +43,7 @@ def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
     (10.45, 89.55)
     """
     if not time_constant > 0:
-        raise ValueError(f"time_constant={time_constant} s is not > 0")
+        raise ValueError(f"time_constant={time_constant} s is not above 0")
     pulse = require_pulse(hit)
     after = np.maximum(np.arange(hit.force.size) - pulse.start, 0) / hit.sample_rate
     window = np.exp(-after / time_constant)

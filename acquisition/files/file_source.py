@@ -63,7 +63,7 @@ class FileSource(ClosedOnExit):
         self.identity = DeviceIdentity(f"replay of {Path(path).name}")
         """Name of the file."""
         self.events: deque[Event] = deque()
-        """It tells of no events."""
+        """Empty: a file has no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
 

@@ -61,7 +61,7 @@ def choose_code_type(channels: Sequence[Channel]) -> type[np.int16 | np.int32]:
 
 
 def write_raw_hits(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
-    """Write hits and the flags of each in a group of their own; nothing without hits."""
+    """Write hits and the flags of each in their own group; nothing without hits."""
     if hits:
         raw = file.create_group("raw")
         write_hit_settings(raw, HitSettings.from_hit(hits[0]))

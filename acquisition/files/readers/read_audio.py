@@ -53,8 +53,8 @@ def _read_flac_or_mp3(path: Path) -> tuple[float, Floats]:
     try:
         import soundfile
     except ImportError as error:
-        cure = 'install it: pip install "lobewatch[sound]", or export WAV'
-        raise DataError(f"{path}: FLAC and MP3 are read by soundfile; {cure}") from error
+        cure = 'Export WAV, or run pip install "lobewatch[sound]".'
+        raise DataError(f"{path}: FLAC and MP3 need the package soundfile. {cure}") from error
     try:
         values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
     except Exception as error:

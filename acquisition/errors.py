@@ -59,7 +59,7 @@ class DataError(ValueError):
 
 
 def format_error(error: Exception) -> str:
-    """Return any error as a sentence, with its type where it is an unforeseen one."""
+    """Return any error as a sentence, with its type if it is unexpected."""
     if isinstance(error, OSError) and error.filename and error.strerror:
         return format_os_error(error)
     if isinstance(error, (ValueError, OSError, ArithmeticError)):

@@ -72,7 +72,7 @@ class Hit:
             shapes = f"force {self.force.shape} and acceleration {self.acceleration.shape}"
             raise ValueError(f"{shapes} must be 1-D records of equal length, at least 8 samples")
         if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
-            raise ValueError(f"sample_rate={self.sample_rate} Hz is not > 0")
+            raise ValueError(f"sample_rate={self.sample_rate} Hz is not above 0")
 
     @classmethod
     def from_codes(
@@ -144,8 +144,8 @@ class TapInputs:
     def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
         """Select the inputs of a tap test in one direction.
 
-        Of several responses that of the direction is used, of "xy" that of y. A hit in x is also recorded by a second
-        sensor along y, if there is one. It comes before the last input.
+        If there are several responses, the one of the direction is used, for "xy" that of y. A hit in x is also
+        recorded by a second sensor along y, if there is one. It comes before the last input.
 
         Parameters
         ----------
@@ -167,11 +167,11 @@ class TapInputs:
         responses = [i for i in found if not several or (direction and channels[i].direction == axis)]
         if len(responses) != 1 or (quantity == "force" and len(forces) != 1):
             listed = ", ".join(channel.name for channel in channels) or "nothing"
-            needed = "one force and one acceleration channel are needed"
+            needed = "one force and one acceleration channel"
             if quantity == "acceleration":
-                needed = "one acceleration channel is needed to tap without a force sensor"
-            which = f', of several that with direction = "{axis}"' if several else ""
-            raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
+                needed = "one acceleration channel without a force sensor"
+            which = f' with direction = "{axis}"' if several else ""
+            raise DataError(f"the DAQ has channels for {listed}. A tap test needs {needed}{which}.")
         cross = [i for i in found if direction == "x" and channels[i].direction == "y" and i not in responses]
         rows = (*forces, *cross[:1], *responses) if quantity == "force" else (*responses,)
         return cls(rows, tuple(channels[row] for row in rows))

@@ -122,7 +122,7 @@ class Device(Source, Protocol):
 
     @property
     def fault(self) -> str:
-        """Present fault, one sentence; empty without one."""
+        """Present fault and its remedy in sentences; empty without one."""
 
     def close(self) -> None:
         """Stop, and release the port."""

@@ -53,7 +53,7 @@ class Conditions:
         for name, (low, high) in CONDITION_RANGES.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}; correct it, or leave it out")
+                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}. Correct or omit it.")
         for name in ("state", "note"):
             check_name(getattr(self, name), name)
 
@@ -86,7 +86,7 @@ class Conditions:
 
 
 UNKNOWN_CONDITIONS = Conditions()
-"""Conditions of which nothing is known."""
+"""Conditions that are all unknown."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Circumstances:
     def __post_init__(self) -> None:
         parse_direction(self.direction)
         if self.created.tzinfo is None:
-            raise ValueError(f"created={self.created} has no time zone; give one, e.g. datetime.now(UTC)")
+            raise ValueError(f"created={self.created} has no time zone. Give one, as in datetime.now(UTC).")
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class TapTest:
     def required_frf(self) -> Frf:
         """Averaged FRF; DataError where no force was measured."""
         if self.frf is None:
-            raise DataError(f"{self.id}: no force was measured, so it has no FRF; tap with a hammer that measures it")
+            raise DataError(f"{self.id}: no FRF, because no force was measured. Tap with an instrumented hammer.")
         return self.frf
 
     @property

@@ -70,9 +70,7 @@ def check_inputs(inputs: Sequence[SensorInput]) -> None:
     numbers = [sensor.number for sensor in inputs]
     for number in numbers:
         if not 0 <= number < DIGITAL_INPUTS_CODE:
-            raise ValueError(
-                f"input={number} does not exist. A DATAQ device has inputs 0 to {DIGITAL_INPUTS_CODE - 1}."
-            )
+            raise ValueError(f"input={number} of a DATAQ device is not one of 0 to {DIGITAL_INPUTS_CODE - 1}")
     if not numbers or len(set(numbers)) < len(numbers):
         raise ValueError(f"inputs {numbers} of a DATAQ device must be at least one, each used once")
 
@@ -81,9 +79,7 @@ def choose_rate(wanted: float, dividend: int) -> RateSetting:
     """Return the setting nearest to a rate (Hz) with the least decimation. ValueError if it is out of reach."""
     fastest, slowest = dividend / SRATE_LIMITS[0], dividend / (SRATE_LIMITS[1] * DEC_LIMITS[1] * DECA_LIMITS[1])
     if not slowest <= wanted <= fastest:
-        raise ValueError(
-            f"sample rate {wanted:g} Hz is outside {slowest:.2g} to {fastest:g} Hz, the limits of this DAQ"
-        )
+        raise ValueError(f"sample rate {wanted:g} Hz is outside the {slowest:.2g} to {fastest:g} Hz of this DAQ")
     dec = min(math.ceil(dividend / wanted / SRATE_LIMITS[1]), DEC_LIMITS[1])
     deca = min(math.ceil(dividend / wanted / SRATE_LIMITS[1] / dec), DECA_LIMITS[1])
     srate = round(dividend / wanted / dec / deca)

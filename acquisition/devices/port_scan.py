@@ -140,8 +140,13 @@ class ScannedPort:
     """Device that answers, None for none."""
     text: str = ""
     """Reason why none answers, in a few words."""
-    problem: str = ""
-    """Reason why the port could not be probed, a sentence with the remedy."""
+    failure: DeviceError | None = None
+    """Error that prevented probing the port, with its remedy."""
+
+    @property
+    def problem(self) -> str:
+        """Text of that error, empty if there is none."""
+        return str(self.failure or "")
 
 
 @dataclass(frozen=True)
@@ -192,5 +197,5 @@ def _scan_port(port: PortInfo, drivers: Sequence[Driver], remarks: list[Remark],
     try:
         answer = probe_port(port.device, drivers, port.vendor, remarks)
     except DeviceError as error:
-        return ScannedPort(port, text="cannot be opened", problem=str(error))
+        return ScannedPort(port, text="cannot be opened", failure=error)
     return ScannedPort(port, answer, "" if answer else "no answer")

@@ -64,9 +64,7 @@ class MillingCut:
             raise ValueError(f"{text} and speed_rpm={self.speed_rpm} must be finite and above 0")
         least = (self.radial, self.tangential_edge, self.radial_edge, self.helix_lag)
         if not (min(least) >= 0 and sum(least) < np.inf):
-            raise ValueError(
-                f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and not below 0"
-            )
+            raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and at least 0")
         if len(self.runout) not in (0, self.teeth):
             raise ValueError(f"runout has {len(self.runout)} values. Give {self.teeth}, one per tooth, or none.")
         is_turn = abs(sum(self.pitch) - 2 * np.pi) < 1e-6

@@ -68,9 +68,7 @@ def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
 def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode time, force and acceleration of one hit; raise DataError for several."""
     if len(hits) != 1:
-        raise DataError(
-            f"a text table cannot hold {len(hits)} hits. Write them as .uff, .mat or .json, or write the FRF."
-        )
+        raise DataError(f"a text table cannot hold {len(hits)} hits. Write .uff, .mat or .json, or write the FRF.")
     (hit,) = hits
     time = np.arange(hit.force.size) / hit.sample_rate
     return _encode_table({"time [s]": time, "force [N]": hit.force, "acceleration [m/s^2]": hit.acceleration}, labels)

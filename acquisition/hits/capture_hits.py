@@ -83,7 +83,7 @@ class Trigger:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.level) and self.level > 0):
-            raise ValueError(f"trigger level={self.level} is not > 0")
+            raise ValueError(f"trigger level={self.level} is not above 0")
         if not 0 < self.pre_trigger < self.n_samples:
             raise ValueError(f"pre_trigger={self.pre_trigger} samples is not between 1 and n_samples={self.n_samples}")
 

@@ -161,9 +161,8 @@ def find_column(signals: Sequence[Signal], name: str, field_name: str, report: I
         return meant[0]
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
-        raise report.reject(
-            field_name, None, f"{len(meant)} columns have the name {name!r}", f"Give a number: {numbers}"
-        )
+        fault = f"{len(meant)} columns have the name {name!r}"
+        raise report.reject(field_name, None, fault, f"Give a column number, {numbers}")
     raise report.reject(field_name, None, f"no column {name!r} in the file, only {format_signal_names(signals)}")
 
 

@@ -57,9 +57,7 @@ def read_numpy(path: Path) -> Contents:
         with path.open("rb") as file:
             return _read_numpy_file(file, path)
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise DataError(
-            f"{path}: unreadable ({error}). Save only arrays of numbers, without Python objects."
-        ) from error
+        raise DataError(f"{path}: unreadable ({error}). Save arrays of numbers, without Python objects.") from error
 
 
 def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:

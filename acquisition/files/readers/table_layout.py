@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from acquisition.errors import DataError
+from acquisition.errors import DataError, join_sentences
 from acquisition.files.contents.column_headings import infer_role, is_unit, split_heading
 from acquisition.files.contents.units import parse_unit
 from acquisition.files.readers.number_format import Column, is_number, parse_columns
@@ -130,9 +130,9 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
         goes_on = goes_on and sum(map(is_number, row)) != width
         if is_short or goes_on:
             n = sum(map(is_number, row))
-            skip = f"pass over it with Description.skip {rows.numbers[0]}"
-            cure = "" if i else f"; {skip}, and name the columns with Description.columns"
-            raise DataError(f"{place}: line {rows.numbers[i]}: {n} numbers where other rows have {width}{cure}")
+            found = f"{place}: line {rows.numbers[i]}: {n} numbers, but the other rows have {width}"
+            skip = f"Skip it with Description.skip {rows.numbers[0]}"
+            raise DataError(join_sentences(found, "" if i else f"{skip}, and give Description.columns"))
 
 
 Heading = list[tuple[str, str]]

@@ -196,7 +196,7 @@ BUILT_IN_DRIVERS = (
     ),
     Driver(
         "lines",
-        "a board that prints lines of numbers",
+        "a text-output board that prints lines of numbers",
         lambda port, settings: _import("text_boards.source").TextBoardSource(
             port, settings.inputs, settings.sample_rate, settings.printing
         ),

@@ -275,10 +275,8 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     counts = (g2 > MIN_SKEW_COHERENCE) & (np.arange(g2.size) > 0)
     share = float(np.mean(counts))
     if share < MIN_COHERENT_SHARE:
-        shares = f"at {share:.0%} of the lines, required {MIN_COHERENT_SHARE:.0%}"
-        text = (
-            f"the two channels do not have the same broad-band signal (coherence over {MIN_SKEW_COHERENCE:g} {shares})"
-        )
+        shares = f"over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the lines, required {MIN_COHERENT_SHARE:.0%}"
+        text = f"the two channels do not record the same broad-band signal (coherence {shares})"
         raise ValueError(f"{text}. Join both inputs with a T-piece and feed noise or taps.")
     omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
     rough = _find_correlation_peak(np.where(counts, mean, 0.0))

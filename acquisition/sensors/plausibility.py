@@ -56,9 +56,8 @@ def unit_mistake_remark(ratio: float) -> Remark | None:
     """
     for factor, (value, cure) in _UNIT_MISTAKES.items():
         if abs(ratio / factor - 1) < UNIT_MISTAKE_TOLERANCE:
-            return Remark(
-                "unit-mistake", "", f"the ratio {ratio:.4g} is close to {value}, a typical unit mistake", cure
-            )
+            text = f"the ratio {ratio:.4g} is close to {value}, a typical unit mistake"
+            return Remark("unit-mistake", "", text, cure)
     return None
 
 

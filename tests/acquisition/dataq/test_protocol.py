@@ -134,9 +134,7 @@ def test_a_rejected_command_is_reported_with_the_words_of_the_device(answer: byt
 
 
 def test_a_silent_device_gets_the_hint_to_cdc_mode() -> None:
-    with pytest.raises(
-        DeviceError, match="COM9.*info 0, 3 .*CDC"
-    ):
+    with pytest.raises(DeviceError, match=r"COM9.*info 0, 3 .*CDC"):
         connect([IDENTITY[0], *[(b"info 0\r", b"")] * 3])
 
 
@@ -189,7 +187,7 @@ def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_rejec
         assert 375 <= chosen.srate <= 65_535
         assert 1 <= chosen.dec <= 512
         assert 1 <= chosen.deca <= 40_000
-    with pytest.raises(ValueError, match="200000 Hz .*160000 Hz"):
+    with pytest.raises(ValueError, match=r"200000 Hz .*160000 Hz"):
         choose_rate(200_000.0, 60_000_000)
 
 
@@ -211,7 +209,7 @@ def test_small_facts_of_the_protocol() -> None:
     assert [parse_firmware(text) for text in ("1.35", "87", "newest")] == [1.35, 1.35, None]
     assert [encode_range("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
     assert [encode_range("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]
-    with pytest.raises(ValueError, match="input=8 .*0 to 7"):
+    with pytest.raises(ValueError, match=r"input=8 .*0 to 7"):
         DataqSource("COM9", (replace(INPUTS[0], number=8),))
     with pytest.raises(ValueError, match=r"inputs \[0, 0\]"):
         DataqSource("COM9", (INPUTS[0], INPUTS[0]))

@@ -275,7 +275,7 @@ def test_digital_inputs_that_do_not_hold_still_are_reported(emulated: Make, monk
     monkeypatch.setattr("acquisition.dataq.source.SILENCE_TIMEOUT", 0.3)
     with emulated(digital_word=0x0001) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
-        with pytest.raises(DeviceError, match="digital inputs .*loss_detection = false"):
+        with pytest.raises(DeviceError, match=r"digital inputs .*loss_detection = false"):
             list(source.blocks())
 
 

@@ -152,7 +152,7 @@ def test_settings_that_make_a_driver_fail_are_rejected_with_its_package(bad_daq:
 @pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
 def test_a_driver_that_fails_when_opened_is_a_device_that_is_not_there(bad_daq: None, error: BaseException) -> None:
     with (
-        pytest.raises(DeviceError, match=f"bad-daq .*opening COM1 .*{type(error).__name__}"),
+        pytest.raises(DeviceError, match=rf"bad-daq .*opening COM1 .*{type(error).__name__}"),
         convert_driver_errors("bad", "opening COM1"),
     ):
         raise error

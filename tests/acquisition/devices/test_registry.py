@@ -80,19 +80,19 @@ def test_what_is_no_driver_is_rejected_with_the_name_of_its_package(
 def test_a_driver_under_another_name_is_rejected(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
     install("liar", "lobewatch_dummy_device:DRIVER")
-    with pytest.raises(DataError, match="driver 'odd': .*liar .*'dummy'"):
+    with pytest.raises(DataError, match=r"driver 'odd': .*liar .*'dummy'"):
         find_driver("odd")
 
 
 def test_two_packages_with_one_driver_are_both_named(install: Install) -> None:
     install("first", "a:b")
     install("second", "c:d")
-    with pytest.raises(DataError, match="driver 'odd': .*first and second"):
+    with pytest.raises(DataError, match=r"driver 'odd': .*first and second"):
         find_driver("odd")
 
 
 def test_a_name_that_nobody_brings() -> None:
-    with pytest.raises(DataError, match="driver='odd' .*taps, dataq, .*ljm"):
+    with pytest.raises(DataError, match=r"driver='odd' .*taps, dataq, .*ljm"):
         find_driver("odd")
 
 

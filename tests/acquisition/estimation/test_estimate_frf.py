@@ -154,7 +154,7 @@ def test_bad_calls_are_rejected(tapper: Tapper, channels: Pair) -> None:
     (hit,) = hits(tapper, channels, 1)
     with pytest.raises(ValueError, match="0 hits"):
         estimate_frf([])
-    with pytest.raises(ValueError, match="'H3' .*H1, H2, Hv"):
+    with pytest.raises(ValueError, match=r"'H3' .*H1, H2, Hv"):
         estimate_frf([hit], "H3")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match=r"\(\d+, \d+\.0\), \(\d+, \d+\.0\)"):
         estimate_frf([hit, replace(hit, sample_rate=51200.0)])

@@ -119,7 +119,7 @@ def test_noise_keeps_it_from_settling() -> None:
 def test_what_cannot_join_or_leave_is_rejected() -> None:
     mean = mean_of([pulse(1.0)])
     other = Hit(np.r_[pulse(1.0).force, 0.0], np.r_[pulse(1.0).acceleration, 0.0], 1024.0)
-    with pytest.raises(ValueError, match="1025 samples at 1024 Hz .*1024 samples"):
+    with pytest.raises(ValueError, match=r"1025 samples at 1024 Hz .*1024 samples"):
         mean.add(other)
     with pytest.raises(ValueError, match="not in the mean"):
         mean.remove(pulse(1.0))

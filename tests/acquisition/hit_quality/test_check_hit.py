@@ -140,7 +140,7 @@ def test_flags_print_as_words_with_the_cure() -> None:
     assert HIT_FAULTS[HitFlags.DOUBLE_HIT].remedy in str(both)
     assert HitFlags.from_words(both.words) == both
     assert not HitFlags.from_words(HitFlags.OK.words)
-    with pytest.raises(ValueError, match="'bad luck' .*double hit"):
+    with pytest.raises(ValueError, match=r"'bad luck' .*double hit"):
         HitFlags.from_words("bad luck")
 
 

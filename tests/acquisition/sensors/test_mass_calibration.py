@@ -185,7 +185,7 @@ def test_bad_calls_are_rejected(true_hits: list[Hit]) -> None:
     for mass in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match=f"mass={mass} kg"):
             calibrate_by_mass(true_hits, mass)
-    with pytest.raises(ValueError, match="2 good hits .*3"):
+    with pytest.raises(ValueError, match=r"2 good hits .*3"):
         calibrate_by_mass(true_hits[:2], MASS)
 
 

@@ -139,7 +139,7 @@ def test_chaos_is_rejected() -> None:
 
 
 def test_too_few_blocks_a_stream_that_ends_and_no_time_are_rejected() -> None:
-    with pytest.raises(DeviceError, match="6 blocks .*10 in 5 s"):
+    with pytest.raises(DeviceError, match=r"6 blocks .*10 in 5 s"):
         measured(even(512.0, seconds=7.0))
     with pytest.raises(DeviceError, match=r"50 blocks .*0\.98 s"):
         measured(even(25600.0, seconds=1.0))

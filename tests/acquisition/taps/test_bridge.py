@@ -237,7 +237,7 @@ def test_a_dataq_with_its_sensors_goes_through(structure: Structure, monkeypatch
 
 
 def test_no_device_and_no_address_are_rejected(tapper: Tapper, channels: Pair) -> None:
-    with pytest.raises(DeviceError, match="acquisition.scan_ports"):
+    with pytest.raises(DeviceError, match=r"acquisition.scan_ports"):
         TapsBridge(lambda: TapsSource("/dev/ttyNOT_THERE"), print)
     with TapsEmulator(tapper(), channels, RATE) as device, pytest.raises(OSError, match="assign requested address"):
         TapsBridge(lambda: TapsSource(device.port), print, address="192.0.2.1")

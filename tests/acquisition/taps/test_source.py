@@ -404,7 +404,7 @@ def test_a_device_whose_info_never_arrives_is_rejected(
     monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     with (
         TapsEmulator(tapper(), channels, RATE, faults=TapsFaults(cut_infos=99)) as device,
-        pytest.raises(DeviceError, match="TAPS/1 .*HELLO, 3 "),
+        pytest.raises(DeviceError, match=r"TAPS/1 .*HELLO, 3 "),
     ):
         TapsSource(device.port)
 
@@ -472,7 +472,7 @@ def test_unplugged_in_any_state_it_is_the_same_sentence(
 
 
 def test_a_rate_that_the_device_does_not_have_is_rejected(device: TapsEmulator) -> None:
-    with pytest.raises(ValueError, match="1000 Hz .*25600 Hz"):
+    with pytest.raises(ValueError, match=r"1000 Hz .*25600 Hz"):
         TapsSource(device.port, sample_rate=1000.0)
 
 

@@ -236,7 +236,7 @@ def test_a_device_in_use_is_reported(name: str, reason: str, plugged: Any, wirin
 
 def test_a_sound_device_that_gives_no_numbers_of_32_bits(plugged: Any, wiring: Wiring) -> None:
     wiring.faults.add("no 32 bits")
-    with pytest.raises(DeviceError, match="audio:485B39 .*Sample format not supported"):
+    with pytest.raises(DeviceError, match=r"audio:485B39 .*Sample format not supported"):
         plugged("audio")
 
 
@@ -258,15 +258,15 @@ def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPat
     settings = DeviceSettings(48000.0, inputs(10.0))
     two = fake_sounddevice(wiring, ("USB Audio", "USB Audio", "Mono Mic"), 10.0)
     monkeypatch.setitem(sys.modules, "sounddevice", two)
-    with pytest.raises(DeviceError, match="2 .*0: USB Audio, 1: USB Audio"):
+    with pytest.raises(DeviceError, match=r"2 .*0: USB Audio, 1: USB Audio"):
         audio.open("audio:USB Audio", settings)
     with audio.open("audio:1", settings) as device:
         assert device.channels[0].full_scale == 10.0  # no calibration in its name: range_v is believed
-    with pytest.raises(ValueError, match="input=1 .*Mono Mic .*0 to 0"):
+    with pytest.raises(ValueError, match=r"input=1 .*Mono Mic .*0 to 0"):
         audio.open("audio:Mono", settings)
     slow = fake_sounddevice(wiring, ("USB Audio",), 10.0, actual_rate=44100.0)
     monkeypatch.setitem(sys.modules, "sounddevice", slow)
-    with pytest.raises(DeviceError, match="44100 Hz .*48000 Hz"):
+    with pytest.raises(DeviceError, match=r"44100 Hz .*48000 Hz"):
         audio.open("audio:USB", settings)
 
 
@@ -282,7 +282,7 @@ def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytes
         device.start()
         block = next(iter(device.blocks()))
     np.testing.assert_allclose(block.codes[0] * device.channels[0].scale, 20.0, rtol=1e-6)
-    with pytest.raises(ValueError, match="input=0: .*333D01"):
+    with pytest.raises(ValueError, match=r"input=0: .*333D01"):
         audio.open("audio:333D01", DeviceSettings(48000.0, inputs(10.0)))
     with pytest.raises(ValueError, match=r"range_v=5 .*333D01 .*1\.579 for input 0"):
         audio.open("audio:333D01", DeviceSettings(48000.0, (SensorInput(0, Channel("acceleration", 0.01, 5.0)),)))

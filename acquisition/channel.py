@@ -33,7 +33,7 @@ def parse_direction(text: str) -> TapDirection:
     Raises
     ------
     ValueError
-        Where the text names no direction.
+        If the text names no direction.
 
     Examples
     --------
@@ -67,11 +67,11 @@ class Channel:
     adc_bits: int = 16
     """Resolution (bits); codes run from -2^(bits-1) to 2^(bits-1) - 1."""
     direction: TapDirection | Literal[""] = ""
-    """Direction at the tool tip; empty where it is not fixed."""
+    """Direction at the tool tip; empty if it is not fixed."""
     serial_number: str = ""
     """Serial number of the sensor."""
     calibration_date: str = ""
-    """Calibration date of the sensor (ISO); empty where unknown."""
+    """Calibration date of the sensor (ISO); empty if unknown."""
     skew: float = 0.0
     """Delay of sampling against channel 0 (s): value k of this channel is taken at t_k + skew."""
 

@@ -89,7 +89,7 @@ _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK
 
 
 class IrregularFileError(OSError):
-    """Raised where a path is not a regular file or is too large."""
+    """Raised if a path is not a regular file or is too large."""
 
 
 def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileIO:

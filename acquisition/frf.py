@@ -21,7 +21,7 @@ class Frf:
     Raises
     ------
     ValueError
-        Where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
+        If shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
 
     Examples
     --------
@@ -40,7 +40,7 @@ class Frf:
     receptance: Complexes
     """Displacement over force (m/N), shape (n,)."""
     coherence: Floats | None = None
-    """Ordinary coherence, 0 to 1, shape (n,); None where unknown."""
+    """Ordinary coherence, 0 to 1, shape (n,); None if unknown."""
     n_averages: int = 1
     """Number of hits averaged."""
     measured_as: FrfQuantity = "receptance"
@@ -120,7 +120,7 @@ class Frf:
         Raises
         ------
         ValueError
-            Where the band holds fewer than 2 lines.
+            If the band holds fewer than 2 lines.
         """
         if band is None:
             return self
@@ -150,7 +150,7 @@ def from_accelerance(
     accelerance : array_like, shape (n,)
         Acceleration over force (m/s^2/N).
     coherence : array_like, shape (n,)
-        Ordinary coherence; None where unknown.
+        Ordinary coherence; None if unknown.
     n_averages
         Number of averaged hits.
     usable_band

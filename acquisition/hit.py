@@ -27,7 +27,7 @@ class Hit:
     Raises
     ------
     ValueError
-        Where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
+        If the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
 
     Examples
     --------
@@ -40,19 +40,19 @@ class Hit:
     """
 
     force: Floats
-    """Hammer force (N), shape (n,); empty where no sensor measured it."""
+    """Hammer force (N), shape (n,); empty if no sensor measured it."""
     acceleration: Floats
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
     """Sample rate (Hz)."""
     pre_trigger: int = 0
-    """Number of samples before the trigger; 0 where unknown."""
+    """Number of samples before the trigger; 0 if unknown."""
     lost_scans: int = 0
     """Number of scans missing inside the record."""
     channels: tuple[Channel, ...] | None = None
     """Force and response channel, or only the response channel, where the hit came from a DAQ."""
     codes: Codes | None = None
-    """Raw ADC codes, shape (channels, n), force first; None where the recording has none."""
+    """Raw ADC codes, shape (channels, n), force first; None if the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
     cross_hit: Hit | None = None
@@ -116,7 +116,7 @@ class Hit:
 
     @property
     def sensors(self) -> tuple[Channel, ...]:
-        """Channels of all sensors of the impact, the response last; empty where it came from no DAQ."""
+        """Channels of all sensors of the impact, the response last; empty if it came from no DAQ."""
         channels = self.channels or ()
         return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
@@ -159,7 +159,7 @@ class TapInputs:
         Raises
         ------
         DataError
-            Where the needed inputs do not exist.
+            If the needed inputs do not exist.
         """
         forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
         found = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]

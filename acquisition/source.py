@@ -81,9 +81,9 @@ class DeviceIdentity:
     model: str
     """Model."""
     serial: str = ""
-    """Serial number; empty where it has none."""
+    """Serial number; empty if it has none."""
     firmware: str = ""
-    """Version; empty where it has none."""
+    """Version; empty if it has none."""
 
 
 @dataclass(frozen=True)

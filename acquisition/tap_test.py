@@ -25,7 +25,7 @@ CONDITION_RANGES = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of a tap test in the units of the shop; None or empty where unknown.
+    """Conditions of a tap test in the units of the shop; None or empty if unknown.
 
     Examples
     --------
@@ -161,7 +161,7 @@ class TapTest:
     circumstances: Circumstances
     """Operator, machine, tool, direction and time."""
     frf: Frf | None
-    """Averaged FRF; None where no force was measured."""
+    """Averaged FRF; None if no force was measured."""
     hits: tuple[Hit, ...] = ()
     """All hits, also the rejected ones; empty for a recorded FRF."""
     flags: tuple[HitFlags, ...] = ()
@@ -225,7 +225,7 @@ def sanitize_id_part(name: str) -> str:
     Returns
     -------
     str
-        Letters, digits and hyphens, at most 24; empty where nothing remains.
+        Letters, digits and hyphens, at most 24; empty if nothing remains.
 
     Examples
     --------
@@ -246,7 +246,7 @@ def parse_machine_name(tap_id: str) -> str:
     Returns
     -------
     str
-        Name as `sanitize_id_part` gives it; empty where the text is no identifier.
+        Name as `sanitize_id_part` gives it; empty if the text is no identifier.
 
     Examples
     --------

@@ -178,7 +178,7 @@ class RunningMean:
         self.hits: tuple[Hit, ...] = ()
         """Hits of the mean, in the order they were added."""
         self.frf: Frf | None = None
-        """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None where there is none."""
+        """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None if there is none."""
         self._sums: Spectra | None = None
         self._before: Frf | None = None
 
@@ -225,7 +225,7 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit has no pulse, or another length or rate.
+            If the hit has no pulse, or another length or rate.
         """
         size = hit.acceleration.size
         if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
@@ -252,7 +252,7 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit is not in the mean, or the only one.
+            If the hit is not in the mean, or the only one.
         """
         others = self._others(hit)
         if not others:
@@ -270,7 +270,7 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit is not in the mean.
+            If the hit is not in the mean.
         """
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None

@@ -204,7 +204,7 @@ def infer_averages(frf: Frf) -> int | None:
     Returns
     -------
     int or None
-        Number of hits; None where it cannot be inferred.
+        Number of hits; None if it cannot be inferred.
 
     References
     ----------
@@ -257,7 +257,7 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
     Returns
     -------
     float or None
-        Approximate time constant (s); None where there is no sign of a window.
+        Approximate time constant (s); None if there is no sign of a window.
     """
     falls = [fall for fall in map(_measure_noise_drop, hits) if fall is not None]
     if not falls:
@@ -267,7 +267,7 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
 
 
 def _measure_noise_drop(hit: Hit) -> tuple[float, float] | None:
-    """Return the noise before the hit over that at the end, and the time between (s); None where one is unknown."""
+    """Return the noise before the hit over that at the end, and the time between (s); None if one is unknown."""
     before, tenth = int(0.8 * count_pre_hit_samples(hit)), hit.acceleration.size // 10
     if min(before, tenth) < MIN_WINDOW_SAMPLES:
         return None

@@ -189,7 +189,7 @@ def _format_data_set_58(
 
 
 def _check_identification_line(text: str) -> str:
-    """Return a line of identification; raise DataError where it has more than 80 characters."""
+    """Return a line of identification; raise DataError if it has more than 80 characters."""
     if len(text.encode("utf-8")) > 80:
         raise DataError(f"{text!r} is longer than 80 characters, the limit of a line in a universal file")
     return text or "NONE"
@@ -231,7 +231,7 @@ class ExportFormat:
     encode_hits: Callable[[Sequence[Hit], ExportLabels], bytes]
     """Function that writes signals over time."""
     encode_frf: Callable[[Frf, ExportLabels], bytes] | None
-    """Function that writes an FRF; None where the format has none."""
+    """Function that writes an FRF; None if the format has none."""
     precision: str
     """Precision of its numbers, for people."""
 

@@ -34,7 +34,7 @@ class CutSignal:
     sample_rate: float
     """Sample rate (Hz)."""
     codes: Codes | None = None
-    """ADC codes, shape (n,); None where a recording of another program holds values."""
+    """ADC codes, shape (n,); None if a recording of another program holds values."""
     channel: Channel | None = None
     """Channel that turns codes into m/s^2; None without codes."""
     lost_scans: int = 0
@@ -44,7 +44,7 @@ class CutSignal:
     sensor: str = "accelerometer"
     """Kind of sensor: accelerometer or microphone."""
     speed_rpm: Floats | None = None
-    """Spindle speed by a tachometer at each sample (rpm), NaN where unknown, shape (n,); None without one."""
+    """Spindle speed by a tachometer at each sample (rpm), NaN if unknown, shape (n,); None without one."""
 
     @property
     def duration(self) -> float:

@@ -52,7 +52,7 @@ class FileSource(ClosedOnExit):
         Raises
         ------
         DataError
-            Where the file has no hits.
+            If the file has no hits.
         """
         hits = read_hits(path)
         quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)

@@ -18,7 +18,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def open_hdf5(memory: io.BytesIO, mode: Literal["r", "r+", "w"]) -> h5py.File:
-    """Open the HDF5 file that these bytes are or become; raise OSError where they are none."""
+    """Open the HDF5 file that these bytes are or become; raise OSError if they are none."""
     import h5py  # takes longer to import than what a command needs that opens no file
 
     return h5py.File(memory, mode)

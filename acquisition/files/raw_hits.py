@@ -27,7 +27,7 @@ class HitSettings(NamedTuple):
     pre_trigger: int
     """Samples before the trigger."""
     channels: tuple[Channel, ...]
-    """Channels of the codes; empty where the hits are samples."""
+    """Channels of the codes; empty if the hits are samples."""
 
     @classmethod
     def from_hit(cls, hit: Hit) -> HitSettings:
@@ -45,7 +45,7 @@ def write_channel(attributes: h5py.AttributeManager, channel: Channel) -> None:
 
 
 def read_channel(attributes: h5py.AttributeManager) -> Channel:
-    """Read the channel that `write_channel` wrote; raise KeyError where a field is missing."""
+    """Read the channel that `write_channel` wrote; raise KeyError if a field is missing."""
     values = convert_to_plain(attributes)
     return Channel(**{field.name: values[field.name] for field in fields(Channel)})
 

@@ -112,7 +112,7 @@ def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple
 
 
 def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> Floats:
-    """Return the spindle speed at each sample (rpm), NaN where unknown."""
+    """Return the spindle speed at each sample (rpm), NaN if unknown."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
     pulses = report.description.pulses
     if unit is None or unit.quantity != "frequency":

@@ -119,7 +119,7 @@ def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTIO
     Raises
     ------
     DataError
-        Where the file holds neither, or does not state enough.
+        If the file holds neither, or does not state enough.
     """
     recording = inspect_file(path, description).require_valid()
     return list(recording.hits) if recording.frf is None else recording.frf
@@ -143,7 +143,7 @@ def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) ->
     Raises
     ------
     DataError
-        Where the file has no hits, or does not state enough.
+        If the file has no hits, or does not state enough.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     Raises
     ------
     DataError
-        Where the file has neither an FRF nor a good hit, or does not state enough.
+        If the file has neither an FRF nor a good hit, or does not state enough.
 
     Examples
     --------

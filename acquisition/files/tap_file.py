@@ -57,7 +57,7 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
     Raises
     ------
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     Raises
     ------
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), raw_hits.HitSettings.from_hit(hit)))
     with hdf5_file.open_hdf5(memory, "r+") as file:

@@ -141,14 +141,14 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     Returns
     -------
     frf : Frf or None
-        H1 FRF of the good hits; None where no force was measured.
+        H1 FRF of the good hits; None if no force was measured.
     flags : tuple of HitFlags
         Faults of each hit.
 
     Raises
     ------
     DataError
-        Where no hit is good; its text has the reasons.
+        If no hit is good; its text has the reasons.
 
     Examples
     --------

@@ -324,7 +324,7 @@ def split_record(record: Hit) -> list[Hit]:
     n = min(n, int(np.min(record.acceleration.size - begins)))
     hits = list[Hit]()
     for part in (slice(int(begin), int(begin) + n) for begin in begins):
-        force = record.force[part]  # empty where it was not measured
+        force = record.force[part]  # empty if it was not measured
         hits.append(replace(record, force=force, acceleration=record.acceleration[part], pre_trigger=before))
     return hits
 

@@ -60,7 +60,7 @@ def estimate_decay_time(hit: Hit) -> float:
     Raises
     ------
     ValueError
-        Where the force has no pulse.
+        If the force has no pulse.
 
     Examples
     --------

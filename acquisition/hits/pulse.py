@@ -42,7 +42,7 @@ class Pulse:
 
 
 def find_pulse(hit: Hit) -> Pulse | None:
-    """Find the highest force pulse; None where it is below 6 times the rms of the baseline, or without a force."""
+    """Find the highest force pulse; None if it is below 6 times the rms of the baseline, or without a force."""
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))

@@ -95,7 +95,7 @@ def infer_decibel_unit(name: str, unit: str) -> str:
 
 
 def parse_decibel_reference(unit: str) -> str:
-    """Return the reference of a level, "1 um/N" of "dB re 1 um/N"; empty where unknown."""
+    """Return the reference of a level, "1 um/N" of "dB re 1 um/N"; empty if unknown."""
     reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?(?:\)\s*[\[(]|[\s,)]*)", "", unit)
     is_known = parse_unit(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
     return reference if is_known else ""

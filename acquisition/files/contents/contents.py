@@ -138,7 +138,7 @@ class ImportReport:
         return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}", cure)
 
     def attempt(self, resolve: Callable[..., Result], *arguments: object) -> Result | None:
-        """Return the result of a function of these arguments and this report; None where it cannot be resolved."""
+        """Return the result of a function of these arguments and this report; None if it cannot be resolved."""
         try:
             return resolve(*arguments, self)
         except UnresolvedError:
@@ -180,7 +180,7 @@ class ImportReport:
 FrfRole = Literal["frf", "real", "imag", "magnitude", "phase", "coherence"]
 """Meaning of a signal that belongs to an FRF."""
 Role = Literal["time", "frequency", "force", "response", "speed", "tacho", FrfRole, "ignored", ""]
-"""Meaning of a signal; empty where unknown."""
+"""Meaning of a signal; empty if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,13 +192,13 @@ class Signal:
     values: NDArray[Any]
     """Values as in the file, real or complex, shape (n,)."""
     role: Role = ""
-    """Role of the signal; empty where the file does not state it."""
+    """Role of the signal; empty if the file does not state it."""
     unit: str = ""
-    """Unit as in the file, empty where unknown; dB of a magnitude, deg or rad of a phase."""
+    """Unit as in the file, empty if unknown; dB of a magnitude, deg or rad of a phase."""
     quantity: str = ""
     """Quantity (displacement, velocity, acceleration, force) where the file states it apart from the unit."""
     direction: str = ""
-    """Direction: x, y, z or -x, -y, -z; empty where unknown."""
+    """Direction: x, y, z or -x, -y, -z; empty if unknown."""
     rate: float | None = None
     """Sample rate that the file states (Hz)."""
     record: int = 0
@@ -224,13 +224,13 @@ class Contents:
     created: datetime | None = None
     """Time of recording (timezone-aware)."""
     direction: str = ""
-    """Direction at the tool tip; empty where unknown."""
+    """Direction at the tool tip; empty if unknown."""
     tool: str = ""
-    """Name of the tool in the spindle; empty where unknown."""
+    """Name of the tool in the spindle; empty if unknown."""
     machines: tuple[str, ...] = ()
     """Names of the tested machines, each once, where the file states them."""
     window: str = ""
-    """Window over the response, as the file states it; empty where unknown."""
+    """Window over the response, as the file states it; empty if unknown."""
     notes: tuple[str, ...] = ()
     """Notes for people."""
 
@@ -281,7 +281,7 @@ def append_force_signals(response: Contents, force: Contents, force_file: Path) 
 
 
 def parse_local_time(text: str, *patterns: str) -> datetime | None:
-    """Parse a time by the first pattern that fits, local where it has no zone; None where it cannot be read."""
+    """Parse a time by the first pattern that fits, local where it has no zone; None if it cannot be read."""
     for pattern in patterns:
         with contextlib.suppress(ValueError, OverflowError, OSError):
             return datetime.strptime(text, pattern).astimezone()
@@ -366,9 +366,9 @@ class Format:
     read: Callable[[Path], Contents | list[Hit] | Frf]
     """Function that reads a file: its contents, or hits in SI units, at least one, or an FRF, where nothing is open."""
     read_circumstances: Callable[[Path], Circumstances | None] = lambda _path: None
-    """Function that reads when, where and by whom a file was recorded; None where it does not state that."""
+    """Function that reads when, where and by whom a file was recorded; None if it does not state that."""
     read_frf: Callable[[Path], Frf] | None = None
-    """Function that reads the FRF of a file that also has hits; None where it is estimated from them."""
+    """Function that reads the FRF of a file that also has hits; None if it is estimated from them."""
     read_from: Callable[[Path, int, str], Contents] | None = None
     """Function that reads a text after some skipped lines, with a decimal sign (empty: unknown); None for other files.
     """

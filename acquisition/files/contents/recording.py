@@ -32,7 +32,7 @@ class Recording:
     title: str
     """Name of its format, for people."""
     hits: tuple[Hit, ...] = ()
-    """Hits in SI units; empty where the file holds only an FRF, or where something is missing or wrong."""
+    """Hits in SI units; empty if the file holds only an FRF, or where something is missing or wrong."""
     frf: Frf | None = None
     """FRF of the file; None without one, or where something is missing or wrong."""
     facts: tuple[Fact, ...] = ()
@@ -40,19 +40,19 @@ class Recording:
     problems: str = ""
     """Missing facts, with the fields of `Description` that state them, and errors; empty if there are none."""
     created: datetime | None = None
-    """Time of recording (timezone-aware); None where unknown."""
+    """Time of recording (timezone-aware); None if unknown."""
     tool: str = ""
-    """Name of the tool in the spindle; empty where unknown."""
+    """Name of the tool in the spindle; empty if unknown."""
     direction: str = ""
-    """Direction at the tool tip; empty where unknown."""
+    """Direction at the tool tip; empty if unknown."""
     operator: str = ""
-    """Name of the person with the hammer; empty where unknown."""
+    """Name of the person with the hammer; empty if unknown."""
     device: str = ""
-    """Recording device; empty where unknown."""
+    """Recording device; empty if unknown."""
     conditions: Conditions | None = None
-    """Conditions of the test; None where the file is not a tap file of lobewatch."""
+    """Conditions of the test; None if the file is not a tap file of lobewatch."""
     window: float | None = None
-    """Time constant of the exponential window over the response (s); NaN where unknown, None without a window."""
+    """Time constant of the exponential window over the response (s); NaN if unknown, None without a window."""
 
     def require_valid(self) -> Recording:
         """Return this recording; raise DataError with all missing facts and faults."""

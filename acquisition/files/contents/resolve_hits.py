@@ -94,7 +94,7 @@ def make_hit_from_motion(force: Floats, response: Floats, rate: float, quantity:
 
 
 def _resolve_force(forces: Sequence[Signal], report: ImportReport) -> Floats | None:
-    """Return the force (N), empty where none was measured; None where it or its unit is missing."""
+    """Return the force (N), empty if none was measured; None if it or its unit is missing."""
     if report.description.without_force:
         return np.empty(0)
     to_newton = report.attempt(resolve_unit.resolve_force_unit, forces[0]) if len(forces) == 1 else None

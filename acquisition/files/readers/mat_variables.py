@@ -32,7 +32,7 @@ ARRAY_EXTENSION_CODE = 1
 
 
 def read_mat_variables(path: Path) -> dict[str, Any]:
-    """Read all variables by name; raise DataError where the file is damaged or unpacks out of proportion."""
+    """Read all variables by name; raise DataError if the file is damaged or unpacks out of proportion."""
     try:
         patience = READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
         content = run_in_subprocess(__name__, str(path), patience=patience)

@@ -74,7 +74,7 @@ def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
 
 
 def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
-    """Infer the use of a sign from words; None where no number has it."""
+    """Infer the use of a sign from words; None if no number has it."""
     if sign not in "".join(words):
         return None
     uses = (use for word in words if sign in word if (use := _classify_sign(sign, word)) is not None)
@@ -108,7 +108,7 @@ def is_number(word: str) -> bool:
 
 
 def _parse_number(plain: str) -> complex:
-    """Parse a number with a decimal point; raise ValueError where it is none."""
+    """Parse a number with a decimal point; raise ValueError if it is none."""
     try:
         return float(plain)
     except ValueError:
@@ -159,7 +159,7 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
 
 
 def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> Floats | None:
-    """Parse cells at once; None where a number is complex or missing, or has thousands."""
+    """Parse cells at once; None if a number is complex or missing, or has thousands."""
     text = "\n".join(cells)
     if any(use != "decimal" and sign in text for sign, use in numerals.items()):
         return None

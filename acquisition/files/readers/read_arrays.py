@@ -24,7 +24,7 @@ _MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
 
 
 def read_mat(path: Path) -> Contents:
-    """Read the arrays of a MATLAB file; raise DataError where it is damaged or unpacks out of proportion."""
+    """Read the arrays of a MATLAB file; raise DataError if it is damaged or unpacks out of proportion."""
     variables = read_mat_variables(path)
     return recognize_layout(variables) or Contents(tuple(list_array_signals(variables)), window=find_window(variables))
 
@@ -94,7 +94,7 @@ _SEP005_KEYS = ("data", "name", "unit_str")
 
 
 def read_sep005(path: Path) -> Contents:
-    """Read the channels of SEP005 JSON; raise DataError where it is damaged or no list of time series."""
+    """Read the channels of SEP005 JSON; raise DataError if it is damaged or no list of time series."""
     try:
         channels = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

@@ -20,7 +20,7 @@ MP3_SYNC_BITS = 0xFFE0
 def read_audio(path: Path) -> Contents:
     """Read the channels as shares of the full scale, -1 to 1.
 
-    Raises DataError where the file is damaged or cut short, or soundfile is not installed.
+    Raises DataError if the file is damaged or cut short, or soundfile is not installed.
     """
     with path.open("rb") as file:
         is_wav = _is_wav(file.read(12))

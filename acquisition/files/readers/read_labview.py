@@ -84,7 +84,7 @@ def _get_word(words: Sequence[str], i: int) -> str:
 
 
 def _parse_lvm_date(head: Mapping[str, str]) -> datetime | None:
-    """Return date and time of the header in the local time zone; None where they cannot be read."""
+    """Return date and time of the header in the local time zone; None if they cannot be read."""
     clock = head.get("Time", "").replace(",", ".").partition(".")[0]
     return parse_local_time(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S")
 

@@ -179,7 +179,7 @@ _PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), 
 
 
 def read_pulse(path: Path) -> Contents:
-    """Read the function of every block; raise DataError where it is cut short or its header states too little."""
+    """Read the function of every block; raise DataError if it is cut short or its header states too little."""
     lines, _ = number_lines(read_text(path), 0)
     blocks = _find_pulse_blocks(lines)
     pairs = (line.partition(":") for line in (lines.texts[: blocks[0][0]] if blocks else []))
@@ -221,7 +221,7 @@ def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
 
 
 def _parse_pulse_date(header: Mapping[str, str]) -> datetime | None:
-    """Return date and time of the first block in the local time zone; None where they cannot be read."""
+    """Return date and time of the first block in the local time zone; None if they cannot be read."""
     pattern = header.get("date format", "")
     for part, directive in _PULSE_DATE_PARTS:
         pattern = re.sub(rf"(?<![%\w]){part}(?!\w)", directive, pattern)

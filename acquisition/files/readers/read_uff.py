@@ -30,7 +30,7 @@ class UffAxis:
     type: int
     """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
     unit: str
-    """Unit; empty where unknown."""
+    """Unit; empty if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class UffFunction:
     name: str
     """Name for people: the measured points."""
     response_direction: int
-    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where unknown."""
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 if unknown."""
     reference_direction: int
     """Direction of the hammer in the same code."""
     place: tuple[object, ...]
@@ -69,14 +69,14 @@ class UffFunction:
 
     @property
     def averages(self) -> int | None:
-        """Number of averaged hits; None where unknown."""
+        """Number of averaged hits; None if unknown."""
         text = " ".join(self.lines)
         number = self.keys.get("averages", "") or "".join(re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", text)[:1])
         return int(number) if number.strip().isdigit() else None
 
     @property
     def window(self) -> str:
-        """Window over the response; empty where unknown."""
+        """Window over the response; empty if unknown."""
         match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
         return match[1].strip() if match else ""
 

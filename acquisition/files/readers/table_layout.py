@@ -108,7 +108,7 @@ def read_columns(rows: NumberedLines, form: RowLayout, place: str, decimal_sign:
 
 
 def _split_cells_fast(form: RowLayout, rows: Sequence[str]) -> list[list[str]] | None:
-    """Split rows of the same layout at once; None where rows differ."""
+    """Split rows of the same layout at once; None if rows differ."""
     separator, n = (None if form.separator == BLANK_SEPARATOR else form.separator), len(form.columns)
     text = (separator or " ").join(rows)
     widths = {len(row.split()) for row in rows} if separator is None else {row.count(separator) + 1 for row in rows}
@@ -136,7 +136,7 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
 
 
 Heading = list[tuple[str, str]]
-"""Name and unit of each column; empty where unknown."""
+"""Name and unit of each column; empty if unknown."""
 _RATIO_LABEL = "Units: Ratio"
 _UNIT_PRODUCT = re.compile(r"(\(.+\))(\(.+\))")
 _LETTER = re.compile(r"[^\W\d_]")
@@ -189,7 +189,7 @@ def is_unit_line(lines: Sequence[str], form: RowLayout, width: int) -> bool:
 
 
 def _split_words(line: str, form: RowLayout, width: int) -> list[str]:
-    """Split a line into a word per column with any separator; empty where there are more or fewer words."""
+    """Split a line into a word per column with any separator; empty if there are more or fewer words."""
     joined = _SPACE_BEFORE_BRACKET.sub("", line)
     for separator in (form.separator, "\t", ";", ",", "[ \t]{2,}", BLANK_SEPARATOR):
         if separator in ",;\t":

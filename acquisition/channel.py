@@ -33,7 +33,7 @@ def parse_direction(text: str) -> TapDirection:
     Raises
     ------
     ValueError
-        Where the text names no direction.
+        If the text names no direction.
 
     Examples
     --------
@@ -41,20 +41,20 @@ def parse_direction(text: str) -> TapDirection:
     ('x', True)
     """
     if text not in get_args(TapDirection):
-        raise ValueError(f"direction={text!r} is none of {', '.join(get_args(TapDirection))}; give one of them")
+        raise ValueError(f"direction={text!r} is not one of {', '.join(get_args(TapDirection))}")
     return cast(TapDirection, text)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One sensor on one input, with all that turns a voltage into a force or an acceleration.
+    """One sensor on one input, with its conversion from voltage to force or acceleration.
 
     Examples
     --------
     >>> hammer = Channel("force", sensitivity=2.25e-3, full_scale=5.0)
     >>> round(hammer.scale, 4)  # N a code: 5 V / 2^15 / 2.25 mV/N
     0.0678
-    >>> hammer.encode(np.array([100.0, 1e4])).tolist()  # N; what is beyond the rail is clipped there
+    >>> hammer.encode(np.array([100.0, 1e4])).tolist()  # N; values beyond the rail are clipped
     [1475, 32767]
     """
 
@@ -67,29 +67,29 @@ class Channel:
     adc_bits: int = 16
     """Resolution (bits); codes run from -2^(bits-1) to 2^(bits-1) - 1."""
     direction: TapDirection | Literal[""] = ""
-    """Direction at the tool tip; empty where it is not fixed."""
+    """Direction at the tool tip; empty if it is not fixed."""
     serial_number: str = ""
     """Serial number of the sensor."""
     calibration_date: str = ""
-    """Calibration date of the sensor (ISO); empty where unknown."""
+    """Calibration date of the sensor (ISO); empty if unknown."""
     skew: float = 0.0
     """Delay of sampling against channel 0 (s): value k of this channel is taken at t_k + skew."""
 
     def __post_init__(self) -> None:
         if self.quantity not in get_args(ChannelQuantity):
-            raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
+            raise ValueError(f"quantity={self.quantity!r} is not one of {', '.join(get_args(ChannelQuantity))}")
         if self.direction and parse_direction(self.direction) == CROSS_TAP:
-            raise ValueError(f"direction={self.direction!r} is that of a tap across; a sensor has x or y")
+            raise ValueError(f"direction={self.direction!r} is the direction of a cross tap. Give the sensor x or y.")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
-            raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
+            raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} must be a finite number other than 0")
         if not (np.isfinite(self.full_scale) and self.full_scale > 0):
-            raise ValueError(f"{self.quantity} full_scale={self.full_scale} V is not > 0")
+            raise ValueError(f"{self.quantity} full_scale={self.full_scale} V is not above 0")
         if not np.isfinite(self.skew):
             raise ValueError(f"{self.quantity} skew={self.skew} s is not a finite number")
 
     @property
     def name(self) -> str:
-        """Quantity, and direction where it is known."""
+        """Quantity, and direction if known."""
         return f"{self.quantity} {self.direction}".strip()
 
     @property

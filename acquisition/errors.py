@@ -35,7 +35,7 @@ def join_sentences(*parts: str) -> str:
 
 
 class DeviceError(OSError):
-    """Raised where the DAQ cannot be reached or has stopped."""
+    """Raised if the DAQ cannot be reached or has stopped."""
 
     def __init__(self, text: str, cure: str = "") -> None:
         """Make an error of a device; str() gives text and cure.
@@ -45,7 +45,7 @@ class DeviceError(OSError):
         text
             Finding without a full stop.
         cure
-            Remedy; empty where unknown.
+            Remedy; empty if unknown.
         """
         super().__init__(join_sentences(text, cure))
         self.text = text
@@ -55,11 +55,11 @@ class DeviceError(OSError):
 
 
 class DataError(ValueError):
-    """Raised where a file cannot be used for a tap test."""
+    """Raised if a file cannot be used for a tap test."""
 
 
 def format_error(error: Exception) -> str:
-    """Return any error as a sentence, with its type where it is an unforeseen one."""
+    """Return any error as a sentence, with its type if it is unexpected."""
     if isinstance(error, OSError) and error.filename and error.strerror:
         return format_os_error(error)
     if isinstance(error, (ValueError, OSError, ArithmeticError)):
@@ -91,7 +91,7 @@ def check_name(name: str, what: str) -> None:
     Raises
     ------
     ValueError
-        Where the name holds a control character.
+        If the name holds a control character.
     """
     found = CONTROL_CHARACTERS.search(name)
     if found is not None:
@@ -117,7 +117,7 @@ class Remark:
     text: str
     """Finding, with figures and units, without a full stop."""
     cure: str = ""
-    """Remedy; empty where none is needed or possible."""
+    """Remedy; empty if none is needed or possible."""
 
     def __str__(self) -> str:
         return join_sentences(self.finding, self.cure)

@@ -89,7 +89,7 @@ _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK
 
 
 class IrregularFileError(OSError):
-    """Raised where a path is not a regular file or is too large."""
+    """Raised if a path is not a regular file or is too large."""
 
 
 def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileIO:
@@ -102,10 +102,10 @@ def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileI
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode):
             kind = "directory" if stat.S_ISDIR(status.st_mode) else "pipe or a device"
-            raise IrregularFileError(errno.EINVAL, f"is a {kind}, not a file", str(path))
+            raise IrregularFileError(errno.EINVAL, f"this is a {kind}, not a file", str(path))
         if status.st_size > largest:
-            sizes = f"has {status.st_size / 1e6:.4g} MB, at most {largest / 1e6:g} MB are read"
-            raise IrregularFileError(errno.EFBIG, f"{sizes}; put it back from a backup, or take it away", str(path))
+            sizes = f"{status.st_size / 1e6:.4g} MB is too large (limit {largest / 1e6:g} MB)"
+            raise IrregularFileError(errno.EFBIG, f"{sizes}. Restore the file from a backup, or remove it.", str(path))
         return FileIO(handle)
     except BaseException:
         os.close(handle)

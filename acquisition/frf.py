@@ -21,7 +21,7 @@ class Frf:
     Raises
     ------
     ValueError
-        Where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
+        If shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
 
     Examples
     --------
@@ -40,7 +40,7 @@ class Frf:
     receptance: Complexes
     """Displacement over force (m/N), shape (n,)."""
     coherence: Floats | None = None
-    """Ordinary coherence, 0 to 1, shape (n,); None where unknown."""
+    """Ordinary coherence, 0 to 1, shape (n,); None if unknown."""
     n_averages: int = 1
     """Number of hits averaged."""
     measured_as: FrfQuantity = "receptance"
@@ -61,13 +61,13 @@ class Frf:
     def _check_axis(self) -> None:
         f = self.frequency
         if f.ndim != 1 or f.size < 2:
-            raise ValueError(f"frequency has shape {f.shape}; a 1-D array of at least 2 lines (Hz) is needed")
+            raise ValueError(f"frequency must be a 1-D array of at least 2 lines (Hz), not of shape {f.shape}")
         if not np.all(np.isfinite(f)) or f[0] < 0 or not np.all(np.diff(f) > 0):
-            raise ValueError("frequency must be finite, >= 0 Hz and strictly rising")
+            raise ValueError("frequency must be finite, at least 0 Hz and strictly increasing")
         if self.measured_as not in get_args(FrfQuantity):
-            raise ValueError(f"measured_as={self.measured_as!r} is none of {', '.join(get_args(FrfQuantity))}")
+            raise ValueError(f"measured_as={self.measured_as!r} is not one of {', '.join(get_args(FrfQuantity))}")
         if self.n_averages < 1:
-            raise ValueError(f"n_averages={self.n_averages} is not at least 1")
+            raise ValueError(f"n_averages={self.n_averages} is below 1")
 
     def _check_values(self) -> None:
         if self.receptance.shape != self.frequency.shape:
@@ -81,7 +81,7 @@ class Frf:
         if self.coherence.shape != self.frequency.shape:
             raise ValueError(f"coherence {self.coherence.shape} and frequency {self.frequency.shape} differ in shape")
         if not np.all((self.coherence >= 0) & (self.coherence <= 1 + 1e-9)):
-            raise ValueError("coherence must lie between 0 and 1")
+            raise ValueError("coherence must be between 0 and 1")
 
     @property
     def mobility(self) -> Complexes:
@@ -120,15 +120,16 @@ class Frf:
         Raises
         ------
         ValueError
-            Where the band holds fewer than 2 lines.
+            If the band holds fewer than 2 lines.
         """
         if band is None:
             return self
         low, high = band
         keep = (self.frequency >= low) & (self.frequency <= high)
         if not low < high or keep.sum() < 2:
-            span = f"which spans {self.frequency[0]:g}..{self.frequency[-1]:g} Hz; choose a wider band inside it"
-            raise ValueError(f"band {low:g}..{high:g} Hz holds {keep.sum()} lines of this FRF, {span}")
+            found = f"band {low:g}..{high:g} Hz contains {keep.sum()} lines of the FRF"
+            span = f"{self.frequency[0]:g}..{self.frequency[-1]:g} Hz"
+            raise ValueError(f"{found}. Choose a wider band within {span}.")
         coherence = None if self.coherence is None else self.coherence[keep]
         return replace(self, frequency=self.frequency[keep], receptance=self.receptance[keep], coherence=coherence)
 
@@ -149,7 +150,7 @@ def from_accelerance(
     accelerance : array_like, shape (n,)
         Acceleration over force (m/s^2/N).
     coherence : array_like, shape (n,)
-        Ordinary coherence; None where unknown.
+        Ordinary coherence; None if unknown.
     n_averages
         Number of averaged hits.
     usable_band

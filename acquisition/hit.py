@@ -27,7 +27,7 @@ class Hit:
     Raises
     ------
     ValueError
-        Where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
+        If the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
 
     Examples
     --------
@@ -40,19 +40,19 @@ class Hit:
     """
 
     force: Floats
-    """Hammer force (N), shape (n,); empty where no sensor measured it."""
+    """Hammer force (N), shape (n,); empty if no sensor measured it."""
     acceleration: Floats
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
     """Sample rate (Hz)."""
     pre_trigger: int = 0
-    """Number of samples before the trigger; 0 where unknown."""
+    """Number of samples before the trigger; 0 if unknown."""
     lost_scans: int = 0
     """Number of scans missing inside the record."""
     channels: tuple[Channel, ...] | None = None
     """Force and response channel, or only the response channel, where the hit came from a DAQ."""
     codes: Codes | None = None
-    """Raw ADC codes, shape (channels, n), force first; None where the recording has none."""
+    """Raw ADC codes, shape (channels, n), force first; None if the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
     cross_hit: Hit | None = None
@@ -72,7 +72,7 @@ class Hit:
             shapes = f"force {self.force.shape} and acceleration {self.acceleration.shape}"
             raise ValueError(f"{shapes} must be 1-D records of equal length, at least 8 samples")
         if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
-            raise ValueError(f"sample_rate={self.sample_rate} Hz is not > 0")
+            raise ValueError(f"sample_rate={self.sample_rate} Hz is not above 0")
 
     @classmethod
     def from_codes(
@@ -116,7 +116,7 @@ class Hit:
 
     @property
     def sensors(self) -> tuple[Channel, ...]:
-        """Channels of all sensors of the impact, the response last; empty where it came from no DAQ."""
+        """Channels of all sensors of the impact, the response last; empty if it came from no DAQ."""
         channels = self.channels or ()
         return channels if self.cross_hit is None else (*channels[:1], *self.cross_hit.sensors[-1:], *channels[-1:])
 
@@ -144,8 +144,8 @@ class TapInputs:
     def select(cls, channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = "") -> Self:
         """Select the inputs of a tap test in one direction.
 
-        Of several responses that of the direction is used, of "xy" that of y. A hit in x is also recorded by a second
-        sensor along y, if there is one. It comes before the last input.
+        If there are several responses, the one of the direction is used, for "xy" that of y. A hit in x is also
+        recorded by a second sensor along y, if there is one. It comes before the last input.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ class TapInputs:
         Raises
         ------
         DataError
-            Where the needed inputs do not exist.
+            If the needed inputs do not exist.
         """
         forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
         found = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
@@ -167,11 +167,11 @@ class TapInputs:
         responses = [i for i in found if not several or (direction and channels[i].direction == axis)]
         if len(responses) != 1 or (quantity == "force" and len(forces) != 1):
             listed = ", ".join(channel.name for channel in channels) or "nothing"
-            needed = "one force and one acceleration channel are needed"
+            needed = "one force and one acceleration channel"
             if quantity == "acceleration":
-                needed = "one acceleration channel is needed to tap without a force sensor"
-            which = f', of several that with direction = "{axis}"' if several else ""
-            raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
+                needed = "one acceleration channel without a force sensor"
+            which = f' with direction = "{axis}"' if several else ""
+            raise DataError(f"the DAQ has channels for {listed}. A tap test needs {needed}{which}.")
         cross = [i for i in found if direction == "x" and channels[i].direction == "y" and i not in responses]
         rows = (*forces, *cross[:1], *responses) if quantity == "force" else (*responses,)
         return cls(rows, tuple(channels[row] for row in rows))

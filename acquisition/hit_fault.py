@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 _REPORTED = "The device reports an overload"
-_RINGS = "The last tenth of the record still rings with {share:.1%} of the loudest"
+_RINGS = "The last tenth of the record still has {share:.1%} of the loudest tenth"
 
 
 class HitFlags(enum.Flag):
@@ -47,7 +47,7 @@ class HitFlags(enum.Flag):
     INCONSISTENT = enum.auto()
     """The FRF of this hit differs from the mean of the good hits."""
     UNDONE = enum.auto()
-    """The operator took the hit back."""
+    """The operator removed the hit."""
     NOT_EVALUATED = enum.auto()
     """The evaluation failed."""
 
@@ -84,7 +84,7 @@ class HitFlags(enum.Flag):
         flags = cls.OK
         for word in filter(None, words.removeprefix("good").split(", ")):
             if word not in by_words:
-                raise ValueError(f"{word!r} is no hit verdict; known are {', '.join(by_words)}")
+                raise ValueError(f"hit verdict {word!r} is not one of {', '.join(by_words)}")
             flags |= by_words[word]
         return flags
 
@@ -100,7 +100,7 @@ class HitFault:
     words: str
     """Words that tap files store and tables show."""
     remedy: str
-    """Advice to the operator, one sentence."""
+    """Advice to the operator, in sentences."""
     sentences: Mapping[str, str] = field(default_factory=dict)
     """Format string of each finding without the full stop, by its case; "" is the only or usual case."""
     limits: Mapping[str, float] = field(default_factory=dict)
@@ -114,21 +114,21 @@ class HitFault:
 HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     HitFlags.DOUBLE_HIT: HitFault(
         "double hit",
-        "Let the hammer bounce back after the first touch.",
+        "Let the hammer bounce off after the hit.",
         {
             "pulse": "Second peak {delay:.2g} ms {side} the main one ({percent:.2g} %)",
-            "decay": "The decay is disturbed {delay:.2g} ms after the hit, as by a second touch",
+            "decay": "The decay is disturbed {delay:.2g} ms after the hit, as by a double hit",
         },
     ),
     HitFlags.OVERLOAD_FORCE: HitFault(
         "overload (force)",
         "Hit softer or choose a larger force range.",
-        {"": "Force cut off at {level:.4g} N for {samples} samples{note}", "reported": _REPORTED},
+        {"": "Force clipped at {level:.4g} N for {samples} samples{note}", "reported": _REPORTED},
     ),
     HitFlags.OVERLOAD_RESPONSE: HitFault(
         "overload (response)",
         "Hit softer or choose a larger acceleration range.",
-        {"": "Response cut off at {level:.4g} m/s^2 for {samples} samples{note}", "reported": _REPORTED},
+        {"": "Response clipped at {level:.4g} m/s^2 for {samples} samples{note}", "reported": _REPORTED},
     ),
     HitFlags.TOO_SOFT: HitFault(
         "too soft",
@@ -137,28 +137,28 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
             "range": "Peak of {peak:.4g} N is below {range_share:.0%} of the range of {full:.0f} N",
             "noise": "Peak of {peak:.4g} N is below {noise_ratio:.0f} times the noise of {noise:.3g} N",
             "response": "Response of {peak:.3g} m/s^2 is below {noise_ratio:.0f} times the noise of {noise:.2g} m/s^2",
-            "spectrum": "The force at {start:.3g} Hz is 20 dB below its largest value: no line can be used",
+            "spectrum": "The force spectrum is 20 dB below its largest value from {start:.3g} Hz on",
         },
         {"range_share": 0.02, "noise_ratio": 20.0},
     ),
     HitFlags.NOT_DECAYED: HitFault(
         "not decayed",
-        "Use a longer record; wait until the tool is still before the next hit.",
-        {"": _RINGS, "hum": f"{_RINGS}; it sounds like mains hum, which 20 ms before the hit would prove"},
+        "Use a longer record, and wait until the tool is still before the next hit.",
+        {"": _RINGS, "hum": f"{_RINGS}, maybe mains hum (record 20 ms before the hit to confirm)"},
         {"residual_share": 0.02, "noise_ratio": 2.0},
     ),
     HitFlags.LOST_SCANS: HitFault(
         "lost scans",
-        "Hit again; if it stays, lower the sample rate or use another cable.",
+        "Hit again. If scans are lost again, lower the sample rate or change the cable.",
         {"": "{count} scans are missing in this record"},
     ),
     HitFlags.NO_HIT: HitFault(
         "no hit",
         "Check the hammer cable and the trigger level.",
-        {"": "No hammer pulse stands out of the noise of the force"},
+        {"": "No hammer pulse above the noise of the force"},
     ),
     HitFlags.SWAPPED_CHANNELS: HitFault(
-        "swapped channels", "Swap the two cables.", {"": "The force rings and the response does not"}
+        "swapped channels", "Swap the two cables.", {"": "The force channel rings, the response channel does not"}
     ),
     HitFlags.TOO_HARD: HitFault(
         "too hard",
@@ -169,19 +169,19 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     HitFlags.NARROW_BAND: HitFault(
         "narrow band",
         "Use a harder hammer tip.",
-        {"": "The force reaches to {reach:.0f} Hz (-20 dB) of the {end:g} Hz wanted"},
+        {"": "The force reaches {reach:.0f} Hz (-20 dB) of the required {end:g} Hz"},
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",
         "Hit the same spot in the same direction as before.",
-        {"": "FRF {distance:.0%} away from the mean of {count} hits (limit {limit:.0%})"},
+        {"": "FRF differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),
-    HitFlags.UNDONE: HitFault("undone", "Taken back by the operator."),
+    HitFlags.UNDONE: HitFault("undone", "Removed by the operator."),
     HitFlags.NOT_EVALUATED: HitFault(
         "not judged",
-        "Hit again; if it stays, check both sensors and their cables.",
-        {"": "Judging it failed ({reason})"},
+        "Hit again. If this repeats, check both sensors and their cables.",
+        {"": "Evaluation failed ({reason})"},
     ),
 }
 """Fault of each flag.

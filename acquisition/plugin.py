@@ -21,7 +21,7 @@ PLUGIN_ERRORS = (Exception, SystemExit)
 
 
 def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
-    """Return the record that an entry point names, or a remark with the package where it cannot be used."""
+    """Return the record that an entry point names, or a remark with the package if it cannot be used."""
     package = get_package_name(point)
     try:
         loaded = point.load()
@@ -29,14 +29,14 @@ def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
         text = f"the package {package} cannot be loaded ({format_exception_line(error)})"
         return make_unusable_remark(kind, point.name, text)
     if not isinstance(loaded, kind):
-        text = f"{point.value} of the package {package} is no acquisition.{kind.__name__}"
+        text = f"{point.value} of the package {package} is not an acquisition.{kind.__name__}"
         return make_unusable_remark(kind, point.name, text)
     if loaded.name != point.name:
-        return make_unusable_remark(kind, point.name, f"the package {package} calls it {loaded.name!r} elsewhere")
+        return make_unusable_remark(kind, point.name, f"the package {package} also names it {loaded.name!r}")
     return loaded
 
 
-def make_unusable_remark(kind: type, name: str, text: str, cure: str = "update or remove that package") -> Remark:
+def make_unusable_remark(kind: type, name: str, text: str, cure: str = "Update or remove that package") -> Remark:
     return Remark("package-not-loaded", f"{kind.__name__.lower()} {name!r}", text, cure)
 
 

@@ -81,9 +81,9 @@ class DeviceIdentity:
     model: str
     """Model."""
     serial: str = ""
-    """Serial number; empty where it has none."""
+    """Serial number; empty if it has none."""
     firmware: str = ""
-    """Version; empty where it has none."""
+    """Version; empty if it has none."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Device(Source, Protocol):
 
     @property
     def fault(self) -> str:
-        """Present fault, one sentence; empty without one."""
+        """Present fault and its remedy in sentences; empty without one."""
 
     def close(self) -> None:
         """Stop, and release the port."""

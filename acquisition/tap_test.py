@@ -25,7 +25,7 @@ CONDITION_RANGES = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of a tap test in the units of the shop; None or empty where unknown.
+    """Conditions of a tap test in the units of the shop; None or empty if unknown.
 
     Examples
     --------
@@ -53,7 +53,7 @@ class Conditions:
         for name, (low, high) in CONDITION_RANGES.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}; correct it, or leave it out")
+                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}. Correct or omit it.")
         for name in ("state", "note"):
             check_name(getattr(self, name), name)
 
@@ -86,7 +86,7 @@ class Conditions:
 
 
 UNKNOWN_CONDITIONS = Conditions()
-"""Conditions of which nothing is known."""
+"""Conditions that are all unknown."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class Circumstances:
     def __post_init__(self) -> None:
         parse_direction(self.direction)
         if self.created.tzinfo is None:
-            raise ValueError(f"created={self.created} has no time zone; give one, e.g. datetime.now(UTC)")
+            raise ValueError(f"created={self.created} has no time zone. Give one, as in datetime.now(UTC).")
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class TapTest:
     circumstances: Circumstances
     """Operator, machine, tool, direction and time."""
     frf: Frf | None
-    """Averaged FRF; None where no force was measured."""
+    """Averaged FRF; None if no force was measured."""
     hits: tuple[Hit, ...] = ()
     """All hits, also the rejected ones; empty for a recorded FRF."""
     flags: tuple[HitFlags, ...] = ()
@@ -173,7 +173,7 @@ class TapTest:
     def required_frf(self) -> Frf:
         """Averaged FRF; DataError where no force was measured."""
         if self.frf is None:
-            raise DataError(f"{self.id}: no force was measured, so it has no FRF; tap with a hammer that measures it")
+            raise DataError(f"{self.id}: no FRF, because no force was measured. Tap with an instrumented hammer.")
         return self.frf
 
     @property
@@ -225,7 +225,7 @@ def sanitize_id_part(name: str) -> str:
     Returns
     -------
     str
-        Letters, digits and hyphens, at most 24; empty where nothing remains.
+        Letters, digits and hyphens, at most 24; empty if nothing remains.
 
     Examples
     --------
@@ -246,7 +246,7 @@ def parse_machine_name(tap_id: str) -> str:
     Returns
     -------
     str
-        Name as `sanitize_id_part` gives it; empty where the text is no identifier.
+        Name as `sanitize_id_part` gives it; empty if the text is no identifier.
 
     Examples
     --------

@@ -70,17 +70,16 @@ def check_inputs(inputs: Sequence[SensorInput]) -> None:
     numbers = [sensor.number for sensor in inputs]
     for number in numbers:
         if not 0 <= number < DIGITAL_INPUTS_CODE:
-            raise ValueError(f"input={number} is none of 0 to {DIGITAL_INPUTS_CODE - 1}")
+            raise ValueError(f"input={number} of a DATAQ device is not one of 0 to {DIGITAL_INPUTS_CODE - 1}")
     if not numbers or len(set(numbers)) < len(numbers):
-        raise ValueError(f"inputs {numbers} of a DATAQ device must be different ones, at least one")
+        raise ValueError(f"inputs {numbers} of a DATAQ device must be at least one, each used once")
 
 
 def choose_rate(wanted: float, dividend: int) -> RateSetting:
     """Return the setting nearest to a rate (Hz) with the least decimation. ValueError if it is out of reach."""
     fastest, slowest = dividend / SRATE_LIMITS[0], dividend / (SRATE_LIMITS[1] * DEC_LIMITS[1] * DECA_LIMITS[1])
     if not slowest <= wanted <= fastest:
-        limits = f"{slowest:.2g} and {fastest:g} Hz"
-        raise ValueError(f"sample rate {wanted:g} Hz is not between {limits}, what this DAQ has")
+        raise ValueError(f"sample rate {wanted:g} Hz is outside the {slowest:.2g} to {fastest:g} Hz of this DAQ")
     dec = min(math.ceil(dividend / wanted / SRATE_LIMITS[1]), DEC_LIMITS[1])
     deca = min(math.ceil(dividend / wanted / SRATE_LIMITS[1] / dec), DECA_LIMITS[1])
     srate = round(dividend / wanted / dec / deca)
@@ -120,7 +119,7 @@ def parse_model(answer: str) -> str:
     """
     model = answer.upper().removeprefix("DI").replace("-", "").replace(" ", "")
     if model not in DATAQ_RANGES:
-        raise ValueError(f"model {answer!r} is none of {', '.join(f'DI-{number}' for number in DATAQ_RANGES)}")
+        raise ValueError(f"model {answer!r} is not one of {', '.join(f'DI-{number}' for number in DATAQ_RANGES)}")
     return model
 
 
@@ -136,7 +135,7 @@ def encode_range(model: str, full_scale: float) -> int:
     """Return the code of a range (V) of a model. ValueError lists the ranges it has."""
     if full_scale not in DATAQ_RANGES[model]:
         has = ", ".join(f"{volts:g}" for volts in DATAQ_RANGES[model])
-        raise ValueError(f"range_v={full_scale:g} is no range of the DI-{model}; it has +-{has} V")
+        raise ValueError(f"range_v={full_scale:g} is not supported. The DI-{model} has ±{has} V.")
     return DATAQ_RANGES[model].index(full_scale)
 
 
@@ -148,8 +147,10 @@ DATAQ_STOP_SILENCE = 0.2
 """Silence that shows that a device has stopped (s)."""
 MAX_DRAIN_TIME = 1.0
 """Time that a device may go on sending before `stop` is sent again (s)."""
-_CDC_STEPS = "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
-CDC_HINT = f"its LED must blink yellow (CDC mode): {_CDC_STEPS}"
+CDC_HINT = (
+    "Set it to CDC mode: plug it in, press its button while the LED is green, release it when the LED is red. "
+    "The LED then blinks yellow"
+)
 
 
 class DataqCommandLink:
@@ -173,7 +174,7 @@ class DataqCommandLink:
             if self.drain():
                 return
         text = f"the device on {self._link.port} does not stop sending ({self._tries} tries)"
-        raise DeviceError(text, "check that this is the DAQ's port, then unplug it and plug it in again")
+        raise DeviceError(text, "Check that this is the port of the DAQ, then unplug it and plug it in again")
 
     def drain(self) -> bool:
         """Read until nothing more arrives. Return whether that happened in time."""
@@ -195,10 +196,10 @@ class DataqCommandLink:
             if maker.upper() != "DATAQ":
                 raise ValueError(f"maker {maker!r} is not DATAQ")
             if not serial:
-                raise ValueError("it names no serial number, by which its measured sample rate is known again")
+                raise ValueError("it reports no serial number")
             return DeviceIdentity(f"DI-{parse_model(model)}", serial[:8], firmware), int(dividend)
         except ValueError as error:
-            raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
+            raise DeviceError(f"the device on {self._link.port} is not supported by this driver ({error})") from error
 
     def send_command(self, command: str) -> str:
         """Send a command, wait for its echo, and return what the device adds to it.
@@ -223,7 +224,7 @@ class DataqCommandLink:
         port, tries = self._link.port, f"{self._tries} tries"
         if not last_line:
             raise DeviceError(f"no DATAQ device answers on {port} ({command}, {tries})", CDC_HINT)
-        raise DeviceError(f"the device on {port} does not take {command!r} ({tries}); it says {last_line[:60]!r}")
+        raise DeviceError(f"the device on {port} rejects {command!r} with {last_line[:60]!r} ({tries})")
 
 
 def probe_dataq(link: SerialLink) -> DeviceIdentity | None:

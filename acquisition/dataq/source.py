@@ -147,15 +147,15 @@ class DataqSource(ClosedOnExit):
     def _failed(self, sends: bool) -> DeviceError:
         daq = f"the DAQ on {self._link.port}"
         if sends:
-            text = f"the digital inputs of {daq} do not hold still: lost bytes cannot be told"
-            return DeviceError(text, "leave them unconnected, or set loss_detection = false in [daq]")
+            text = f"the digital inputs of {daq} change, so lost bytes cannot be detected"
+            return DeviceError(text, "Leave them unconnected, or set loss_detection = false in [daq]")
         text = f"{daq} has sent no samples for {SILENCE_TIMEOUT:g} s"
-        return DeviceError(text, "switch it off and on and give the same command again")
+        return DeviceError(text, "Switch it off and on, then repeat the command")
 
     def _check_firmware(self) -> None:
         version = protocol.parse_firmware(self.identity.firmware)
         if version is not None and version < protocol.MIN_FIRMWARE_VERSION:
-            remedy = f"{protocol.MIN_FIRMWARE_VERSION} or newer is needed: install it with the maker's upgrade tool"
+            remedy = f"Install {protocol.MIN_FIRMWARE_VERSION} or newer with the upgrade tool of the manufacturer"
             raise DeviceError(f"the {self.identity.model} on {self._link.port} has firmware {version:.2f}", remedy)
 
     def _configure(self, inputs: Sequence[SensorInput], wanted: float, dividend: int) -> float:

@@ -35,7 +35,7 @@ class DeviceSettings:
 
 @dataclass(frozen=True)
 class SensorDataLocation:
-    """Location of the sensor data in a device, in the words by which a person finds them there."""
+    """Location of the sensor data in a device, for people."""
 
     place: str
     """Location, e.g. "the device's own channel data (INFO)"."""
@@ -109,9 +109,9 @@ EMULATED_CLOCK_FREQUENCY = 1000.0
 
 def _check_taps(settings: DeviceSettings) -> None:
     if not settings.loss_detection:
-        raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
+        raise ValueError("loss_detection=false is not possible with a TAPS/1 device. Remove the key from [daq].")
     if settings.digital_clock:
-        raise ValueError("digital_clock=true: a TAPS/1 device numbers its scans and needs no clock; leave the key out")
+        raise ValueError("digital_clock=true is not possible with a TAPS/1 device. Remove the key from [daq].")
 
 
 def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
@@ -132,7 +132,7 @@ def _open_dataq(port: str, settings: DeviceSettings) -> Device:
 def _check_dataq(settings: DeviceSettings) -> None:
     _import("dataq.protocol").check_inputs(settings.inputs)
     if settings.digital_clock and not settings.loss_detection:
-        raise ValueError("digital_clock=true: the clock stands in the digital word; leave out loss_detection=false")
+        raise ValueError("digital_clock=true needs loss detection. Remove loss_detection=false from [daq].")
 
 
 def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
@@ -196,7 +196,7 @@ BUILT_IN_DRIVERS = (
     ),
     Driver(
         "lines",
-        "a board that prints lines of numbers",
+        "a text-output board that prints lines of numbers",
         lambda port, settings: _import("text_boards.source").TextBoardSource(
             port, settings.inputs, settings.sample_rate, settings.printing
         ),

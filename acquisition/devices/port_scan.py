@@ -69,12 +69,12 @@ def probe_port(
 
 
 def _query_port(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | None:
-    """Return who answers a driver on a port, None for nobody, or a remark on a driver that fails."""
-    about = f"who is on {link.port}"
-    answer = query_driver(driver.name, lambda: driver.probe(link), about)
+    """Return the device that answers a driver on a port, None for none, or a remark on a driver that fails."""
+    doing = f"probing {link.port}"
+    answer = query_driver(driver.name, lambda: driver.probe(link), doing)
     if answer is None or isinstance(answer, Remark) or _is_identity(answer):
         return cast("DeviceIdentity | Remark | None", answer)
-    text = f"answers {type(answer).__name__} when asked {about}, not a DeviceIdentity of texts"
+    text = f"returns {type(answer).__name__} instead of a DeviceIdentity of texts when {doing}"
     return driver_failure_remark(driver.name, text)
 
 
@@ -90,7 +90,7 @@ def _select_drivers(drivers: Sequence[Driver], vendor: int | None) -> list[Drive
     return of_this_vendor or [driver for driver in drivers if not driver.usb_vendors]
 
 
-SEARCH_QUESTION = "which devices there are"
+SEARCH_ACTION = "listing devices"
 
 
 def search_devices(driver: Driver, remarks: list[Remark]) -> list[DeviceAddress]:
@@ -111,14 +111,14 @@ def search_devices(driver: Driver, remarks: list[Remark]) -> list[DeviceAddress]
     if driver.search is None:
         return []
     search = driver.search
-    answer = query_driver(driver.name, lambda: list(search()), SEARCH_QUESTION)
+    answer = query_driver(driver.name, lambda: list(search()), SEARCH_ACTION)
     if isinstance(answer, Remark):
         remarks.append(answer)
     if not isinstance(answer, list):
         return []
     usable = [device for device in answer if _is_address(device, f"{driver.name}:")]
     if len(usable) < len(answer):
-        text = f"lists what is no DeviceAddress that begins with {driver.name}: when asked {SEARCH_QUESTION}"
+        text = f'returns other entries than a DeviceAddress beginning with "{driver.name}:" when {SEARCH_ACTION}'
         remarks.append(driver_failure_remark(driver.name, text))
     return usable
 
@@ -140,8 +140,13 @@ class ScannedPort:
     """Device that answers, None for none."""
     text: str = ""
     """Reason why none answers, in a few words."""
-    problem: str = ""
-    """Reason why the port could not be probed, a sentence with the remedy."""
+    failure: DeviceError | None = None
+    """Error that prevented probing the port, with its remedy."""
+
+    @property
+    def problem(self) -> str:
+        """Text of that error, empty if there is none."""
+        return str(self.failure or "")
 
 
 @dataclass(frozen=True)
@@ -188,9 +193,9 @@ def _make_scanned_port(driver: Driver, device: DeviceAddress) -> ScannedPort:
 
 def _scan_port(port: PortInfo, drivers: Sequence[Driver], remarks: list[Remark], named: bool) -> ScannedPort:
     if port.vendor is None and not named:
-        return ScannedPort(port, text="not asked: no USB device")
+        return ScannedPort(port, text="not probed, not a USB device")
     try:
         answer = probe_port(port.device, drivers, port.vendor, remarks)
     except DeviceError as error:
-        return ScannedPort(port, text="cannot be opened", problem=str(error))
+        return ScannedPort(port, text="cannot be opened", failure=error)
     return ScannedPort(port, answer, "" if answer else "no answer")

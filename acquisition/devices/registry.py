@@ -51,7 +51,7 @@ def find_driver(name: str) -> Driver:
     >>> find_driver("tap")
     Traceback (most recent call last):
         ...
-    acquisition.errors.DataError: driver='tap' is none of taps, dataq, lines, audio, nidaqmx, mcc172, ...
+    acquisition.errors.DataError: driver='tap' is not one of taps, dataq, lines, audio, nidaqmx, mcc172, ...
     """
     driver = _load_driver(name)
     if isinstance(driver, Remark):
@@ -111,11 +111,11 @@ def _load_driver(name: str) -> Driver | Remark:
         return ours
     points = sorted(entry_points(group=DRIVER_ENTRY_POINTS, name=name), key=get_package_name)
     if not points:
-        text = f"driver={name!r} is none of {', '.join(list_driver_names())}"
-        return Remark("driver-not-known", "", text, "correct the name, or install the package that brings it")
+        text = f"driver={name!r} is not one of {', '.join(list_driver_names())}"
+        return Remark("driver-not-known", "", text, "Correct the name, or install the package with this driver")
     if len(points) > 1:
         packages = " and ".join(map(get_package_name, points))
-        return make_unusable_remark(Driver, name, f"the packages {packages} both bring it", "remove one of them")
+        return make_unusable_remark(Driver, name, f"the packages {packages} both provide it", "Remove one of them")
     return load_plugin(points[0], Driver)
 
 
@@ -123,11 +123,11 @@ DRIVER_ANSWER_TIMEOUT = 10.0
 """Time limit for the answer of a driver (s), three times what the built-in ones take, chosen."""
 
 
-def query_driver(name: str, question: Callable[[], object], about: str) -> object:
+def query_driver(name: str, question: Callable[[], object], doing: str) -> object:
     """Query a driver in a thread, so that a failing or hanging driver stops nothing else.
 
-    Returns the answer, None for a DeviceError (unplugged meanwhile), or a Remark if the driver fails or hangs. about:
-    what it is asked, e.g. "who is on COM3".
+    Returns the answer, None for a DeviceError (unplugged meanwhile), or a Remark if the driver fails or hangs. doing:
+    description of the call, e.g. "probing COM3".
     """
     answers = queue.SimpleQueue[object]()
 
@@ -141,11 +141,11 @@ def query_driver(name: str, question: Callable[[], object], about: str) -> objec
     try:
         answer = answers.get(timeout=DRIVER_ANSWER_TIMEOUT)
     except queue.Empty:
-        return driver_failure_remark(name, f"has not answered within {DRIVER_ANSWER_TIMEOUT:g} s {about}")
+        return driver_failure_remark(name, f"does not answer within {DRIVER_ANSWER_TIMEOUT:g} s when {doing}")
     if isinstance(answer, DeviceError):
         return None
     if isinstance(answer, BaseException):
-        return driver_failure_remark(name, f"fails when asked {about} ({format_exception_line(answer)})")
+        return driver_failure_remark(name, f"fails when {doing} ({format_exception_line(answer)})")
     return answer
 
 
@@ -169,10 +169,10 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
     if driver.sensor_data is None:
         _check_sensors(driver, settings)
     elif settings.inputs:
-        text = 'leave [[daq.channel]] out, or name another driver ("dataq" takes them)'
-        raise ValueError(f"channel: {driver.title} names its own sensors: {text}")
+        cure = "Remove [[daq.channel]], or choose another driver, such as dataq."
+        raise ValueError(f"channel: {driver.title} describes its sensors itself. {cure}")
     if settings.printing and not driver.prints_samples:
-        raise ValueError(f'printing: [daq.printing] is for driver = "lines"; leave it out for {driver.title}')
+        raise ValueError('printing: only driver = "lines" uses [daq.printing]. Remove the table.')
     with convert_driver_errors(driver.name, "checking [daq]", DataError):
         driver.check(settings)
 
@@ -180,16 +180,15 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
 def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
     quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
     if quantities.count("acceleration") == 0 or quantities.count("force") > 1:
-        listed = ", ".join(quantities) or "nothing"
-        needed = "two [[daq.channel]], one of force and one of acceleration"
-        alone = 'with hammer = "none" in [tap] that of acceleration alone'
-        raise ValueError(f'driver = "{driver.name}" needs {needed}; here are {listed}; {alone}')
+        found = f'driver = "{driver.name}" has [[daq.channel]] for {", ".join(quantities) or "nothing"}'
+        cure = 'Give one of force and one of acceleration (with hammer = "none" in [tap] only acceleration).'
+        raise ValueError(f"{found}. {cure}")
     directions = [sensor.channel.direction for sensor in settings.inputs if sensor.channel.quantity == "acceleration"]
     named = sorted(filter(None, directions))
     if len(directions) > 1 and (not named or len(set(named)) < len(named)):
-        needed = 'each that is tapped along needs its own direction = "x" or "y" in [[daq.channel]]'
-        raise ValueError(f"{len(directions)} channels of acceleration: {needed}")
+        cure = 'Give each its own direction = "x" or "y" in [[daq.channel]].'
+        raise ValueError(f"{len(directions)} channels of acceleration have directions {directions}. {cure}")
     numbers = [sensor.number for sensor in settings.inputs]
     for second, number in enumerate(numbers, 1):
         if (first := numbers.index(number) + 1) < second:
-            raise ValueError(f"channel {second}: input={number} is that of channel {first}; each sensor needs its own")
+            raise ValueError(f"channel {second}: input={number} is already used by channel {first}")

@@ -59,7 +59,7 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     (1.25, 1.25)
     """
     if estimator not in get_args(Estimator):
-        raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
+        raise ValueError(f"estimator={estimator!r} is not one of {', '.join(get_args(Estimator))}")
     return estimate_frf_from_spectra(compute_cross_spectra(hits), hits, estimator)
 
 
@@ -118,10 +118,11 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     0.5
     """
     if not hits:
-        raise ValueError("there is no hit to average; at least one is needed")
+        raise ValueError("0 hits cannot be averaged")
     shapes = {(hit.force.size, hit.sample_rate) for hit in hits}
     if len(shapes) > 1:
-        raise ValueError(f"hits differ in length or sample rate: {sorted(shapes)}; average only hits of one set-up")
+        found = f"hits differ in length or sample rate: {sorted(shapes)}"
+        raise ValueError(f"{found}. Average only hits of one set-up.")
     n = hits[0].force.size
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
@@ -175,9 +176,9 @@ class RunningMean:
 
     def __init__(self) -> None:
         self.hits: tuple[Hit, ...] = ()
-        """The hits in it, in the order in which they came."""
+        """Hits of the mean, in the order they were added."""
         self.frf: Frf | None = None
-        """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None where there is none."""
+        """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None if there is none."""
         self._sums: Spectra | None = None
         self._before: Frf | None = None
 
@@ -224,12 +225,13 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit has no pulse, or another length or rate.
+            If the hit has no pulse, or another length or rate.
         """
         size = hit.acceleration.size
         if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
-            mean = f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
-            raise ValueError(f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of {mean}")
+            mean = f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz"
+            found = f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot be averaged with hits of {mean}"
+            raise ValueError(f"{found}. Start a new test.")
         if not hit.has_force:
             self.hits = (*self.hits, hit)
             return
@@ -250,11 +252,11 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit is not in the mean, or the only one.
+            If the hit is not in the mean, or the only one.
         """
         others = self._others(hit)
         if not others:
-            raise ValueError("this hit is the only one in the mean; there is no mean of the others")
+            raise ValueError("this is the only hit in the mean")
         return estimate_frf(others)
 
     def remove(self, hit: Hit) -> None:
@@ -268,7 +270,7 @@ class RunningMean:
         Raises
         ------
         ValueError
-            Where the hit is not in the mean.
+            If the hit is not in the mean.
         """
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
@@ -278,7 +280,7 @@ class RunningMean:
     def _others(self, hit: Hit) -> list[Hit]:
         kept = [counted for counted in self.hits if counted is not hit]
         if len(kept) == len(self.hits):
-            raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
+            raise ValueError("this hit is not in the mean, so it cannot be removed")
         return kept
 
 

@@ -43,7 +43,7 @@ def apply_exponential_window(hit: Hit, time_constant: float) -> Hit:
     (10.45, 89.55)
     """
     if not time_constant > 0:
-        raise ValueError(f"time_constant={time_constant} s is not > 0")
+        raise ValueError(f"time_constant={time_constant} s is not above 0")
     pulse = require_pulse(hit)
     after = np.maximum(np.arange(hit.force.size) - pulse.start, 0) / hit.sample_rate
     window = np.exp(-after / time_constant)
@@ -204,7 +204,7 @@ def infer_averages(frf: Frf) -> int | None:
     Returns
     -------
     int or None
-        Number of hits; None where it cannot be inferred.
+        Number of hits; None if it cannot be inferred.
 
     References
     ----------
@@ -257,7 +257,7 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
     Returns
     -------
     float or None
-        Approximate time constant (s); None where there is no sign of a window.
+        Approximate time constant (s); None if there is no sign of a window.
     """
     falls = [fall for fall in map(_measure_noise_drop, hits) if fall is not None]
     if not falls:
@@ -267,7 +267,7 @@ def infer_window(hits: Sequence[Hit]) -> float | None:
 
 
 def _measure_noise_drop(hit: Hit) -> tuple[float, float] | None:
-    """Return the noise before the hit over that at the end, and the time between (s); None where one is unknown."""
+    """Return the noise before the hit over that at the end, and the time between (s); None if one is unknown."""
     before, tenth = int(0.8 * count_pre_hit_samples(hit)), hit.acceleration.size // 10
     if min(before, tenth) < MIN_WINDOW_SAMPLES:
         return None

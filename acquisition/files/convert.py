@@ -68,7 +68,7 @@ def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
 def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode time, force and acceleration of one hit; raise DataError for several."""
     if len(hits) != 1:
-        raise DataError(f"{len(hits)} hits: a text table holds one; write them as .uff, .mat or .json, or the FRF")
+        raise DataError(f"a text table cannot hold {len(hits)} hits. Write .uff, .mat or .json, or write the FRF.")
     (hit,) = hits
     time = np.arange(hit.force.size) / hit.sample_rate
     return _encode_table({"time [s]": time, "force [N]": hit.force, "acceleration [m/s^2]": hit.acceleration}, labels)
@@ -96,7 +96,7 @@ def encode_mat_frf(frf: Frf, labels: ExportLabels) -> bytes:
 def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode force (N) and acceleration (m/s^2), a row per hit, and the sample rate (Hz) as MATLAB v5."""
     if len({(hit.force.size, hit.sample_rate) for hit in hits}) > 1:
-        raise DataError("the hits differ in length or sample rate; write them as .json")
+        raise DataError("the hits differ in length or sample rate. Write them as .json.")
     rows = {name: np.stack([getattr(hit, name) for hit in hits]) for name in ("force", "acceleration")}
     return _encode_mat({**rows, "sample_rate": hits[0].sample_rate}, labels)
 
@@ -189,9 +189,9 @@ def _format_data_set_58(
 
 
 def _check_identification_line(text: str) -> str:
-    """Return a line of identification; raise DataError where it has more than 80 characters."""
+    """Return a line of identification; raise DataError if it has more than 80 characters."""
     if len(text.encode("utf-8")) > 80:
-        raise DataError(f"{text!r} has more than the 80 characters of a line of a universal file")
+        raise DataError(f"{text!r} is longer than 80 characters, the limit of a line in a universal file")
     return text or "NONE"
 
 
@@ -231,7 +231,7 @@ class ExportFormat:
     encode_hits: Callable[[Sequence[Hit], ExportLabels], bytes]
     """Function that writes signals over time."""
     encode_frf: Callable[[Frf, ExportLabels], bytes] | None
-    """Function that writes an FRF; None where the format has none."""
+    """Function that writes an FRF; None if the format has none."""
     precision: str
     """Precision of its numbers, for people."""
 
@@ -273,14 +273,14 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     out
         File to write.
     description
-        What the recorded file does not state.
+        Facts that the recorded file does not state.
     hits
         Whether to write the signals over time; a format without FRFs always does.
 
     Returns
     -------
     Conversion
-        What was written.
+        Content of the new file.
 
     Raises
     ------
@@ -292,9 +292,9 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     path, out = Path(path), Path(out)
     writer = EXPORT_FORMATS.get(out.suffix.lower())
     if writer is None:
-        raise ValueError(f"{out}: files that end with {', '.join(EXPORT_FORMATS)} are written; give one of them")
+        raise ValueError(f"{out}: {out.suffix!r} is not one of {', '.join(EXPORT_FORMATS)}")
     if out.exists() and path.exists() and out.samefile(path):
-        raise ValueError(f"{out}: this is the file that is read; name another")
+        raise ValueError(f"{out}: this is also the input file. Give another output file.")
     recording = inspect_file(path, description).require_valid()
     created = description.date.astimezone() if description.date else recording.created
     direction, tool = description.direction or recording.direction, description.tool or recording.tool
@@ -305,7 +305,7 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     elif recording.hits:
         content, amount = writer.encode_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"
     else:
-        raise DataError(f"{path}: holds an FRF, not the hits it was made from; write it as {_FRF_EXTENSIONS}")
+        raise DataError(f"{path}: the file has an FRF but no hits. Write it as {_FRF_EXTENSIONS}.")
     atomic_write(out, content)
     return Conversion(out, writer.title, amount, writer.precision, recording)
 

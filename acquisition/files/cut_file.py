@@ -34,7 +34,7 @@ class CutSignal:
     sample_rate: float
     """Sample rate (Hz)."""
     codes: Codes | None = None
-    """ADC codes, shape (n,); None where a recording of another program holds values."""
+    """ADC codes, shape (n,); None if a recording of another program holds values."""
     channel: Channel | None = None
     """Channel that turns codes into m/s^2; None without codes."""
     lost_scans: int = 0
@@ -44,7 +44,7 @@ class CutSignal:
     sensor: str = "accelerometer"
     """Kind of sensor: accelerometer or microphone."""
     speed_rpm: Floats | None = None
-    """Spindle speed by a tachometer at each sample (rpm), NaN where unknown, shape (n,); None without one."""
+    """Spindle speed by a tachometer at each sample (rpm), NaN if unknown, shape (n,); None without one."""
 
     @property
     def duration(self) -> float:
@@ -95,7 +95,7 @@ def is_cut_file(path: Path) -> bool:
 
 
 def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:
-    """Write a recorded cut with what is known of it (JSON); return the bytes, which are then on the disk."""
+    """Write a recorded cut with its description (JSON); return the bytes, which are then on the disk."""
     memory = io.BytesIO()
     with hdf5_file.open_hdf5(memory, "w") as file:
         file.attrs.update(format=CUT_FORMAT_NAME, version=CUT_FORMAT_VERSION, sample_rate_hz=signal.sample_rate)
@@ -115,18 +115,18 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
 
 
 def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
-    """Read what `write_cut_signal` wrote; raise DataError for another or a damaged file."""
+    """Read a file of `write_cut_signal`; raise DataError for another or a damaged file."""
     content = read_regular_file(path)
     if not hdf5_file.has_valid_checksum(content):  # HDF5 could hang on it
-        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
+        raise DataError(f"{path}: changed since it was written (SHA-256 differs). Restore it from a backup.")
     try:
         with hdf5_file.open_hdf5(io.BytesIO(content), "r") as file:
             if file.attrs.get("format") != CUT_FORMAT_NAME or int(file.attrs["version"]) > CUT_FORMAT_VERSION:
-                raise DataError(f"{path}: no recording of a cut that this lobewatch reads")
+                raise DataError(f"{path}: not a recorded cut that this version of lobewatch can read")
             hdf5_file.check_unpacked_size(file, len(content), path)
             return _read_signal(file), json.loads(file["about"][()])
     except (OSError, KeyError) as error:
-        raise DataError(f"{path}: no readable recording of a cut ({error}); take it again from a backup") from error
+        raise DataError(f"{path}: unreadable recorded cut ({error}). Restore it from a backup.") from error
 
 
 def _read_signal(file: h5py.File) -> CutSignal:

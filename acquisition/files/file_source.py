@@ -52,7 +52,7 @@ class FileSource(ClosedOnExit):
         Raises
         ------
         DataError
-            Where the file has no hits.
+            If the file has no hits.
         """
         hits = read_hits(path)
         quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)
@@ -63,7 +63,7 @@ class FileSource(ClosedOnExit):
         self.identity = DeviceIdentity(f"replay of {Path(path).name}")
         """Name of the file."""
         self.events: deque[Event] = deque()
-        """It tells of no events."""
+        """Empty: a file has no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
 

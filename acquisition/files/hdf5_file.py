@@ -18,7 +18,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def open_hdf5(memory: io.BytesIO, mode: Literal["r", "r+", "w"]) -> h5py.File:
-    """Open the HDF5 file that these bytes are or become; raise OSError where they are none."""
+    """Open the HDF5 file that these bytes are or become; raise OSError if they are none."""
     import h5py  # takes longer to import than what a command needs that opens no file
 
     return h5py.File(memory, mode)
@@ -36,11 +36,8 @@ def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
     try:
         file.visititems(lambda _, node: sizes.append(_measure_unpacked_size(node)))
     except (OSError, RuntimeError, TypeError, ValueError) as error:
-        raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
-    if sum(sizes) > get_unpacked_limit(packed):
-        limits = f"at most {MIN_UNPACKED_LIMIT / 1e6:g} MB or {MAX_UNPACKED_RATIO} times the file are read"
-        fault = f"{packed / 1e6:.3g} MB that unpack to {sum(sizes) / 1e6:.4g} MB; {limits}; no tap test is like that"
-        raise DataError(f"{path}: {fault}: take it again from where it was recorded")
+        raise DataError(f"{path}: unreadable HDF5 file ({error}). Restore it from a backup.") from error
+    check_unpacked_total(sum(sizes), packed, path)
 
 
 def get_unpacked_limit(packed: int) -> int:
@@ -48,11 +45,12 @@ def get_unpacked_limit(packed: int) -> int:
     return max(MIN_UNPACKED_LIMIT, MAX_UNPACKED_RATIO * packed)
 
 
-def check_unpacked_ratio(unpacked: int, path: Path) -> None:
-    """Raise DataError for a file that unpacks to too many bytes."""
-    packed = path.stat().st_size
-    if unpacked > get_unpacked_limit(packed):
-        raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
+def check_unpacked_total(unpacked: int, packed: int, path: Path) -> None:
+    """Raise DataError for a file of `packed` bytes that unpacks to too many bytes."""
+    limit = get_unpacked_limit(packed)
+    if unpacked > limit:
+        sizes = f"{packed / 1e6:.3g} MB unpack to {unpacked / 1e6:.4g} MB (limit {limit / 1e6:.4g} MB)"
+        raise DataError(f"{path}: {sizes}. Export the recording again.")
 
 
 def _measure_unpacked_size(data: Any) -> int:

@@ -27,7 +27,7 @@ class HitSettings(NamedTuple):
     pre_trigger: int
     """Samples before the trigger."""
     channels: tuple[Channel, ...]
-    """Channels of the codes; empty where the hits are samples."""
+    """Channels of the codes; empty if the hits are samples."""
 
     @classmethod
     def from_hit(cls, hit: Hit) -> HitSettings:
@@ -45,7 +45,7 @@ def write_channel(attributes: h5py.AttributeManager, channel: Channel) -> None:
 
 
 def read_channel(attributes: h5py.AttributeManager) -> Channel:
-    """Read the channel that `write_channel` wrote; raise KeyError where a field is missing."""
+    """Read the channel that `write_channel` wrote; raise KeyError if a field is missing."""
     values = convert_to_plain(attributes)
     return Channel(**{field.name: values[field.name] for field in fields(Channel)})
 
@@ -61,7 +61,7 @@ def choose_code_type(channels: Sequence[Channel]) -> type[np.int16 | np.int32]:
 
 
 def write_raw_hits(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
-    """Write hits and the flags of each in a group of their own; nothing without hits."""
+    """Write hits and the flags of each in their own group; nothing without hits."""
     if hits:
         raw = file.create_group("raw")
         write_hit_settings(raw, HitSettings.from_hit(hits[0]))

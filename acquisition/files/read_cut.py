@@ -23,7 +23,7 @@ MIN_REGULAR_TURNS_SHARE = 0.8
 """Smallest share of turns that are as long as their neighbours."""
 NEIGHBOR_TURNS = 5
 """Number of turns on each side to compare with."""
-_TACHOMETER_QUESTION = "is the tachometer connected, and is this its column?"
+_TACHOMETER_ADVICE = "Check the tachometer and its column."
 
 
 def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
@@ -60,17 +60,17 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
     [3000.0]
     """
     if pulses < 1:
-        raise ValueError(f"{pulses} pulses a turn; give 1 or more")
+        raise ValueError(f"{pulses} pulses per turn must be 1 or more")
     begins = _find_rising_edges(signal)
     marks = begins[::pulses]
     if marks.size < 3:
-        found = f"{begins.size} pulses in {signal.size / sample_rate:.3g} s, less than two turns of {pulses}"
-        raise ValueError(f"{found}; {_TACHOMETER_QUESTION}")
+        found = f"{begins.size} pulses in {signal.size / sample_rate:.3g} s are less than two turns of {pulses}"
+        raise ValueError(f"{found}. {_TACHOMETER_ADVICE}")
     turn = np.diff(marks)
     usual = np.array([np.median(turn[max(i - NEIGHBOR_TURNS, 0) : i + NEIGHBOR_TURNS + 1]) for i in range(turn.size)])
     is_even = np.maximum(turn / usual, usual / turn) < MAX_TURN_RATIO
     if np.mean(is_even) < MIN_REGULAR_TURNS_SHARE:
-        raise ValueError(f"{begins.size} pulses at no even times; {_TACHOMETER_QUESTION}")
+        raise ValueError(f"the {begins.size} pulses are irregular. {_TACHOMETER_ADVICE}")
     speed = np.full(signal.size, np.nan)
     edges = np.ceil(marks).astype(int)
     for first, last, time in zip(edges[:-1][is_even], edges[1:][is_even], turn[is_even], strict=True):
@@ -103,43 +103,42 @@ def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple
         named = report.attempt(find_column, signals, report.description.tacho, "tacho")
         columns = [] if named is None else [named]
     if len(columns) > 1:
-        names = " and ".join(signal.name for signal in columns)
-        report.add_missing(f"which of {names} is the speed of the spindle", "tacho", f' "{columns[0].name}"')
+        names = ", ".join(signal.name for signal in columns)
+        report.add_missing(f"column of the spindle speed among {names}", "tacho", f' "{columns[0].name}"')
     rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
     if pulses is not None and not columns:
-        report.reject("pulses", pulses, "no column is a tachometer; name it with Description.tacho")
+        report.reject("pulses", pulses, "no tachometer column", "Give its name with Description.tacho")
     return rest, columns[0] if columns else None
 
 
 def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> Floats:
-    """Return the spindle speed at each sample (rpm), NaN where unknown."""
+    """Return the spindle speed at each sample (rpm), NaN if unknown."""
     unit, values = parse_unit(signal.unit), np.asarray(signal.values, dtype=np.float64)
     pulses = report.description.pulses
     if unit is None or unit.quantity != "frequency":
         if signal.role == "speed":
             example = f' "speed [rpm]={signal.name}"'
-            raise report.add_missing(f"the unit of the speed in {signal.name}", "columns", example)
+            raise report.add_missing(f"unit of the speed in {signal.name}", "columns", example)
         try:
             return compute_speed_from_pulses(values, sample_rate, 1 if pulses is None else pulses)
         except ValueError as error:
             raise report.add_fault(f"{signal.name}: {error}") from error
     speed = np.abs(values) * (60 * unit.factor)
     if pulses is not None:
-        raise report.reject("pulses", pulses, f"{signal.name} is the speed itself ({signal.unit}); leave it out")
+        raise report.reject("pulses", pulses, f"{signal.name} is a speed in {signal.unit}", "Omit the option")
     if not np.any(speed > 0):
-        fault = f"stands at 0 {signal.unit} all along; name another column, or leave it out"
-        raise report.add_fault(f"{signal.name}: {fault}")
+        raise report.add_fault(f"{signal.name} is always 0 {signal.unit}", "Choose another column, or omit it")
     return np.where(speed > 0, speed, np.nan)
 
 
-CUT_COLUMNS_EXAMPLE = ' "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
+CUT_COLUMNS_EXAMPLE = ' "time [s],acceleration [m/s^2]"'
 """Example of the columns of a cut."""
 MICROPHONE_SENSOR = "microphone"
 """Sensor whose values need no unit, because only their ratios count."""
 
 
 def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> CutSignal:
-    """Read what accelerometers or a microphone recorded of a cut, from a file of any known format.
+    """Read a cut recorded by accelerometers or a microphone, from a file of any known format.
 
     Raises DataError for a file without such a signal, or with too few statements.
     """
@@ -151,14 +150,14 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
     file_format = detect_format(path)
     contents = read_contents(file_format, path, description)
     if not isinstance(contents, Contents):
-        raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
+        raise DataError(f"{path}: this is a {file_format.title}, not a recorded cut")
     report = ImportReport(description)
     signals = report.attempt(_resolve_cut_signals, contents)
     if signals is None:
         raise DataError(f"{path}: {report.format_problems()}")
     values, rate, speed = signals
     if not np.all(np.isfinite(values)):
-        raise DataError(f"{path}: holds values that are no numbers; export it again")
+        raise DataError(f"{path}: the signal has infinite or missing values. Export it again.")
     return CutSignal(values, rate, sensor=description.sensor, speed_rpm=speed)
 
 
@@ -178,7 +177,7 @@ def _resolve_cut_signals(contents: Contents, report: ImportReport) -> tuple[Floa
     responses = [signal for signal in over_time if infer_kind(signal) == "response"]
     candidates = responses or [signal for signal in over_time if not infer_kind(signal)]
     if not candidates:
-        fact = f"which of its columns is the acceleration ({format_signal_names(signals)})"
+        fact = f"column of the acceleration among {format_signal_names(signals)}"
         raise report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
     if description.response is not None:
         one = report.attempt(choose_signal, candidates, "responses")
@@ -187,7 +186,7 @@ def _resolve_cut_signals(contents: Contents, report: ImportReport) -> tuple[Floa
     speed_signals = [speed_signal] if speed_signal is not None and candidates else []
     rate, used = resolve_rate(scaled, [*candidates, *speed_signals], report)
     if is_microphone and responses:
-        report.add_fault(f"{responses[0].name} moves; leave Description.sensor microphone out")
+        report.add_fault(f"{responses[0].name} is a motion, not a sound", "Omit Description.sensor microphone")
     report.require_clean()
     speed = resolve_speed(used[-1], rate, report) if speed_signals else None
     values = np.stack([signal.values * factor for signal, factor in zip(used, factors, strict=False)])
@@ -198,5 +197,5 @@ def _resolve_factor(signal: Signal, report: ImportReport) -> float:
     """Return the factor of an acceleration to m/s^2."""
     quantity, factor = resolve_response_unit(signal, report)
     if quantity != "acceleration":
-        raise report.add_fault(f"{signal.name} is a {quantity}; a cut is heard by an accelerometer")
+        raise report.add_fault(f"{signal.name} is a {quantity}, but a recorded cut needs an acceleration")
     return factor

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from acquisition.errors import DataError, Remark
+from acquisition.errors import DataError, Remark, join_sentences
 from acquisition.file_io import open_regular_file
 from acquisition.files.contents.contents import Contents, Description, Fact, Format, append_force_signals
 from acquisition.files.contents.recording import Recording, resolve_recording
@@ -55,7 +55,7 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     path
         Recorded file.
     description
-        What the file does not state.
+        Facts that the file does not state.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     ...     unclear = inspect_file(f"{folder}/frf.csv")
     ...     clear = inspect_file(f"{folder}/frf.csv", Description(unit="m/N"))
     >>> print(unclear.problems)
-    it does not say: the unit of real (Description.unit, such as m/N, um/N, g/N)
+    missing unit of real (Description.unit, such as m/N, um/N, g/N)
     >>> clear.problems, clear.frf.frequency.size
     ('', 100)
     """
@@ -93,7 +93,7 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = ", ".join(description.list_signal_options())
-    problems = f"a {file_format.title} says itself what it holds; leave out {options}" if options else ""
+    problems = f"a {file_format.title} describes its contents itself. Omit {options}." if options else ""
     names = ("created", "tool", "direction", "operator", "device") if about else ()
     labels = {name: getattr(about, name) for name in names}
     conditions = about.conditions if about and about.machine else None
@@ -109,7 +109,7 @@ def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTIO
     path
         Recorded file of any known format.
     description
-        What the file does not state.
+        Facts that the file does not state.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTIO
     Raises
     ------
     DataError
-        Where the file holds neither, or does not state enough.
+        If the file holds neither, or does not state enough.
     """
     recording = inspect_file(path, description).require_valid()
     return list(recording.hits) if recording.frf is None else recording.frf
@@ -133,7 +133,7 @@ def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) ->
     path
         Recorded file of any known format.
     description
-        What the file does not state.
+        Facts that the file does not state.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) ->
     Raises
     ------
     DataError
-        Where the file has no hits, or does not state enough.
+        If the file has no hits, or does not state enough.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) ->
     """
     recording = read_recording(path, description)
     if isinstance(recording, Frf):
-        raise DataError(f"{path}: holds an FRF, not the hits it was made from")
+        raise DataError(f"{path}: the file has an FRF but no hits")
     return recording
 
 
@@ -173,7 +173,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     path
         Recorded file of any known format.
     description
-        What the file does not state.
+        Facts that the file does not state.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     Raises
     ------
     DataError
-        Where the file has neither an FRF nor a good hit, or does not state enough.
+        If the file has neither an FRF nor a good hit, or does not state enough.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     if frf is None:
-        raise DataError(f"{path}: it holds no force, and so no FRF")
+        raise DataError(f"{path}: no FRF, because no force was measured")
     return frf
 
 
@@ -225,10 +225,9 @@ def detect_format(path: Path) -> Format:
                 return file_format
         except PLUGIN_ERRORS as error:  # the code of other packages may raise anything
             reason = format_exception_line(error)
-            _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, reason)
+            _log.warning("%r: format %r failed to check the file (%s)", str(path), file_format.name, reason)
     titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
-    fault = f"of no format that is known here; export it as one of these: {titles}"
-    raise DataError(f"{path}: {fault}{_describe_broken_formats()}")
+    raise DataError(join_sentences(f"{path}: unknown file format", f"Export it as {titles}", *_list_broken_formats()))
 
 
 def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:
@@ -239,9 +238,9 @@ def read_contents(file_format: Format, path: Path, description: Description) -> 
             return file_format.read(path)
     option = f"{path}: Description.skip {skip}" if skip else f"{path}: Description.decimal {decimal}"
     if read_from is None:
-        raise DataError(f"{option}: a {file_format.title} is no text of lines; leave the option out")
+        raise DataError(f"{option}: a {file_format.title} has no lines of text. Omit the option.")
     if decimal not in DECIMAL_SIGNS:
-        raise DataError(f"{option}: is no decimal sign; give comma or point")
+        raise DataError(f"{option} is not comma or point")
     with _convert_errors(file_format, path):
         return read_from(path, skip or 0, DECIMAL_SIGNS[decimal])
 
@@ -250,7 +249,7 @@ def _read_force_contents(path: Path, description: Description) -> Contents:
     file_format = detect_format(path)
     held = read_contents(file_format, path, description if file_format.read_from else EMPTY_DESCRIPTION)
     if not isinstance(held, Contents):
-        raise DataError(f"Description.force {path}: a {file_format.title}; it needs no other file")
+        raise DataError(f"Description.force {path}: a {file_format.title} already has force and response")
     return held
 
 
@@ -260,17 +259,17 @@ def _convert_errors(file_format: Format, path: Path) -> Iterator[None]:
     try:
         yield
     except DataError as error:
-        raise DataError(f"{error}{_describe_broken_formats()}") from error
+        raise DataError(join_sentences(str(error), *_list_broken_formats())) from error
     except OSError:
         raise
     except Exception as error:
-        fault = f"cannot be read as {file_format.title} ({type(error).__name__}: {error})"
-        raise DataError(f"{path}: {fault}; export it in another format") from error
+        fault = f"unreadable as {file_format.title} ({type(error).__name__}: {error})"
+        raise DataError(f"{path}: {fault}. Export it in another format.") from error
 
 
-def _describe_broken_formats() -> str:
-    """Return the faults in formats of other packages, to append to the error of a file."""
-    return "".join(f"; {remark}" for remark in _load_plugin_formats()[1])
+def _list_broken_formats() -> list[str]:
+    """List the faults in formats of other packages, to append to the error of a file."""
+    return [f"Note on {remark}" for remark in _load_plugin_formats()[1]]
 
 
 @functools.cache
@@ -284,7 +283,7 @@ def _load_plugin_formats() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
         if not isinstance(plugin, Format):
             remarks.append(plugin)
         elif plugin.name in taken | formats.keys():
-            text = f"{get_package_name(point)} is not the only one to bring it"
+            text = f"{get_package_name(point)} and another package both provide it"
             remarks.append(make_unusable_remark(Format, point.name, text))
         else:
             formats[plugin.name] = plugin

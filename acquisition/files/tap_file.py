@@ -57,7 +57,7 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
     Raises
     ------
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def read_tap(path: Path | str) -> TapTest:
             tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
             return TapTest(tap_id, about, frf, hits, flags, _read_source(file))
         except KeyError as error:
-            raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
+            raise DataError(f"{path}: incomplete tap file ({error}). Restore it from a backup.") from error
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
@@ -154,7 +154,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     Raises
     ------
     OSError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), raw_hits.HitSettings.from_hit(hit)))
     with hdf5_file.open_hdf5(memory, "r+") as file:
@@ -215,20 +215,20 @@ def read_hit_name(path: Path | str) -> str:
 def _open_tap_file(path: Path) -> h5py.File:
     content = read_regular_file(path)
     if hdf5_file.has_wrong_checksum(content):
-        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
+        raise DataError(f"{path}: changed since it was written (SHA-256 differs). Restore it from a backup.")
     with contextlib.ExitStack() as closed_on_error:
         try:
             file = closed_on_error.enter_context(hdf5_file.open_hdf5(io.BytesIO(content), "r"))
             if file.attrs.get("format") != TAP_FORMAT_NAME:
-                fault = f"no tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
-                raise DataError(f"{path}: an HDF5 file, but {fault}")
+                fault = f"HDF5 file, but not a tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
+                raise DataError(f"{path}: {fault}")
             version, newest = int(file.attrs.get("version", TAP_FORMAT_VERSION)), TAP_FORMAT_VERSION_WITHOUT_FORCE
             if version > newest:
-                versions = f"a tap file of version {version}, this lobewatch reads up to {newest}"
-                raise DataError(f"{path}: {versions}; update lobewatch")
+                fault = f"tap file version {version} is newer than {newest}, the newest that this lobewatch reads"
+                raise DataError(f"{path}: {fault}. Update lobewatch.")
             hdf5_file.check_unpacked_size(file, len(content), path)
         except (OSError, LookupError, RuntimeError) as error:
-            raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
+            raise DataError(f"{path}: unreadable or truncated HDF5 file ({error})") from error
         closed_on_error.pop_all()
     return file
 

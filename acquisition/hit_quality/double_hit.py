@@ -28,7 +28,7 @@ class SecondPulse:
     """Second pulse of a hit."""
 
     delay: float
-    """Floats from the peak of the main pulse, negative before it."""
+    """Samples from the peak of the main pulse, negative before it."""
     share: float
     """Height over that of the main pulse (-)."""
 
@@ -106,11 +106,11 @@ MIN_DECAY_SAMPLES = 8 * PREDICTION_ORDER
 ERROR_AVERAGING_TIME = 3e-4
 """Time over which prediction errors are averaged (s): half of a short pulse."""
 SECOND_INPUT_RISE_TIME = 1e-3
-"""Rise time of a second touch (s): errors are compared with those before it."""
+"""Rise time of a double hit (s): errors are compared with those before it."""
 MIN_ERROR_RISE = 2.0
 """Smallest ratio to the largest error before it: nonlinear structures err most while they move most."""
 DECAY_FALSE_ALARM_RATE = 1e-4
-"""Largest probability that noise is reported as a second touch in one decay."""
+"""Largest probability that noise is reported as a double hit in one decay."""
 NOISE_LIMIT_MARGIN = 1.25
 """Factor on the noise limit, as errors are not quite independent."""
 REWEIGHTING_ROUNDS = 4
@@ -120,8 +120,8 @@ REWEIGHTING_ROUNDS = 4
 def find_second_input(decay: Floats, sample_rate: float, noise: float) -> float | None:
     """Find the time (s) in a free decay (m/s^2) at which it was hit again; None without a sign of it.
 
-    A second touch breaks the linear prediction that a free decay obeys. noise: rms at rest (m/s^2); a decay below three
-    times that does not count. A touch within 1 ms cannot be distinguished from a nonlinear decay.
+    A double hit breaks the linear prediction of a free decay. noise: rms without vibration (m/s^2); a decay below three
+    times that does not count. A double hit within 1 ms cannot be distinguished from a nonlinear decay.
 
     Source of the prediction: Makhoul (1975), Proc. IEEE 63, 561.
     """

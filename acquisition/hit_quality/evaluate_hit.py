@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.arrays import Floats
-from acquisition.errors import DataError
+from acquisition.errors import DataError, join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit
@@ -31,9 +31,9 @@ class HitVerdict:
     """Faults of a hit and their remedies."""
 
     flags: HitFlags
-    """Flags of the faults; falsy where the hit may be averaged."""
+    """Flags of the faults; falsy if the hit may be averaged."""
     reasons: tuple[str, ...] = ()
-    """One sentence per flag, in the order of the flags: finding with its figures, and remedy."""
+    """Finding with its figures, and remedy, of each flag in their order."""
 
     @classmethod
     def from_findings(cls, findings: Mapping[HitFlags, str]) -> HitVerdict:
@@ -45,7 +45,7 @@ class HitVerdict:
             Finding for each flag, without the remedy.
         """
         flags = functools.reduce(operator.or_, findings, HitFlags.OK)
-        return cls(flags, tuple(f"{findings[flag]}: {flag.cure[0].lower()}{flag.cure[1:]}" for flag in flags))
+        return cls(flags, tuple(join_sentences(findings[flag], flag.cure) for flag in flags))
 
     @property
     def text(self) -> str:
@@ -54,7 +54,7 @@ class HitVerdict:
 
 
 def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> HitVerdict:
-    """Evaluate one hit with the reasons that speak against averaging it.
+    """Evaluate one hit, with the reasons against averaging it.
 
     Without `mean` and `band` only the time signals decide. A hit without a measured force is evaluated by its response.
 
@@ -85,7 +85,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     >>> evaluate_hit(hit).flags == HitFlags.OK
     True
     >>> print(evaluate_hit(hit, band=(200.0, 4000.0)).text)
-    The force reaches to 2220 Hz (-20 dB) of the 4000 Hz wanted: use a harder hammer tip.
+    The force reaches 2220 Hz (-20 dB) of the required 4000 Hz. Use a harder hammer tip.
     """
     findings = _evaluate_overloads(hit)
     if hit.lost_scans:
@@ -141,14 +141,14 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     Returns
     -------
     frf : Frf or None
-        H1 FRF of the good hits; None where no force was measured.
+        H1 FRF of the good hits; None if no force was measured.
     flags : tuple of HitFlags
         Faults of each hit.
 
     Raises
     ------
     DataError
-        Where no hit is good; its text has the reasons.
+        If no hit is good; its text has the reasons.
 
     Examples
     --------
@@ -164,8 +164,8 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     verdicts = [evaluate_hit(hit) for hit in hits]
     good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict.flags]
     if not good:
-        reasons = "; ".join(f"hit {i}: {verdict.flags.words}. {verdict.text}" for i, verdict in enumerate(verdicts, 1))
-        raise DataError(f"no good hit of {len(hits)}: {reasons}")
+        reasons = (f"Hit {i} ({verdict.flags.words}): {verdict.text}" for i, verdict in enumerate(verdicts, 1))
+        raise DataError(join_sentences(f"no good hit among {len(hits)}", *reasons))
     return estimate_frf(good) if good[0].has_force else None, tuple(verdict.flags for verdict in verdicts)
 
 
@@ -201,9 +201,9 @@ def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:
     """
     error, n = mean.random_error, mean.n_averages
     if error is None:
-        raise ValueError(f"a mean of {n} hits (with its coherence) cannot tell how far hits scatter; 3 are needed")
+        raise ValueError(f"the scatter of hits needs a mean of 3 or more hits with coherence, not of {n}")
     if not np.array_equal(frf.frequency, mean.frequency):
-        of_mean = f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz; compare hits of one set-up only"
+        of_mean = f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz. Compare only hits of one set-up."
         raise ValueError(f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean {of_mean}")
     reach = min(response.usable_band[1] if response.usable_band else np.inf for response in (frf, mean))
     used = mean.frequency <= reach

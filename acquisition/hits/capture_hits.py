@@ -83,7 +83,7 @@ class Trigger:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.level) and self.level > 0):
-            raise ValueError(f"trigger level={self.level} is not > 0")
+            raise ValueError(f"trigger level={self.level} is not above 0")
         if not 0 < self.pre_trigger < self.n_samples:
             raise ValueError(f"pre_trigger={self.pre_trigger} samples is not between 1 and n_samples={self.n_samples}")
 
@@ -324,7 +324,7 @@ def split_record(record: Hit) -> list[Hit]:
     n = min(n, int(np.min(record.acceleration.size - begins)))
     hits = list[Hit]()
     for part in (slice(int(begin), int(begin) + n) for begin in begins):
-        force = record.force[part]  # empty where it was not measured
+        force = record.force[part]  # empty if it was not measured
         hits.append(replace(record, force=force, acceleration=record.acceleration[part], pre_trigger=before))
     return hits
 

@@ -60,7 +60,7 @@ def estimate_decay_time(hit: Hit) -> float:
     Raises
     ------
     ValueError
-        Where the force has no pulse.
+        If the force has no pulse.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def _locate_hit(hit: Hit) -> tuple[int, int]:
     if not hit.has_force:
         before = count_pre_hit_samples(hit)
         return int(0.8 * before), before + round(MAX_CONTACT_TIME * hit.sample_rate)
-    pulse = require_pulse(hit, "its ring-down cannot be seen")
+    pulse = require_pulse(hit)
     return pulse.start, pulse.end
 
 

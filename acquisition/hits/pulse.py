@@ -42,7 +42,7 @@ class Pulse:
 
 
 def find_pulse(hit: Hit) -> Pulse | None:
-    """Find the highest force pulse; None where it is below 6 times the rms of the baseline, or without a force."""
+    """Find the highest force pulse; None if it is below 6 times the rms of the baseline, or without a force."""
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))
@@ -57,11 +57,11 @@ def find_pulse(hit: Hit) -> Pulse | None:
     return Pulse(hit.force, offset, top, peak, start, end, rms)
 
 
-def require_pulse(hit: Hit, remedy: str = "check hits with check_hit first") -> Pulse:
-    """Return the highest force pulse; raise ValueError with the remedy where there is none."""
+def require_pulse(hit: Hit) -> Pulse:
+    """Return the highest force pulse; raise ValueError if there is none."""
     pulse = find_pulse(hit)
     if pulse is None:
-        raise ValueError(f"a hit has no force pulse; {remedy}")
+        raise ValueError("a hit has no force pulse. Check hits with check_hit first.")
     return pulse
 
 
@@ -135,7 +135,7 @@ _windowed_forces: WeakKeyDictionary[Hit, WindowedForce] = WeakKeyDictionary()
 
 
 def _compute_windowed_force(hit: Hit) -> WindowedForce:
-    pulse = require_pulse(hit, "check hits with check_hit before averaging")
+    pulse = require_pulse(hit)
     width = max(pulse.end - pulse.start, 8)
     corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
     samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))

@@ -41,7 +41,7 @@ def find_usb_port(vid: int, serial_number: str) -> str | None:
 
 
 def find_usb_identity(port: str) -> tuple[int, str] | None:
-    """Find what is plugged in at a port.
+    """Find the USB device on a port.
 
     Parameters
     ----------
@@ -89,17 +89,16 @@ def list_serial_ports() -> list[PortInfo]:
     ]
 
 
-_PLUG_IN = "plug the DAQ in and"
 NO_PORTS_REMEDIES = {
-    "linux": f"{_PLUG_IN} look at the last lines of `sudo dmesg`; hand it through to a container or virtual machine",
-    "darwin": f"{_PLUG_IN} look for /dev/cu.usbmodem*; allow the accessory where macOS asks",
-    "win32": f"{_PLUG_IN} look under Ports (COM & LPT) of the Device Manager",
+    "linux": "Check the last lines of `sudo dmesg`. In a container or virtual machine, pass the device through.",
+    "darwin": "Look for /dev/cu.usbmodem*, and allow the accessory if macOS asks.",
+    "win32": "Look under Ports (COM & LPT) in the Device Manager.",
 }
 """Remedy by sys.platform."""
 
 
 def explain_no_ports(platform: str | None = None) -> str:
-    """Explain in one sentence what to do if no serial port exists.
+    """Return the finding that no serial port exists, with its remedies.
 
     Parameters
     ----------
@@ -109,28 +108,28 @@ def explain_no_ports(platform: str | None = None) -> str:
     Returns
     -------
     str
-        Sentence with the remedy.
+        Finding and remedies.
     """
-    cure = NO_PORTS_REMEDIES.get(platform or sys.platform, "plug the DAQ in")
-    dataq = "A DATAQ device shows none until its LED blinks yellow (CDC mode)."
-    return f"No serial port on this computer: {cure}; try another cable, some carry no data. {dataq}"
+    plug_in = "No serial port on this computer. Plug the DAQ in, with a cable that carries data."
+    dataq = "A DATAQ device needs CDC mode (LED blinks yellow)."
+    return " ".join(filter(None, (plug_in, NO_PORTS_REMEDIES.get(platform or sys.platform), dataq)))
 
 
 def explain_open_error(port: str, error: Exception, platform: str = sys.platform) -> DeviceError:
-    """Return the error to raise, with the system's words and the remedy."""
+    """Return the error to raise, with the message of the system and the remedy."""
     text = str(error)
-    busy = "another program uses it: close that program"
+    busy = "Close the other program that uses the port"
     if platform == "linux" and not port.startswith("socket:"):
-        busy += f" (`sudo fuser -v {port}` names it; ModemManager lets go after half a minute)"
-    missing = "check the cable and the port's name (`acquisition.scan_ports` lists all)"
+        busy += f" (find it with `sudo fuser -v {port}`). If it is ModemManager, wait half a minute"
+    missing = "Check the cable and the port name (list all with `acquisition.scan_ports`)"
     hints = {
         **dict.fromkeys(("lock", "busy"), busy),
         "Permission denied": busy if platform == "win32" else _explain_permission(port, platform),
         "Access is denied": busy,
         **dict.fromkeys(("No such file", "FileNotFound"), missing),
-        "refused": "nothing listens there: start the device or emulator first",
+        "refused": "Start the device or emulator first",
     }
-    cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
+    cure = next((hint for word, hint in hints.items() if word in text), "Check the port name and the cable")
     number = (error.errno or 0) if isinstance(error, OSError) else 0
     reason = os.strerror(number) if number > 0 else text  # a host that has no address comes with a negative number
     return DeviceError(f"port {port} cannot be opened ({reason})", cure)
@@ -139,12 +138,12 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
 def _explain_permission(port: str, platform: str) -> str:
     """Return the exact remedy. On Linux the user must belong to the port's group."""
     if platform != "linux":
-        return "you may not use it: ask for the rights of an administrator"
+        return "Ask an administrator for permission to use the port"
     try:
         group = Path(port).group()
     except (OSError, KeyError):
         group = "dialout"
-    return f"you may not use it: sudo usermod -aG {group} $USER, then log out and in again"
+    return f"Run sudo usermod -aG {group} $USER, then log out and in again"
 
 
 try:
@@ -201,8 +200,8 @@ class SerialLink:
         try:
             self._serial.write(data)
         except serial.SerialTimeoutException as error:
-            text = f"the DAQ on {self.port} takes no commands"
-            raise DeviceError(text, "switch it off and on and repeat the command") from error
+            text = f"the DAQ on {self.port} does not accept commands"
+            raise DeviceError(text, "Switch it off and on, then repeat the command") from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
 
@@ -257,7 +256,8 @@ class SerialLink:
                 self._arrived.notify()
 
     def _unplugged(self) -> DeviceError:
-        return DeviceError(f"the DAQ on {self.port} was unplugged or switched off", "plug it in and repeat the command")
+        text = f"the DAQ on {self.port} was unplugged or switched off"
+        return DeviceError(text, "Plug it in, then repeat the command")
 
 
 class _TcpPort:
@@ -268,7 +268,7 @@ class _TcpPort:
 
     @property
     def in_waiting(self) -> int:
-        """Number of bytes to ask for. TCP does not tell how many there are."""
+        """Number of bytes to request. TCP does not report how many there are."""
         return 65536 if select.select([self._socket], [], [], 0)[0] else 0
 
     def read(self, size: int) -> bytes:
@@ -276,7 +276,7 @@ class _TcpPort:
             return b""
         data = self._socket.recv(size)
         if not data:
-            raise ConnectionError("the other end has hung up")
+            raise ConnectionError("the other end closed the connection")
         return data
 
     def write(self, data: bytes) -> None:
@@ -293,7 +293,7 @@ def _open_port(port: str, baud_rate: int) -> Any:  # a pyserial port, which has 
     url = urlsplit(port)
     if url.scheme == "socket":
         if not url.hostname or not url.port:
-            raise ValueError("socket://HOST:PORT is expected")
+            raise ValueError("the address must be socket://HOST:PORT")
         return _TcpPort(url.hostname, url.port)
     opened = serial.Serial(port, baud_rate, timeout=0.1, write_timeout=2.0, exclusive=True)
     if hasattr(opened, "set_buffer_size"):  # Windows only

@@ -53,8 +53,8 @@ class MeasuredRate:
 def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic) -> MeasuredRate:
     """Start a source, count its scans against the clock, and stop it.
 
-    A block can arrive late, never early. The stream is cut into 20 stretches. Of each the block with the least delay is
-    kept, stretches that are late as a whole (a busy computer) are left out, and time is regressed on the scan count.
+    A block can arrive late, never early. The stream is cut into 20 stretches. The block with the least delay of each is
+    kept, stretches that are late as a whole (a busy computer) are omitted, and time is regressed on the scan count.
     The standard error is that of the slope, enlarged if neighbouring residuals are similar (lag-1 correlation), and
     combined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
 
@@ -87,7 +87,7 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     10240
     """
     if not (np.isfinite(seconds) and seconds > 0):
-        raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
+        raise ValueError(f"seconds={seconds} is not above 0. Use about 5 s to measure a sample rate.")
     arrived: list[float] = []
     scans: list[int] = []
     source.start()
@@ -99,9 +99,9 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     source.stop()
     elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
     if len(scans) < MIN_RATE_BLOCKS or elapsed < seconds:
-        needed = f"to measure its rate, at least {MIN_RATE_BLOCKS} over {seconds:g} s are needed"
-        text = f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s"
-        raise DeviceError(text, f"{needed}: check its sample rate and the cable")
+        needed = f"at least {MIN_RATE_BLOCKS} in {seconds:g} s are needed to measure its rate"
+        text = f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s, {needed}"
+        raise DeviceError(text, "Check its sample rate and the cable")
     period, scatter = _fit_scan_period(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, USB_POLL_INTERVAL / np.sqrt(6) / n_scans) / period**2)
     return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
@@ -130,17 +130,17 @@ def check_rate(measured: MeasuredRate, nominal: float) -> None:
     >>> check_rate(MeasuredRate(24000.0, 0.5, 120000, 5.0), nominal=25600.0)
     Traceback (most recent call last):
         ...
-    acquisition.errors.DeviceError: the DAQ delivers 24000.00 ± 0.50 scans a second, not 25600: every ...
+    acquisition.errors.DeviceError: the DAQ samples at 24000.00 ± 0.50 Hz, not 25600 Hz, so ...
     """
     if measured.std > MAX_RATE_STD * measured.rate:
-        rate = f"{measured.rate:.6g} Hz ± {measured.std / measured.rate:.2%}, needed ± {MAX_RATE_STD:.2%}"
-        text = f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({rate})"
-        raise DeviceError(text, "close other programs and try again")
+        rate = f"{measured.rate:.6g} Hz ± {measured.std / measured.rate:.2%}, limit ± {MAX_RATE_STD:.2%}"
+        text = f"the sample rate of the DAQ cannot be measured, because its data arrive too unevenly ({rate})"
+        raise DeviceError(text, "Close other programs and try again")
     off = nominal / measured.rate - 1
     if abs(measured.rate / nominal - 1) > RATE_TOLERANCE + (0 if measured.is_accurate else 2 * measured.std / nominal):
-        error = f"every frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}"
-        text = f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: {error}"
-        raise DeviceError(text, "correct the DAQ's sample rate or work with the measured one")
+        error = f"so every frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}"
+        text = f"the DAQ samples at {measured.rate:.2f} ± {measured.std:.2f} Hz, not {nominal:g} Hz, {error}"
+        raise DeviceError(text, "Correct the sample rate of the DAQ, or use the measured one")
 
 
 def rate_remark(measured: MeasuredRate) -> Remark | None:
@@ -159,8 +159,8 @@ def rate_remark(measured: MeasuredRate) -> Remark | None:
     if measured.is_accurate:
         return None
     share = measured.std / measured.rate
-    text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
-    remedy = "close other programs and run acquisition.measure_rate, which measures it again"
+    text = f"the sample rate of the DAQ, and with it every frequency, has an uncertainty of ±{share:.2%}"
+    remedy = "Close other programs and measure it again with acquisition.measure_rate"
     return Remark("rate-not-sure", "", text, remedy)
 
 
@@ -256,7 +256,7 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     '19.53 us, 19.53 us'
     """
     if not (np.isfinite(sample_rate) and sample_rate > 0):
-        raise ValueError(f"sample_rate={sample_rate} Hz is not > 0")
+        raise ValueError(f"sample_rate={sample_rate} Hz is not above 0")
     records = _check_records(first, second)
     fit = _fit_phase_slope(records, records[1])
     for _ in range(2):
@@ -275,14 +275,14 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     counts = (g2 > MIN_SKEW_COHERENCE) & (np.arange(g2.size) > 0)
     share = float(np.mean(counts))
     if share < MIN_COHERENT_SHARE:
-        shares = f"at {share:.0%} of the lines, {MIN_COHERENT_SHARE:.0%} are needed"
-        text = f"the two channels do not carry one broad-band signal (coherence over {MIN_SKEW_COHERENCE:g} {shares})"
-        raise ValueError(f"{text}; join both inputs with a T-piece and feed noise or taps")
+        shares = f"over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the lines, required {MIN_COHERENT_SHARE:.0%}"
+        text = f"the two channels do not record the same broad-band signal (coherence {shares})"
+        raise ValueError(f"{text}. Join both inputs with a T-piece and feed noise or taps.")
     omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
     rough = _find_correlation_peak(np.where(counts, mean, 0.0))
     turned = cross[:, counts] * np.exp(-1j * omega * rough)
     if np.sum(turned).real < 0:
-        raise ValueError("the second channel has the opposite sign of the first; swap its two wires or its polarity")
+        raise ValueError("the two channels have opposite signs. Swap the wires or the polarity of the second channel.")
     weight = omega * g2[counts] / np.maximum(1 - g2[counts], 1e-9)
     weight /= weight @ omega
     n = cross.shape[0]
@@ -296,8 +296,7 @@ def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
     n_least = MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES
     for record, name in zip(records, ("first", "second"), strict=True):
         if record.ndim != 1 or record.size < n_least or not np.all(np.isfinite(record)):
-            text = f"the {name} record has shape {record.shape} or holds NaN or inf"
-            raise ValueError(f"{text}; at least {n_least} finite samples are needed")
+            raise ValueError(f"the {name} record of shape {record.shape} must have {n_least} or more finite samples")
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
     return np.stack([record - np.mean(record) for record in records])

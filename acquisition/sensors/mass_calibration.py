@@ -28,7 +28,7 @@ MAX_RIGID_PHASE = 10.0
 
 @dataclass(frozen=True)
 class MassCalibration:
-    """Result F/(m a) of a known mass. `str()` is the verdict in words."""
+    """Result F/(m a) of a known mass. `str()` gives the results in sentences."""
 
     ratio: float
     """Ratio |F|/(m |a|) at low frequency, 1 if force and acceleration sensitivity agree."""
@@ -61,34 +61,35 @@ class MassCalibration:
 
     @property
     def force_sensitivity(self) -> float | None:
-        """Force sensitivity (V/N) if the accelerometer is trusted, None without channels."""
+        """Force sensitivity (V/N) if the accelerometer is right, None without channels."""
         return self.channels[0].sensitivity * self.ratio if self.channels else None
 
     @property
     def acceleration_sensitivity(self) -> float | None:
-        """Acceleration sensitivity (V per m/s^2) if the hammer is trusted, None without channels."""
+        """Acceleration sensitivity (V per m/s^2) if the hammer is right, None without channels."""
         return self.channels[1].sensitivity / self.ratio if self.channels else None
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Remarks on what is wrong, empty if the mass is rigid and both sensitivities agree."""
+        """Remarks on faults, empty if the mass is rigid and both sensitivities agree."""
         return tuple(self._find_faults())
 
     def _find_faults(self) -> Iterator[Remark]:
         if abs(self.phase) > MAX_RIGID_PHASE:
-            text = f"the phase of {self.phase:+.1f} deg is not that of a rigid mass"
-            cure = "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass"
+            text = f"the phase of {self.phase:+.1f} deg is too large for a rigid mass"
+            cure = "Measure the channel skew, and hit in line with the accelerometer and the centre of the mass"
             yield Remark("phase-not-rigid", "", text, cure)
         if self.inverted:
-            cure = "turn the accelerometer or negate its sensitivity"
+            cure = "Turn the accelerometer round, or change the sign of its sensitivity"
             yield Remark("opposite-signs", "", "force and acceleration have opposite signs", cure)
         if self.sizes_agree:
             return
         large, share = ("force", self.ratio - 1) if self.ratio > 1 else ("acceleration", 1 / self.ratio - 1)
-        much = f"{share:.1%}" if share < 1 else f"{1 + share:.4g} times"
+        much = f"{share:.1%} too large" if share < 1 else f"{1 + share:.4g} times too large"
         wrong = "large" if self.ratio > 1 else "small"
-        text = f"against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}"
-        cure = "before you change one: is the mass the total that moves, with accelerometer and mount?"
+        small = "acceleration" if self.ratio > 1 else "force"
+        text = f"the {large} reads {much} compared with the {small}, so every stiffness K is too {wrong}"
+        cure = "Check that the mass is the total moving mass, with accelerometer and mount"
         yield Remark("sensitivities-disagree", "", text, cure)
         if mistake := unit_mistake_remark(self.ratio):
             yield mistake
@@ -107,7 +108,8 @@ class MassCalibration:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
             force = f"the hammer has {old[0] * self.ratio:.4g} mV/N instead of {old[0]:.4g}"
             response = f"the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 instead of {old[1]:.4g}"
-            lines.append(f"If the accelerometer is trusted, {force}; if the hammer is trusted, {response}.")
+            lines.append(f"If the accelerometer is right, {force}.")
+            lines.append(f"If the hammer is right, {response}.")
         return "\n".join(lines)
 
 
@@ -128,7 +130,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     Returns
     -------
     MassCalibration
-        Ratio F/(m a) and what follows from it.
+        Ratio F/(m a) and conclusions.
 
     Raises
     ------
@@ -154,9 +156,9 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     ('1.031', 1.031, True)
     """
     if not (np.isfinite(mass) and mass > 0):
-        raise ValueError(f"mass={mass} kg is not > 0; give the total moving mass, accelerometer included")
+        raise ValueError(f"mass={mass} kg is not above 0. Give the total moving mass, accelerometer included.")
     if len(hits) < 3:
-        raise ValueError(f"{len(hits)} good hits; at least 3 are needed for a standard error")
+        raise ValueError(f"{len(hits)} good hits are too few. A standard error needs at least 3.")
     upper = (estimate_frf(hits).usable_band or (0.0, 0.0))[1]
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
     inside = (frequency >= MIN_CALIBRATION_FREQUENCY) & (frequency <= upper)
@@ -165,9 +167,9 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     s_fa = mass * np.array([cross[inside] for _, _, cross in spectra])
     n = _count_flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
     if n < MIN_CALIBRATION_LINES:
-        lines = f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz up, {MIN_CALIBRATION_LINES} are needed"
-        cure = "hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
-        raise ValueError(f"force and acceleration of this mass keep no fixed ratio: {lines}; {cure}")
+        lines = f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz on, {MIN_CALIBRATION_LINES} are required"
+        cure = "Hang the mass on long thin threads, screw the accelerometer on, hit harder, or record longer."
+        raise ValueError(f"force and acceleration have no constant ratio ({lines}). {cure}")
     f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]
     sign = float(np.sign(np.sum(s_fa).real))
     fits = np.array([_fit_ratio(f, force, sign * cross.real) for force, cross in zip(s_ff, s_fa, strict=True)])

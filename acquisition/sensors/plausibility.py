@@ -23,14 +23,14 @@ UNIT_MISTAKE_TOLERANCE = 0.15
 DAYS_PER_MONTH = 365.25 / 12
 
 _G, _LBF = STANDARD_GRAVITY, POUND_FORCE
-_MILLIVOLTS = "is one sensitivity in mV, the other in V"
+_MILLIVOLTS = "Check whether one sensitivity is in mV and the other in V"
 _UNIT_MISTAKES: Mapping[float, tuple[str, str]] = {
-    _G: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
-    1 / _G: ("1/9.81", "was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?"),
-    1 / _LBF: ("1/4.45", "is the force in lbf, not N? A sensitivity in V/lbf is divided by 4.44822"),
-    _LBF: ("4.45", "was a force sensitivity in V/N divided by 4.44822 as if it were V/lbf?"),
-    1e3: ("1000", f"{_MILLIVOLTS} (force 1000 times too large or acceleration too small)?"),
-    1e-3: ("1/1000", f"{_MILLIVOLTS} (force 1000 times too small or acceleration too large)?"),
+    _G: ("9.81", "Check whether the acceleration is in g. Divide a sensitivity in V/g by 9.80665"),
+    1 / _G: ("1/9.81", "Check whether a sensitivity in V per m/s^2 was divided by 9.80665 by mistake"),
+    1 / _LBF: ("1/4.45", "Check whether the force is in lbf. Divide a sensitivity in V/lbf by 4.44822"),
+    _LBF: ("4.45", "Check whether a sensitivity in V/N was divided by 4.44822 by mistake"),
+    1e3: ("1000", f"{_MILLIVOLTS} (force 1000 times too large or acceleration too small)"),
+    1e-3: ("1/1000", f"{_MILLIVOLTS} (force 1000 times too small or acceleration too large)"),
 }
 
 
@@ -50,13 +50,14 @@ def unit_mistake_remark(ratio: float) -> Remark | None:
     Examples
     --------
     >>> print(unit_mistake_remark(STANDARD_GRAVITY).text)
-    the ratio 9.807 is near 9.81
+    the ratio 9.807 is close to 9.81, a typical unit mistake
     >>> unit_mistake_remark(1.05) is None
     True
     """
-    for factor, (value, question) in _UNIT_MISTAKES.items():
+    for factor, (value, cure) in _UNIT_MISTAKES.items():
         if abs(ratio / factor - 1) < UNIT_MISTAKE_TOLERANCE:
-            return Remark("unit-mistake", "", f"the ratio {ratio:.4g} is near {value}", question)
+            text = f"the ratio {ratio:.4g} is close to {value}, a typical unit mistake"
+            return Remark("unit-mistake", "", text, cure)
     return None
 
 
@@ -83,9 +84,9 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
     """
     low, high, unit, usual = SENSITIVITY_LIMITS[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
-    text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
+    text = f"a sensitivity of {channel.sensitivity:g} V per {per} is implausible ({usual})"
     limits = low / SENSITIVITY_SPREAD, high * SENSITIVITY_SPREAD
-    range_text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
+    range_text = f"a range of ±{channel.full_scale:g} V is implausible (converters have 0.01 to 100 V)"
     checks = (
         ("sensitivity-not-believed", text, abs(channel.sensitivity) * unit, limits),
         ("input-range-not-believed", range_text, channel.full_scale, FULL_SCALE_LIMITS),
@@ -98,8 +99,8 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
 
 
 def _explain_slip(value: float, low: float, high: float) -> str:
-    """Return the slip by 1000 that explains a value outside its limits, as a question. Empty if it does not."""
-    slips = {value / 1e3: "did you mean mV?", value * 1e3: "was it divided by 1000 twice?"}
+    """Return the advice on a slip by 1000 that explains a value outside its limits. Empty if it does not."""
+    slips = {value / 1e3: "Check whether it is in mV", value * 1e3: "Check whether it was divided by 1000 twice"}
     return next((words for corrected, words in slips.items() if low <= corrected <= high), "")
 
 
@@ -126,7 +127,7 @@ def stiffness_remark(stiffness: float) -> Remark | None:
         return None
     shown = f"{stiffness:.0f} N/m" if abs(stiffness) < low else f"{stiffness / 1e6:.0f} N/um"
     text = f"K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
-    cure = "check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass"
+    cure = "Check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass"
     return Remark("stiffness-not-believed", "", text, cure)
 
 
@@ -155,18 +156,18 @@ def calibration_remark(channel: Channel, today: date, interval_months: float = 1
     ('calibration-old', None)
     """
     if not channel.calibration_date:
-        text = "date of calibration not known"
-        return Remark("calibration-unknown", channel.name, text, "enter it beside the sensitivity")
+        text = "calibration date is missing"
+        return Remark("calibration-unknown", channel.name, text, "Enter it next to the sensitivity")
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
     except ValueError:
-        text = f"calibration date {channel.calibration_date!r} is no date"
-        return Remark("calibration-no-date", channel.name, text, "give YYYY-MM-DD")
+        text = f"calibration date {channel.calibration_date!r} is invalid"
+        return Remark("calibration-no-date", channel.name, text, "Give YYYY-MM-DD")
     if calibrated > today:
-        text = f"calibration date {calibrated} lies in the future (today is {today})"
-        return Remark("calibration-in-future", channel.name, text, "correct it, or the clock of this computer")
+        text = f"calibration date {calibrated} is in the future (today is {today})"
+        return Remark("calibration-in-future", channel.name, text, "Correct it, or the clock of this computer")
     months = (today - calibrated).days / DAYS_PER_MONTH
     if months <= interval_months:
         return None
     text = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
-    return Remark("calibration-old", channel.name, text, "check it with a known mass or have it calibrated")
+    return Remark("calibration-old", channel.name, text, "Check it with a known mass, or have it calibrated")

@@ -91,7 +91,7 @@ class TapsBridge(TapsServer):
             except DeviceError:
                 continue
             self.wire = TcpWire(int(self.port.rpartition(":")[2]), self._address)
-            self._tell("the device is back")
+            self._tell("the device is connected again")
             return
 
     def _serve(self) -> None:

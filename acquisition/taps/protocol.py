@@ -120,7 +120,7 @@ def encode_frame(frame: Frame) -> bytes:
     """
     raw = _FRAME_HEADER.pack(frame.type, frame.flags, frame.session, frame.seq) + frame.body
     if len(raw) + 4 > MAX_FRAME:
-        raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}; send fewer scans a frame")
+        raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}. Send fewer scans per frame.")
     return bytes(cobs.encode(raw + struct.pack("<I", zlib.crc32(raw)))) + b"\x00"
 
 
@@ -178,7 +178,7 @@ def decode_data(body: bytes) -> Block:
     first, n_scans, n_channels, form, overload = _DATA_HEADER.unpack_from(body)
     n_words = n_scans * n_channels
     if form >= len(SAMPLE_BITS) or len(body) - _DATA_HEADER.size != n_words * SAMPLE_BITS[form] // 8:
-        raise ValueError(f"a DATA body of {len(body)} bytes does not hold {n_words} samples of format {form}")
+        raise ValueError(f"a DATA body of {len(body)} bytes cannot contain {n_words} samples of format {form}")
     codes = _decode_words(body[_DATA_HEADER.size :], SAMPLE_BITS[form])
     return Block(first, codes.reshape(n_scans, n_channels).T, overload)
 
@@ -198,9 +198,9 @@ _EVENT_BODY = struct.Struct("<BBBQ")
 _NO_CHANNEL = 0xFF
 
 _FAULT_TEXTS = {
-    EventKind.CABLE: "the cable of the {} sensor is broken or not plugged in: check it at both ends",
-    EventKind.SENSOR_BIAS: "the {} sensor has no proper supply (bias voltage out of range): check the sensor, "
-    "its cable and the IEPE switch",
+    EventKind.CABLE: "The cable of the {} sensor is broken or not plugged in. Check it at both ends.",
+    EventKind.SENSOR_BIAS: "The bias voltage of the {} sensor is out of range. Check the sensor, its cable and the "
+    "IEPE switch.",
 }
 
 
@@ -238,11 +238,11 @@ class EventLog:
         self._standing = (*remaining, event) if event.begins and event.kind in _FAULT_TEXTS else tuple(remaining)
 
     def fault(self, channels: Mapping[int, Channel]) -> str:
-        """Describe the active faults in one sentence, empty if there are none. channels: by their i in INFO."""
+        """Describe the active faults and their remedies, empty if there are none. channels: by their i in INFO."""
         names: dict[int | None, str] = {number: channel.quantity for number, channel in channels.items()}
         names[None] = "force or acceleration"
         standing = [(event.kind, names.get(event.channel, f"(channel {event.channel})")) for event in self._standing]
-        return "; ".join(_FAULT_TEXTS[EventKind(kind)].format(name) for kind, name in standing)
+        return " ".join(_FAULT_TEXTS[EventKind(kind)].format(name) for kind, name in standing)
 
 
 class TapsServer:
@@ -280,9 +280,9 @@ class TapsServer:
 
     def _configure(self, config: dict[str, Any]) -> None:
         if self._streaming:
-            raise ValueError("CONFIG while streaming; send STOP first")
+            raise ValueError("CONFIG is not allowed while streaming. Send STOP first.")
         if config["fs"] != self._rate or config["channels"] != list(range(len(self._channels))):
-            raise ValueError(f"CONFIG asks for what this device does not have: {config}")
+            raise ValueError(f"CONFIG {config} is not supported by this device")
         self._bits, self._per_frame = SAMPLE_BITS[config["format"]], int(config["samples_per_frame"])
 
     def _serve_host(self, timeout: float) -> None:

@@ -20,7 +20,7 @@ TAPS_PROBE_TIMEOUT = 1.0
 
 
 def probe_taps(link: SerialLink) -> DeviceIdentity | None:
-    """Send HELLO once and return who answers.
+    """Send HELLO once and return the device that answers.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ class ScanStream:
     def accept(self, frame: Frame) -> Block | None:
         """Return the block of a DATA frame with the scans lost before it. None if the frame is rejected.
 
-        A jump of the index tells how many scans are missing. If the device reports a loss without a jump, one lost scan
-        is counted, so that no hit that contains the gap passes.
+        A jump of the index shows how many scans are missing. If the device reports a loss without a jump, one lost scan
+        is counted, so that no hit with the gap is accepted.
         """
         if frame.session != self._session:
             self.foreign += 1
@@ -143,7 +143,7 @@ class TapsSource(ClosedOnExit):
 
     @property
     def fault(self) -> str:
-        """Sentence on a broken cable or unpowered sensor while it lasts, empty if all is well."""
+        """Broken cable or unpowered sensor and its remedy while it lasts, empty if there is none."""
         numbers = (entry["i"] for entry in self._info["channels"])
         return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
 
@@ -192,8 +192,8 @@ class TapsSource(ClosedOnExit):
             if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
                 is_foreign = bool(self._stream.foreign)
                 silent = f"has sent no samples for {SILENCE_TIMEOUT:g} s"
-                text = f"the DAQ on {self._link.port} {'has begun another stream by itself' if is_foreign else silent}"
-                raise DeviceError(text, "switch it off and on and give the same command again")
+                text = f"the DAQ on {self._link.port} {'started another stream by itself' if is_foreign else silent}"
+                raise DeviceError(text, "Switch it off and on, then repeat the command")
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
@@ -202,14 +202,14 @@ class TapsSource(ClosedOnExit):
             channels = _parse_channels(info)
             rates = [float(rate) for rate in info["fs_choices"]]
             if not rates or not all(0 < rate < float("inf") for rate in rates):
-                raise ValueError(f"fs_choices={info['fs_choices']} are no sample rates > 0")
+                raise ValueError(f"fs_choices={info['fs_choices']} must be sample rates above 0")
             info["fs_choices"] = rates
             for key in ("model", "serial"):
                 if not info[key]:
-                    raise ValueError(f"{key} is empty; the measured sample rate is kept by it")
+                    raise ValueError(f"{key} is empty")
         except (ValueError, KeyError, TypeError) as error:
-            text = f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error})"
-            raise DeviceError(text, "its firmware must send the INFO of TAPS/1") from error
+            text = f"the DAQ on {self._link.port} sends invalid channel data ({type(error).__name__}: {error})"
+            raise DeviceError(text, "Update its firmware, which must send the INFO of TAPS/1") from error
         return info, channels
 
     def _configure(self, sample_rate: float | None) -> float:
@@ -217,7 +217,7 @@ class TapsSource(ClosedOnExit):
         rate = max(choices) if sample_rate is None else sample_rate
         if rate not in choices:
             listed = ", ".join(f"{choice:g}" for choice in choices)
-            raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
+            raise ValueError(f"sample rate {rate:g} Hz is not one of {listed} Hz, the rates of this device")
         form = next(form for form, bits in enumerate(SAMPLE_BITS) if self._info["adc_bits"] <= bits)
         channels = [entry["i"] for entry in self._info["channels"]]
         fit = (protocol.MAX_FRAME - protocol.FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
@@ -240,7 +240,7 @@ class TapsSource(ClosedOnExit):
                 if frame is not None and self._answers(frame, answer):
                     return frame
         text = f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TAPS_COMMAND_TRIES} tries)"
-        raise DeviceError(text, "check that this is the DAQ's port and that it is switched on")
+        raise DeviceError(text, "Check that this is the port of the DAQ and that the DAQ is switched on")
 
     def _next_frame(self, timeout: float) -> Frame | None:
         """Return the next frame in order of arrival, None after the timeout (s)."""
@@ -260,7 +260,7 @@ class TapsSource(ClosedOnExit):
         about = int.from_bytes(frame.body[:4], "little")
         if frame.type == MessageType.NACK and about == self._seq:
             text = frame.body[6:].decode(errors="replace")
-            raise DeviceError(f"the DAQ on {self._link.port} refuses a command: {text}")
+            raise DeviceError(f"the DAQ on {self._link.port} rejects a command ({text})")
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
 
 

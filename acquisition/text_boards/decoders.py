@@ -159,5 +159,5 @@ class OutputFormat(NamedTuple):
 
     @property
     def bits(self) -> int:
-        """Bits of the codes made of the numbers: 24 for volts, so that nothing is lost."""
+        """Bits of the codes computed from the numbers: 24 for volts, so that nothing is lost."""
         return self.adc_bits or (16 if self.frame else 24)

@@ -48,7 +48,7 @@ def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
     likeliest = max(lines, key=lambda count: lines[count])
     if lines[likeliest] < MIN_NUMBER_LINES:
         return None
-    return DeviceIdentity(f"a board that prints {likeliest} number{'s' * (likeliest > 1)} a line")
+    return DeviceIdentity(f"text-output board with {likeliest} number{'s' * (likeliest > 1)} per line")
 
 
 class TextBoardSource(ClosedOnExit):
@@ -56,8 +56,8 @@ class TextBoardSource(ClosedOnExit):
 
     The board prints by itself and is never written to. Values come in the order of the inputs, with a counter before
     them if there is one number more than inputs. They are volts, or with `adc_bits` codes of a converter from 0 to
-    2^adc_bits - 1 whose center is 0 V. Two things cannot be known: lost whole lines without a counter, and whether both
-    sensors were sampled at once.
+    2^adc_bits - 1 whose center is 0 V. Two things cannot be detected: lost whole lines without a counter, and whether
+    both sensors were sampled at once.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class TextBoardSource(ClosedOnExit):
     inputs
         Sensors, their numbers being the columns after the counter.
     sample_rate
-        Lines per second that the board was made for (Hz).
+        Nominal number of lines per second (Hz).
     printing
         Output format, None for volts in lines.
 
@@ -79,7 +79,7 @@ class TextBoardSource(ClosedOnExit):
     """
 
     follows_clock = True
-    """True, as scans follow the clock. Their rate is known by measurement only."""
+    """True, as scans follow the clock. Their rate can only be measured."""
     fault = ""
     """Empty: the board reports no faults."""
 
@@ -129,7 +129,7 @@ class TextBoardSource(ClosedOnExit):
             if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
                 wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
                 text = f"the board on {self._link.port} has printed no samples for {SILENCE_TIMEOUT:g} s"
-                remedy = f"check its program and baud_rate: it must print counter,{wanted} or {wanted}"
+                remedy = f"Check its program and baud_rate. It must print counter,{wanted} or {wanted}"
                 raise DeviceError(text, remedy)
 
     def _codes(self, values: Floats) -> Codes:
@@ -165,13 +165,10 @@ def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -
         The sample rate is missing, or the inputs are no columns.
     """
     if sample_rate is None:
-        text = 'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate'
-        cure = "give the number of lines a second that it was made for: it is measured against the clock"
-        raise ValueError(f"{text}; {cure}")
+        raise ValueError('sample_rate_hz is missing for driver = "lines". Give the nominal number of lines per second.')
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
-        before = ", ".join(map(str, range(len(inputs) - 1)))
-        last = f"the inputs {before} and {len(inputs) - 1}" if before else "input 0, and there is one alone"
-        raise ValueError(f"input: the numbers after the counter are {last}; correct [[daq.channel]]")
+        given = ", ".join(str(sensor.number) for sensor in inputs)
+        raise ValueError(f"input: {given} must be 0 to {len(inputs) - 1}, each once. Correct [[daq.channel]].")
     return sample_rate
 
 

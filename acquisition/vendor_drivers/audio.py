@@ -125,14 +125,14 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
     except library.PortAudioError as error:
         if error.args[1:2] == (PORTAUDIO_INVALID_RATE,):
-            text = f"sample_rate_hz={rate:g}: {entry['name']} has no such rate ({error}); try 48000"
+            text = f"sample_rate_hz={rate:g} is not supported by {entry['name']} ({error}). Try 48000."
             raise ValueError(text) from error
-        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
+        raise DeviceError(f"{port} cannot be opened ({error})", "Check that no other program uses it") from error
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
 
 
 class AudioReader(StreamReader):
-    """Reader of the blocks that PortAudio delivers in a thread of its own."""
+    """Reader of the blocks that PortAudio delivers in its own thread."""
 
     def __init__(
         self, library: Any, index: int, numbers: tuple[int, ...], rate: float, full_scales: Sequence[float]
@@ -146,8 +146,8 @@ class AudioReader(StreamReader):
         actual = self._stream.samplerate
         if abs(actual / rate - 1) > 1e-3:
             self._stream.close()
-            text = f"the sound device samples at {actual:g} Hz where {rate:g} Hz was asked"
-            raise DeviceError(text, "name its rate as sample_rate_hz in [daq]")
+            text = f"the sound device samples at {actual:g} Hz instead of {rate:g} Hz"
+            raise DeviceError(text, f"Set sample_rate_hz = {actual:g} in [daq]")
 
     def start(self) -> None:
         self._blocks = queue.SimpleQueue()
@@ -179,8 +179,8 @@ def _find_sound_device(devices: Sequence[dict[str, Any]], wanted: str) -> dict[s
     if len(listed) == 1:
         return listed[0]
     names = ", ".join(f"{entry['index']}: {entry['name']}" for entry in listed or inputs) or "none"
-    reason = f"{len(listed)} sound devices fit" if listed else "no sound device fits"
-    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', "plug it in, or give its number, as in audio:3")
+    reason = f"{len(listed)} sound devices match" if listed else "no sound device matches"
+    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', "Plug it in, or give its number, as in audio:3")
 
 
 def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
@@ -193,9 +193,9 @@ def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibrati
     scale = calibration.full_scales[number]
     if calibration.is_accelerometer:
         if channel.quantity == "force":
-            raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
+            raise ValueError(f"input={number}: a {calibration.model} is an accelerometer and cannot measure force")
         scale *= abs(channel.sensitivity)
     if abs(channel.full_scale / scale - 1) > MAX_RANGE_DEVIATION:
-        text = f"the calibration of {calibration.model} says {scale:.4g} V for input {number}; write that"
-        raise ValueError(f"range_v={channel.full_scale:g}: {text}")
+        text = f"range_v={channel.full_scale:g} differs from the calibration of {calibration.model} in its name"
+        raise ValueError(f"{text}. Set range_v = {scale:.4g} for input {number}.")
     return replace(channel, adc_bits=24, full_scale=scale)

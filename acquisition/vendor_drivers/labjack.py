@@ -77,7 +77,8 @@ def open_ljm(port: str, inputs: Sequence[SensorInput], sample_rate: float | None
     for sensor in inputs:
         if sensor.channel.full_scale not in T7_RANGES:
             listed = ", ".join(f"{scale:g}" for scale in T7_RANGES)
-            raise ValueError(f"range_v={sensor.channel.full_scale:g} is none of {listed}, the ranges of a LabJack T7")
+            scale = sensor.channel.full_scale
+            raise ValueError(f"range_v={scale:g} is not one of {listed}, the ranges of a LabJack T7")
     with library_device.convert_errors((library.LJMError,), f"{port} cannot be opened"), ExitStack() as cleanup:
         handle = library.openS("ANY", "ANY", port.removeprefix("ljm:"))
         cleanup.callback(library.close, handle)
@@ -96,7 +97,7 @@ class LjmReader(LibraryReader):
     """Reader of an LJM stream."""
 
     def __init__(self, library: Any, handle: int, numbers: Sequence[int], rate: float) -> None:
-        """Take the opened device. Starting it once tells its true rate (Hz)."""
+        """Take the opened device. Starting it once gives its true rate (Hz)."""
         self.errors: tuple[type[Exception], ...] = (library.LJMError,)
         self._library, self._handle = library, handle
         self._inputs = library.namesToAddresses(len(numbers), [f"AIN{number}" for number in numbers])[0]

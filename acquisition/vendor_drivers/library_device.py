@@ -17,7 +17,7 @@ from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 
 EXTRAS = {"daqhats": "mcc172", "labjack": "ljm", "nidaqmx": "nidaqmx", "sounddevice": "audio", "uldaq": "uldaq"}
 """Extra of lobewatch that installs each vendor library."""
-OPEN_REMEDY = "`acquisition.scan_ports` lists what there is"
+OPEN_REMEDY = "List the connected devices with `acquisition.scan_ports`"
 """Remedy for a device that cannot be opened."""
 BLOCK_TIME = 0.02
 """Duration of the blocks that a library delivers (s)."""
@@ -36,14 +36,14 @@ def load_library(module: str) -> Any:  # a module without types
     try:
         return import_module(module)
     except (ImportError, OSError) as error:
-        remedy = f"pip install 'lobewatch[{EXTRAS[package]}]', and what its maker says it needs (docs/devices.md)"
+        remedy = f"Run pip install 'lobewatch[{EXTRAS[package]}]', and install the vendor driver (docs/devices.md)"
         text = " ".join(str(error).split())
         raise DeviceError(f"the library {package} cannot be used ({text})", remedy) from error
 
 
 @contextmanager
 def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: str = OPEN_REMEDY) -> Iterator[None]:
-    """Convert errors of a vendor library to DeviceError. failure: what cannot be done or has failed."""
+    """Convert errors of a vendor library to DeviceError. failure: finding, for people."""
     try:
         yield
     except errors as error:
@@ -53,8 +53,8 @@ def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: st
 def check_input_numbers(inputs: Sequence[SensorInput], count: int, device: str) -> None:
     for sensor in inputs:
         if sensor.number >= count:
-            text = f"input={sensor.number}: {device} has the inputs 0 to {count - 1}; correct [[daq.channel]]"
-            raise ValueError(text)
+            text = f"input={sensor.number} does not exist, {device} has inputs 0 to {count - 1}"
+            raise ValueError(f"{text}. Correct [[daq.channel]].")
 
 
 class VoltageBlock(NamedTuple):
@@ -92,7 +92,7 @@ class LibraryReader:
         """Release the device."""
 
     def fault(self) -> str:
-        """Describe a sensor that is not connected. Empty if all is well or the library cannot tell."""
+        """Describe a sensor that is not connected. Empty if there is none or the library cannot detect it."""
         return ""
 
 
@@ -135,7 +135,7 @@ class LibraryDevice(ClosedOnExit):
 
     @property
     def fault(self) -> str:
-        """Sentence on a sensor fault while it lasts."""
+        """Sensor fault and its remedy while it lasts."""
         with self._convert_errors():
             return self.reader.fault()
 
@@ -169,12 +169,12 @@ class LibraryDevice(ClosedOnExit):
                 scan, last_arrival = scan + block.volts.shape[1], time.monotonic()
             elif time.monotonic() - last_arrival > LIBRARY_SILENCE_TIMEOUT:
                 text = f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s"
-                raise DeviceError(text, "unplug it and plug it in again")
+                raise DeviceError(text, "Unplug it and plug it in again")
 
     def _codes(self, volts: Floats) -> Codes:
         rows = zip(self.channels, volts, strict=True)
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 
     def _convert_errors(self) -> AbstractContextManager[None]:
-        remedy = "check its cable and that no other program uses it"
+        remedy = "Check its cable and that no other program uses it"
         return convert_errors(self.reader.errors, f"the DAQ {self.address} has failed", remedy)

@@ -109,7 +109,8 @@ class NidaqmxReader(StreamReader):
         stream = self._stream.in_stream
         if not stream.open_current_loop_chans_exist:
             return ""
-        return f"No sensor, or a broken cable, at {', '.join(stream.open_current_loop_chans)}: its IEPE loop is open."
+        inputs = ", ".join(stream.open_current_loop_chans)
+        return f"The IEPE loop of {inputs} is open. Check the sensor and its cable."
 
 
 def _read_identity(device: Any) -> DeviceIdentity:

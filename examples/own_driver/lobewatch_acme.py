@@ -39,7 +39,7 @@ class Acme:
         identity = probe(self._link)
         if identity is None:
             self._link.close()
-            raise DeviceError(f"no ACME-1 answers on {port}", "check that it is switched on")
+            raise DeviceError(f"no ACME-1 answers on {port}", "Check that it is switched on")
         self.identity, self.channels, self.sample_rate = identity, CHANNELS, RATE
         self.events = deque()
 
@@ -58,7 +58,7 @@ class Acme:
         while self._going:
             data = self._link.read(3.0)
             if not data:
-                raise DeviceError("the ACME-1 has sent nothing for 3 s", "switch it off and on")
+                raise DeviceError("the ACME-1 has sent nothing for 3 s", "Switch it off and on")
             received += data
             while len(received) >= SIZE:
                 first, *codes = struct.unpack(f"<I{2 * SCANS}h", received[:SIZE])

@@ -75,7 +75,7 @@ def _check_versions() -> Iterator[Finding]:
     names = "numpy", "scipy", "h5py", "matplotlib", "pyserial"
     listed = ", ".join(f"{name} {version(name)}" for name in names)
     text = f"lobewatch {version('lobewatch')}, Python {platform.python_version()} on {platform.platform(terse=True)}"
-    yield Finding("versions", "fine", f"{text}; {listed}")
+    yield Finding("versions", "fine", f"{text}, {listed}")
 
 
 def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
@@ -92,16 +92,15 @@ def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
         subject = f"port {wanted}"  # a pseudo-terminal, the network, or missing
         try:
             SerialLink(wanted).close()
-            yield Finding(subject, "fine", "named in [daq], opens")
+            yield Finding(subject, "fine", "set in [daq], can be opened")
         except DeviceError as error:
-            yield Finding(subject, "hinders", f"named in [daq]: {error.text}", error.cure)
+            yield Finding(subject, "hinders", f"set in [daq], but {error.text}", error.cure)
 
 
 def _check_port(port: ScannedPort) -> Finding:
     subject = f"port {port.port.device}"
-    if port.problem:
-        text, _, cure = port.problem.partition("; ")
-        return Finding(subject, "hinders", text, cure)
+    if port.failure is not None:
+        return Finding(subject, "hinders", port.failure.text, port.failure.cure)
     if port.answer is None:
         return Finding(subject, "fine", port.text)
     return Finding(subject, "fine", f"{port.answer.identity.model} answers ({port.answer.driver})")
@@ -115,7 +114,7 @@ def _check_latency(folder: Path) -> Iterator[Finding]:
         except (OSError, ValueError):
             continue
         port = f"latency of {timer.parent.name}"
-        cure = "" if wait <= MAX_LATENCY_TIMER else f"echo 1 | sudo tee {timer}"
+        cure = "" if wait <= MAX_LATENCY_TIMER else f"Run echo 1 | sudo tee {timer}"
         yield Finding(port, "note" if cure else "fine", f"{wait} ms", cure)
 
 
@@ -124,7 +123,7 @@ def _check_clock(machine: MachineFolder | None, now: datetime) -> Finding:
     written = [datetime.fromisoformat(entry.time) for entry in machine.taps()] if machine else []
     newest = max((moment.astimezone(UTC) for moment in written), default=None)
     text = f"{now:%Y-%m-%d %H:%M} UTC"
-    cure = "set the clock (`timedatectl set-ntp true` on Linux)"
+    cure = "Set the clock (`timedatectl set-ntp true` on Linux)"
     if now.year < MIN_CLOCK_YEAR:
         return Finding("clock", "hinders", text, cure)
     if newest is not None and newest > now:
@@ -136,12 +135,12 @@ def _check_disk_space(folder: Path) -> Finding:
     """Check free space and write permission."""
     subject = f"disk of {folder}"
     if not os.access(folder, os.W_OK):
-        return Finding(subject, "hinders", "cannot be written", "give yourself the right to write there")
+        return Finding(subject, "hinders", "no write permission", "Get write permission for the folder")
     free = shutil.disk_usage(folder).free
     text = f"{free / 1e9:.3g} GB free"
     if free >= AMPLE_FREE_BYTES:
         return Finding(subject, "fine", text)
-    return Finding(subject, "hinders" if free < MIN_FREE_BYTES else "note", text, "make room on that disk")
+    return Finding(subject, "hinders" if free < MIN_FREE_BYTES else "note", text, "Free space on that disk")
 
 
 def _check_extras(machine: MachineFolder | None) -> Iterator[Finding]:
@@ -153,12 +152,12 @@ def _check_extras(machine: MachineFolder | None) -> Iterator[Finding]:
     shown = sorted(set(packages) - {"dev", "bench"})
     missing = [extra for extra in shown if not all(map(_is_installed, packages[extra]))]
     there = ", ".join(extra for extra in shown if extra not in missing) or "none"
-    cure = f"for one of {', '.join(missing)}: pip install 'lobewatch[NAME]'" if missing else ""
+    cure = f"If you need {', '.join(missing)}, run pip install 'lobewatch[NAME]'" if missing else ""
     yield Finding("extras", "fine", f"installed: {there}", cure)
     needed = find_driver(machine.machine.daq.driver).extra if machine else ""
     if needed in missing:
         text = f'driver = "{needed}" needs the extra {needed}, which is not installed'
-        yield Finding("driver", "hinders", text, f"pip install 'lobewatch[{needed}]'")
+        yield Finding("driver", "hinders", text, f"Run pip install 'lobewatch[{needed}]'")
 
 
 def _is_installed(package: str) -> bool:
@@ -172,9 +171,9 @@ def _check_browser() -> Finding:
     try:
         name = webbrowser.get().__class__.__name__
     except webbrowser.Error:
-        cure = "open the address of screen.ScreenServer on a tablet: ScreenServer.listen 0.0.0.0"
-        return Finding("browser", "note", "none here", cure)
-    return Finding("browser", "fine", f"there is one ({name})")
+        cure = "Use screen.ScreenServer with ScreenServer.listen 0.0.0.0, and open its address on a tablet"
+        return Finding("browser", "note", "none on this computer", cure)
+    return Finding("browser", "fine", f"installed ({name})")
 
 
 def _check_load() -> Finding:
@@ -183,4 +182,4 @@ def _check_load() -> Finding:
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     busy = load > cores
     text = f"{cores} cores, load {load:.1f}"
-    return Finding("processor", "note" if busy else "fine", text, "close other programs" if busy else "")
+    return Finding("processor", "note" if busy else "fine", text, "Close other programs" if busy else "")

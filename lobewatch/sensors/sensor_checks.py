@@ -16,7 +16,7 @@ RATE_MEASUREMENT_SECONDS = 5.0
 
 
 class SensorList(NamedTuple):
-    """Device, its channels, and what is wrong with them."""
+    """Device, its channels, and remarks on their faults."""
 
     identity: acquisition.DeviceIdentity
     """Model and serial number of the device."""
@@ -33,7 +33,7 @@ class SensorList(NamedTuple):
 
     @property
     def errors(self) -> tuple[Remark, ...]:
-        """Remarks that must be settled first."""
+        """Remarks on faults that must be corrected first."""
         return tuple(remark for remark in self.remarks if remark.code in SENSOR_ERROR_CODES)
 
 
@@ -58,7 +58,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
     remarks += _aliasing_remarks(folder.machine.daq.anti_alias, device.sample_rate)
     nominal, measured = device.sample_rate, None
     if has_clock(device):
-        tell(f"measuring the rate for {RATE_MEASUREMENT_SECONDS:g} s")
+        tell(f"measuring the sample rate for {RATE_MEASUREMENT_SECONDS:g} s")
         try:
             measured = acquisition.measure_rate(device, RATE_MEASUREMENT_SECONDS)
             apply_measured_rate(folder, device, measured)
@@ -73,9 +73,9 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
     """Return the remark on a missing anti-alias filter. declared: whether there is one, None if not stated."""
     if declared:
         return []
-    kept = "nobody says that a filter keeps" if declared is None else "no filter keeps"
-    text = f"{kept} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
-    cure = "enter [daq] anti_alias = true where the device or an amplifier has one, else choose a higher rate"
+    stated = "no anti-alias filter is stated" if declared is None else "without an anti-alias filter"
+    text = f"{stated}, so vibration above {rate / 2:g} Hz (half the sample rate) may appear as false modes"
+    cure = "If the device or an amplifier has a filter, set [daq] anti_alias = true. If not, use a higher sample rate"
     return [Remark("no-anti-alias", "", text, cure)]
 
 
@@ -87,7 +87,7 @@ class MassCheck(NamedTuple):
     """Result of the check with a hung mass, and where to correct a sensitivity."""
 
     calibration: acquisition.MassCalibration
-    """Ratio of force to mass times acceleration, and what follows from it."""
+    """Ratio of force to mass times acceleration, and conclusions."""
     place: SensorDataLocation | None
     """Location of the sensitivities in the device, None if machine.toml has them."""
 
@@ -115,7 +115,7 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
     """
     wanted = folder.machine.tap.hits
     check_device_rate(folder, device)
-    tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
+    tell(f"HIT the suspended mass opposite the accelerometer {wanted} times. Wait until it is still before each hit.")
     good: list[Hit] = []
     device.start()
     baseline = find_quiet_part(DeviceConnection(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
@@ -174,9 +174,9 @@ def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[
     """
     if len(device.channels) != 2:
         n = len(device.channels)
-        raise acquisition.DataError(f"a skew is that of two inputs; the DAQ has {n}: name two in [[daq.channel]]")
+        raise acquisition.DataError(f"a skew needs two inputs, but the DAQ has {n}. Give two in [[daq.channel]].")
     rate = check_device_rate(folder, device)
-    tell(f"recording {SKEW_RECORDING_SECONDS:g} s: both inputs joined with a T-piece, noise or taps on them")
+    tell(f"recording {SKEW_RECORDING_SECONDS:g} s, join both inputs with a T-piece and feed noise or taps")
     device.start()
     (first, second), _ = collect_codes(device.blocks(), SKEW_RECORDING_SECONDS * rate)
     device.stop()

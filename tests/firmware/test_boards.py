@@ -113,7 +113,7 @@ def test_a_board_without_power_is_missed_at_once(board: Any) -> None:
         source.start()
         next(source.blocks())
         board.unplug()
-        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+        with pytest.raises(DeviceError, match="unplugged"):
             list(source.blocks())
         board.replug()
     with TapsSource(board.port) as source:

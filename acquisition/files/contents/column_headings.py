@@ -95,14 +95,14 @@ def infer_decibel_unit(name: str, unit: str) -> str:
 
 
 def parse_decibel_reference(unit: str) -> str:
-    """Return the reference of a level, "1 um/N" of "dB re 1 um/N"; empty where unknown."""
+    """Return the reference of a level, "1 um/N" of "dB re 1 um/N"; empty if unknown."""
     reference = re.sub(r"(?i)^db\s*(?:re[fl]?\b)?[.:]?(?:\)\s*[\[(]|[\s,)]*)", "", unit)
     is_known = parse_unit(reference) is not None or ("/" in reference and reference.count("(") == reference.count(")"))
     return reference if is_known else ""
 
 
 def infer_role(name: str, unit: str) -> Role:
-    """Infer the role of a column from its unit and its name; empty where neither tells."""
+    """Infer the role of a column from its unit and its name; empty if neither shows it."""
     letters = unicodedata.normalize("NFKD", name.strip().lower())
     plain = "".join(letter for letter in letters if not unicodedata.combining(letter))
     plain = plain if _FRF_PREFIX.fullmatch(plain) else re.sub(rf"^(?:{_FRF_PREFIX.pattern})", "", plain, count=1)
@@ -128,20 +128,19 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
     if not columns:
         return signals
     if len(columns) < len(signals) and not any("=" in text for text in columns):
-        fault = f"names {len(columns)} of its {len(signals)} columns, which are {format_signal_names(signals)}"
-        cure = 'name all in their order, "-" for what is left out, or each as in "real=2"'
-        report.add_fault(f"Description.columns {fault}; {cure}")
+        fault = f"{len(columns)} of {len(signals)} columns are named ({format_signal_names(signals)})"
+        report.reject("columns", None, fault, 'Name all in their order ("-" to skip one), or each as in "real=2"')
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = report.attempt(_select_signal, signals, name.strip(), number)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
-            report.reject("columns", repr(text), f"{word!r} is none of {', '.join(COLUMN_ROLES)}")
+            report.reject("columns", repr(text), f"{word!r} is not one of {', '.join(COLUMN_ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = infer_decibel_unit(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
-                report.reject("columns", repr(text), f"{signal.name} is named twice; name each column once")
+                report.reject("columns", repr(text), f"column {signal.name} is named twice")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
     return tuple(named)
 
@@ -152,7 +151,7 @@ def _select_signal(signals: Sequence[Signal], name: str, number: int, report: Im
     if number < len(signals):
         return signals[number]
     held = format_signal_names(signals)
-    raise report.reject("columns", None, f"no column {number + 1} in the file, which holds {held}")
+    raise report.reject("columns", None, f"no column {number + 1} in the file, only {held}")
 
 
 def find_column(signals: Sequence[Signal], name: str, field_name: str, report: ImportReport) -> Signal:
@@ -162,10 +161,9 @@ def find_column(signals: Sequence[Signal], name: str, field_name: str, report: I
         return meant[0]
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
-        fault = f"{len(meant)} columns are called {name!r}; say which by its number, {numbers}"
-    else:
-        fault = f"nothing called {name!r} in the file, which holds {format_signal_names(signals)}"
-    raise report.reject(field_name, None, fault)
+        fault = f"{len(meant)} columns have the name {name!r}"
+        raise report.reject(field_name, None, fault, f"Give a column number, {numbers}")
+    raise report.reject(field_name, None, f"no column {name!r} in the file, only {format_signal_names(signals)}")
 
 
 def _match_columns(signals: Sequence[Signal], name: str) -> Sequence[Signal]:

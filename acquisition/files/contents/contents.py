@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.errors import join_sentences
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions
@@ -99,14 +100,14 @@ class Fact:
 
 
 class UnresolvedError(Exception):
-    """Raised where a recording cannot be resolved; its report says what is missing or wrong."""
+    """Raised if a recording cannot be resolved; its report has the missing facts and the faults."""
 
 
 @dataclass
 class ImportReport:
     """Facts, gaps and faults of a recording, collected while its contents are resolved.
 
-    The methods that add a gap or a fault return an UnresolvedError, to raise where the rest needs what is missing.
+    The methods that add a gap or a fault return an UnresolvedError, to raise if the rest depends on it.
     """
 
     description: Description
@@ -127,17 +128,17 @@ class ImportReport:
         self.missing.append(f"{fact} (Description.{field_name}{example})")
         return UnresolvedError()
 
-    def add_fault(self, fault: str) -> UnresolvedError:
-        """Add a fault of the file."""
-        self.faults.append(fault)
+    def add_fault(self, fault: str, cure: str = "") -> UnresolvedError:
+        """Add a fault of the file and its remedy."""
+        self.faults.append(join_sentences(fault, cure))
         return UnresolvedError()
 
-    def reject(self, field_name: str, value: object, fault: str) -> UnresolvedError:
+    def reject(self, field_name: str, value: object, fault: str, cure: str = "") -> UnresolvedError:
         """Add the fault of a field of the description and its value; None leaves the value out."""
-        return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}")
+        return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}", cure)
 
     def attempt(self, resolve: Callable[..., Result], *arguments: object) -> Result | None:
-        """Return the result of a function of these arguments and this report; None where it cannot be resolved."""
+        """Return the result of a function of these arguments and this report; None if it cannot be resolved."""
         try:
             return resolve(*arguments, self)
         except UnresolvedError:
@@ -151,15 +152,14 @@ class ImportReport:
 
     def add_contradiction(self, field_name: str, given: object, in_file: object) -> UnresolvedError:
         """Add the fault of a field that differs from the file."""
-        return self.reject(field_name, given, f"the file says {in_file}; leave the option out")
+        return self.reject(field_name, given, f"the file states {in_file}", "Omit the option")
 
     def add_flaws(self, used: Sequence["Signal"], first: int = 0) -> None:
         """Add a fault for each column with a flaw from this index on."""
         for column in used:
             if flaw := next((flaw for i, flaw in column.flaws.items() if first <= i < _count_values(column)), ""):
-                self.add_fault(
-                    f"{column.name} {flaw}; mend it there, or leave {column.name} out of Description.columns"
-                )
+                cure = f"Correct the file, or omit {column.name} from Description.columns"
+                self.add_fault(f"column {column.name} {flaw}", cure)
 
     @property
     def is_clean(self) -> bool:
@@ -172,15 +172,15 @@ class ImportReport:
             raise UnresolvedError
 
     def format_problems(self) -> str:
-        """Return all that is missing and wrong; empty where nothing is."""
-        missing = [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
-        return "; ".join([*self.faults, *missing])
+        """Return all faults and missing facts; empty if there are none."""
+        missing = f"{'Missing' if self.faults else 'missing'} {' and '.join(self.missing)}" if self.missing else ""
+        return join_sentences(*self.faults, missing)
 
 
 FrfRole = Literal["frf", "real", "imag", "magnitude", "phase", "coherence"]
 """Meaning of a signal that belongs to an FRF."""
 Role = Literal["time", "frequency", "force", "response", "speed", "tacho", FrfRole, "ignored", ""]
-"""Meaning of a signal; empty where unknown."""
+"""Meaning of a signal; empty if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,13 +192,13 @@ class Signal:
     values: NDArray[Any]
     """Values as in the file, real or complex, shape (n,)."""
     role: Role = ""
-    """Role of the signal; empty where the file does not state it."""
+    """Role of the signal; empty if the file does not state it."""
     unit: str = ""
-    """Unit as in the file, empty where unknown; dB of a magnitude, deg or rad of a phase."""
+    """Unit as in the file, empty if unknown; dB of a magnitude, deg or rad of a phase."""
     quantity: str = ""
     """Quantity (displacement, velocity, acceleration, force) where the file states it apart from the unit."""
     direction: str = ""
-    """Direction: x, y, z or -x, -y, -z; empty where unknown."""
+    """Direction: x, y, z or -x, -y, -z; empty if unknown."""
     rate: float | None = None
     """Sample rate that the file states (Hz)."""
     record: int = 0
@@ -224,13 +224,13 @@ class Contents:
     created: datetime | None = None
     """Time of recording (timezone-aware)."""
     direction: str = ""
-    """Direction at the tool tip; empty where unknown."""
+    """Direction at the tool tip; empty if unknown."""
     tool: str = ""
-    """Name of the tool in the spindle; empty where unknown."""
+    """Name of the tool in the spindle; empty if unknown."""
     machines: tuple[str, ...] = ()
     """Names of the tested machines, each once, where the file states them."""
     window: str = ""
-    """Window over the response, as the file states it; empty where unknown."""
+    """Window over the response, as the file states it; empty if unknown."""
     notes: tuple[str, ...] = ()
     """Notes for people."""
 
@@ -248,14 +248,14 @@ def cut_to_shortest(
 ) -> tuple[list[Signal], list[Signal]]:
     """Cut columns and their axes of one table to the shortest, and report it; leave others unchanged.
 
-    Of several axes only the longest counts, because the others may belong to other columns.
+    If there are several axes, only the longest counts, because the others may belong to other columns.
     """
     by_size = sorted([*used, *sorted(axes, key=_count_values)[-1:]], key=_count_values)
     if not by_size or not all(_is_in_same_table(column, by_size[0]) for column in by_size):
         return list(used), list(axes)
     n, longest = _count_values(by_size[0]), _count_values(by_size[-1])
     if longest > n:
-        report.add_fact("rows", f"{n} of {longest}, as {by_size[0].name} ends there", "default")
+        report.add_fact("rows", f"{n} of {longest}, because {by_size[0].name} ends there", "default")
     cut = [[replace(column, values=column.values[:n]) for column in columns] for columns in (used, axes)]
     return cut[0], cut[1]
 
@@ -281,7 +281,7 @@ def append_force_signals(response: Contents, force: Contents, force_file: Path) 
 
 
 def parse_local_time(text: str, *patterns: str) -> datetime | None:
-    """Parse a time by the first pattern that fits, local where it has no zone; None where it cannot be read."""
+    """Parse a time by the first pattern that fits, local where it has no zone; None if it cannot be read."""
     for pattern in patterns:
         with contextlib.suppress(ValueError, OverflowError, OSError):
             return datetime.strptime(text, pattern).astimezone()
@@ -366,9 +366,9 @@ class Format:
     read: Callable[[Path], Contents | list[Hit] | Frf]
     """Function that reads a file: its contents, or hits in SI units, at least one, or an FRF, where nothing is open."""
     read_circumstances: Callable[[Path], Circumstances | None] = lambda _path: None
-    """Function that reads when, where and by whom a file was recorded; None where it does not state that."""
+    """Function that reads when, where and by whom a file was recorded; None if it does not state that."""
     read_frf: Callable[[Path], Frf] | None = None
-    """Function that reads the FRF of a file that also has hits; None where it is estimated from them."""
+    """Function that reads the FRF of a file that also has hits; None if it is estimated from them."""
     read_from: Callable[[Path, int, str], Contents] | None = None
     """Function that reads a text after some skipped lines, with a decimal sign (empty: unknown); None for other files.
     """

@@ -1,4 +1,4 @@
-"""Recorded file as it is understood: hits or an FRF, the origin of each fact, and what is missing."""
+"""Interpreted recorded file: hits or an FRF, the origin of each fact, and missing facts."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ from acquisition.hit import Hit
 from acquisition.tap_test import Conditions
 
 ANY_COLUMNS_EXAMPLE = (
-    f"{HIT_COLUMNS_EXAMPLE}, those of Description.force FILE where the force stands in another file behind them; or "
-    f"Description.columns{FRF_COLUMNS_EXAMPLE}, without time where Description.rate says it, "
-    "without frequency where Description.spacing does"
+    f"{HIT_COLUMNS_EXAMPLE} for hits, with Description.rate if there is no time, "
+    f"or Description.columns{FRF_COLUMNS_EXAMPLE} for an FRF, with Description.spacing if there is no frequency"
 )
 """Example of the columns of either hits or an FRF."""
 
@@ -33,7 +32,7 @@ class Recording:
     title: str
     """Name of its format, for people."""
     hits: tuple[Hit, ...] = ()
-    """Hits in SI units; empty where the file holds only an FRF, or where something is missing or wrong."""
+    """Hits in SI units; empty if the file holds only an FRF, or where something is missing or wrong."""
     frf: Frf | None = None
     """FRF of the file; None without one, or where something is missing or wrong."""
     facts: tuple[Fact, ...] = ()
@@ -41,22 +40,22 @@ class Recording:
     problems: str = ""
     """Missing facts, with the fields of `Description` that state them, and errors; empty if there are none."""
     created: datetime | None = None
-    """Time of recording (timezone-aware); None where unknown."""
+    """Time of recording (timezone-aware); None if unknown."""
     tool: str = ""
-    """Name of the tool in the spindle; empty where unknown."""
+    """Name of the tool in the spindle; empty if unknown."""
     direction: str = ""
-    """Direction at the tool tip; empty where unknown."""
+    """Direction at the tool tip; empty if unknown."""
     operator: str = ""
-    """Name of the person with the hammer; empty where unknown."""
+    """Name of the person with the hammer; empty if unknown."""
     device: str = ""
-    """Recording device; empty where unknown."""
+    """Recording device; empty if unknown."""
     conditions: Conditions | None = None
-    """Conditions of the test; None where the file is not a tap file of lobewatch."""
+    """Conditions of the test; None if the file is not a tap file of lobewatch."""
     window: float | None = None
-    """Time constant of the exponential window over the response (s); NaN where unknown, None without a window."""
+    """Time constant of the exponential window over the response (s); NaN if unknown, None without a window."""
 
     def require_valid(self) -> Recording:
-        """Return this recording; raise DataError with all that is missing or wrong."""
+        """Return this recording; raise DataError with all missing facts and faults."""
         if self.problems:
             raise DataError(f"{self.path}: {self.problems}")
         return self
@@ -69,7 +68,8 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
     contents = replace(contents, signals=signals)
     frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, report)
     if len(contents.machines) > 1:
-        report.add_fault(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
+        machines = ", ".join(contents.machines)
+        report.add_fault(f"the file has {len(contents.machines)} machines ({machines})", "Export each to its own file")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
         report.add_fact("window", window)
@@ -87,12 +87,12 @@ def _resolve_frf_or_hits(contents: Contents, report: ImportReport) -> tuple[Frf 
         _reject_useless_fields(("rate", "full_scale", "force"), "an FRF", report)
         return resolve_frf(contents, report), []
     if not signals:
-        report.add_fault("it holds no columns of numbers")
+        report.add_fault("the file has no columns of numbers")
     elif over_frequency or not _is_over_time(signals):
         example = FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE
-        report.add_missing(f"what its columns are ({format_signal_names(signals)})", "columns", example)
+        report.add_missing(f"meaning of the columns {format_signal_names(signals)}", "columns", example)
     else:
-        _reject_useless_fields(("averages",), "hits, and they are counted", report)
+        _reject_useless_fields(("averages",), "single hits", report)
         _reject_useless_fields(("spacing", "start"), "signals over time", report)
         return None, resolve_hits(contents, report)
     return None, []
@@ -105,4 +105,4 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
 def _reject_useless_fields(names: Sequence[str], content: str, report: ImportReport) -> None:
     for name in names:
         if getattr(report.description, name) not in ((), None):
-            report.reject(name, None, f"the file holds {content}; leave the option out")
+            report.reject(name, None, f"the file has {content}", "Omit the option")

@@ -16,7 +16,7 @@ from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_u
 from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
-FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
+FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag"'
 """Example of the columns of an FRF."""
 FRF_FORM_BY_MOTION: dict[str, FrfQuantity] = dict(zip(MOTION_QUANTITIES, get_args(FrfQuantity), strict=True))
 """Form of an FRF by the quantity of its response."""
@@ -38,7 +38,7 @@ def find_frf_candidates(signals: Sequence[Signal]) -> list[list[Signal]]:
 
 
 def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
-    """Return the FRF of contents with one or more; None where the report says what is missing or wrong."""
+    """Return the FRF of contents with one or more; None if the report has faults or missing facts."""
     listed = find_frf_candidates(contents.signals)
     signal = report.attempt(choose_signal, [parts[0] for parts in listed], "FRFs")
     n_averages = _resolve_averages(contents, report)
@@ -78,21 +78,21 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     first, second = parts[0], parts[1] if len(parts) > 1 else None
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
-            report.add_fault(f"{first.name} holds real numbers; an FRF is complex")
+            report.add_fault(f"column {first.name} has real numbers, but an FRF is complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
-        fact = f"the {'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
+        fact = f"{'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
         raise report.add_missing(fact, "columns", ' "frequency,real,imag" or "frequency,magnitude,phase"')
     if first.role == "real":
         if second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
-            units = f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}"
-            raise report.add_fault(f"{units}; they must be the same")
+            units = f"{first.name} in {first.unit!r} and {second.name} in {second.unit!r}"
+            raise report.add_fault(f"columns {units} must have the same unit")
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLE_UNITS.get(second.unit.lower(), "")
     if not angle:
-        raise report.add_missing("the unit of its phase", "columns", ' "frequency,magnitude,phase [deg]"')
+        raise report.add_missing("unit of the phase", "columns", ' "frequency,magnitude,phase [deg]"')
     if not is_decibel(first.unit) and np.any(first.values < 0):
-        fact = f"whether {first.name}, which falls below 0, is in dB"
+        fact = f"unit of {first.name}, probably dB because of negative values"
         raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
@@ -113,14 +113,14 @@ def _resolve_frequency(
         return _make_even_frequency(contents.signals, frf, report)
     report.add_flaws([axis])
     if report.description.spacing is not None or report.description.start is not None:
-        fault = f"the file holds its frequencies, {axis.name}; leave them out"
-        raise report.add_fault(f"Description.spacing, Description.start: {fault}")
+        fault = f"the file has its own frequencies ({axis.name})"
+        raise report.add_fault(f"Description.spacing, Description.start: {fault}", "Omit these options")
     if not axis.unit and _is_angular(axis):
         example = f' "frequency [rad/s]={axis.name},..."'
-        raise report.add_missing(f"the unit of {axis.name}, Hz or rad/s", "columns", example)
+        raise report.add_missing(f"unit of {axis.name}, Hz or rad/s", "columns", example)
     unit = parse_unit(axis.unit or "Hz")
     if unit is None or unit.quantity != "frequency":
-        raise report.add_fault(f"the frequency is in {axis.unit!r}; Hz, kHz and rad/s are known")
+        raise report.add_fault(f"frequency unit {axis.unit!r} is not one of Hz, kHz, rad/s")
     values = np.asarray(axis.values, dtype=np.float64) * unit.factor
     report.add_fact("lines", _format_lines(values.size, *(axis.values[[0, -1]] * unit.factor)))
     if not axis.unit:
@@ -143,14 +143,14 @@ def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], repor
     """Return the frequencies of the lines by the spacing in the description (Hz)."""
     n, step, start = frf[0].values.size, report.description.spacing, report.description.start or 0.0
     if step is None:
-        fact, by_spacing = "the frequencies of its lines", "spacing 0.5 Description.start 0 in Hz"
+        fact, by_spacing = "frequencies of the lines", "spacing 0.5 Description.start 0 in Hz"
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         if axis is None:
             raise report.add_missing(fact, by_spacing)
         columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
-        raise report.add_missing(fact, "columns", f' "{columns}", or [rad/s]; or Description.{by_spacing}')
+        raise report.add_missing(fact, "columns", f' "{columns}", or in [rad/s], or Description.{by_spacing}')
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
-        fault = "give a spacing > 0 Hz and a start >= 0 Hz"
+        fault = "the spacing must be above 0 Hz, the start at least 0 Hz"
         raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)
     report.add_fact("lines", _format_lines(n, start, start + step * (n - 1)), "option")
     return np.asarray(start + step * np.arange(n), dtype=np.float64)
@@ -182,9 +182,9 @@ def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | 
     values = np.asarray(signal.values.real, dtype=np.float64)
     invalid = ~((values >= 0) & (values <= 1 + 1e-9))
     if np.mean(invalid) > MAX_INVALID_COHERENCE_SHARE:
-        report.add_fact("coherence", f"{signal.name} is beyond 0 to 1 at {invalid.sum()} lines: left out")
+        report.add_fact("coherence", f"{signal.name} omitted, because it is outside 0 to 1 at {invalid.sum()} lines")
         return None
-    taken = f"; beyond 0 to 1 at {invalid.sum()} lines, there taken as 0" if invalid.any() else ""
+    taken = f", set to 0 at {invalid.sum()} lines outside 0 to 1" if invalid.any() else ""
     report.add_fact("coherence", f"{signal.name}{taken}")
     return np.where(invalid, 0.0, values)
 
@@ -192,7 +192,7 @@ def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | 
 def _resolve_averages(contents: Contents, report: ImportReport) -> int:
     in_file, given = contents.averages, report.description.averages
     if given is not None and given < 1:
-        report.reject("averages", given, "give the number of hits averaged, 1 or more")
+        report.reject("averages", given, "the number of averaged hits must be 1 or more")
     elif in_file is not None and given is not None and given != in_file:
         report.add_contradiction("averages", given, in_file)
     elif (averages := given if in_file is None else in_file) is not None:

@@ -15,11 +15,11 @@ from acquisition.hit import Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
 from acquisition.hits.capture_hits import split_record
 
-HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]", in their order, or each with =NAME'
+HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]"'
 """Example of the columns of hits."""
-NO_FORCE_ADVICE = "hammer none where no force was measured"
-"""Advice where a file has no force."""
-FEW_DIGITS = "its time is printed with few digits: whether samples are missing cannot be seen"
+NO_FORCE_ADVICE = "If no force was measured, use hammer none"
+"""Advice for a file without a force."""
+FEW_DIGITS = "its time has few digits, so missing samples cannot be detected"
 """Note on a time that cannot show missing samples."""
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
@@ -33,7 +33,7 @@ MIN_UNEVEN_STEPS = 20
 
 
 def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
-    """Return the hits of each record; empty where the report says what is missing or wrong."""
+    """Return the hits of each record; empty if the report has faults or missing facts."""
     hits = list[Hit]()
     for record in dict.fromkeys(signal.record for signal in contents.signals):
         record_report = ImportReport(report.description)
@@ -54,7 +54,7 @@ def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
     scaled = report.attempt(resolve_unit.convert_to_sensor_units, apply_full_scale(signals, report))
     if scaled is None:
         if sum(signal.role != "time" for signal in signals) > 2 and report.description.response is None:
-            report.add_missing("which of its responses is meant", "response", " 1")
+            report.add_missing("number of the response", "response", " 1")
         resolve_rate(signals, (), report)
         raise UnresolvedError
     forces, responses = _split_by_kind(scaled, report)
@@ -73,7 +73,7 @@ def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
     except ValueError as error:
         raise report.add_fault(str(error)) from error
     if unit[0] != "acceleration":
-        report.add_fact("note", f"its {unit[0]} is differentiated")
+        report.add_fact("note", f"acceleration computed from the {unit[0]}")
     return hit
 
 
@@ -94,7 +94,7 @@ def make_hit_from_motion(force: Floats, response: Floats, rate: float, quantity:
 
 
 def _resolve_force(forces: Sequence[Signal], report: ImportReport) -> Floats | None:
-    """Return the force (N), empty where none was measured; None where it or its unit is missing."""
+    """Return the force (N), empty if none was measured; None if it or its unit is missing."""
     if report.description.without_force:
         return np.empty(0)
     to_newton = report.attempt(resolve_unit.resolve_force_unit, forces[0]) if len(forces) == 1 else None
@@ -102,7 +102,7 @@ def _resolve_force(forces: Sequence[Signal], report: ImportReport) -> Floats | N
 
 
 def _split_by_kind(signals: Sequence[Signal], report: ImportReport) -> tuple[list[Signal], list[Signal]]:
-    """Return forces and responses, and report where neither unit nor name tells them."""
+    """Return forces and responses, and report channels whose kind neither unit nor name shows."""
     needs_force = not report.description.without_force
     forces = [signal for signal in signals if needs_force and infer_kind(signal) == "force"]
     responses = [signal for signal in signals if infer_kind(signal) == "response"]
@@ -110,24 +110,25 @@ def _split_by_kind(signals: Sequence[Signal], report: ImportReport) -> tuple[lis
     channels = [channel for channel in signals if channel.role != "time"]
     names = format_signal_names(channels)
     if len(channels) < 1 + needs_force:
-        needed = f"a force and a response (Description.force FILE; {NO_FORCE_ADVICE})" if needs_force else "a response"
-        report.add_fault(f"it holds {names or 'nothing'} over time; a hit needs {needed}")
+        needed = "a force and a response" if needs_force else "a response"
+        cure = f"Give the file with the force by Description.force. {NO_FORCE_ADVICE}" if needs_force else ""
+        report.add_fault(f"a hit needs {needed}, but the file has {names or 'no signals'} over time", cure)
         return [], []
     if unclear and ((needs_force and not forces) or not responses):
-        report.add_missing(f"what its columns are ({format_signal_names(signals)})", "columns", HIT_COLUMNS_EXAMPLE)
+        report.add_missing(f"meaning of the columns {format_signal_names(signals)}", "columns", HIT_COLUMNS_EXAMPLE)
         return forces, responses
     if needs_force and not forces:
-        report.add_fault(f"no force channel among {names}; one is needed ({NO_FORCE_ADVICE})")
+        report.add_fault(f"no force channel among {names}", NO_FORCE_ADVICE)
     if needs_force and len(forces) > 1:
-        fact = f"which force of {format_signal_names(forces)} goes with which response"
+        fact = f"force for each response ({format_signal_names(forces)})"
         report.add_missing(fact, "columns", HIT_COLUMNS_EXAMPLE)
     if not responses:
-        report.add_fault(f"no channel of a response among {names}")
+        report.add_fault(f"no response channel among {names}")
     return forces, responses
 
 
 def infer_kind(signal: Signal) -> str:
-    """Return "force" or "response" by the unit or the role; empty where neither tells."""
+    """Return "force" or "response" by the unit or the role; empty if neither shows it."""
     unit = parse_unit(signal.unit) if signal.unit else None
     quantity = signal.quantity or (unit.quantity if unit else "")
     if quantity in (*MOTION_QUANTITIES, "force"):
@@ -141,11 +142,11 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
     used, times = cut_to_shortest(used, times, report)
     of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
     if len({signal.values.size for signal in of_one_length}) > 1:
-        report.add_fault(f"its channels differ in length: {format_signal_names(of_one_length)}")
+        report.add_fault(f"the channels differ in length ({format_signal_names(of_one_length)})")
         return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
-        report.add_fault(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
+        report.add_fault(f"the channels differ in sample rate ({min(rates):g} and {max(rates):g} Hz)")
         return 0.0, used
     times = [time for time in times if time.values.size == of_one_length[0].values.size]
     report.add_flaws([*used, *times])
@@ -159,28 +160,28 @@ def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> fl
         return None
     size = times[0].values.size
     if size < 8:
-        report.add_fault(f"{size} samples; at least 8 are needed")
+        report.add_fault(f"{size} samples are too few. A hit needs at least 8")
         return None
     steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), report) for time in times]
     if not all(steps):
         return None
     starts = [time.values[0] for time in times]
     if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * size > steps[0]:
-        report.add_fault(f"its time axes differ: they begin at {starts} with steps of {steps}")
+        report.add_fault(f"the time axes differ (start {starts}, step {steps})")
         return None
     unit = parse_unit(times[0].unit)
     return 1 / (steps[0] * unit.factor) if unit is not None and unit.quantity == "time" else None
 
 
 def _resolve_step(time: Floats, report: ImportReport) -> float:
-    """Return the step of an even axis; 0 where the report says that it is uneven."""
+    """Return the step of an even axis; 0 if it is uneven, with a fault in the report."""
     step, fault = measure_step(time)
     if not fault:
         return step
     printed = infer_printed_step(time) if step > 0 else None
     if printed is None:
-        remedy = "where the time alone is wrong leave it out of Description.columns and give Description.rate"
-        report.add_fault(f"{fault}; {remedy}")
+        remedy = "If only the time is wrong, omit it from Description.columns and give Description.rate"
+        report.add_fault(fault, remedy)
         return 0.0
     if not any(fact.value == FEW_DIGITS for fact in report.facts):
         report.add_fact("note", FEW_DIGITS)
@@ -188,29 +189,28 @@ def _resolve_step(time: Floats, report: ImportReport) -> float:
 
 
 def measure_step(time: Floats) -> tuple[float, str]:
-    """Return the step of an even axis, and what is wrong with it; the text is empty where nothing is.
+    """Return the step of an even axis and its fault, empty if there is none.
 
     The axis is evaluated as a whole, because single steps of a printed time are never quite the same.
     """
     if time.size < 2 or not np.all(np.isfinite(time)):
-        return 0.0, "its time is no row of finite numbers"
+        return 0.0, "the time has empty or infinite values"
     step = float(time[-1] - time[0]) / (time.size - 1)
     if step <= 0:
-        return 0.0, f"its time does not rise (from {time[0]:g} to {time[-1]:g}); sort its rows"
+        return 0.0, f"the time does not increase (from {time[0]:g} to {time[-1]:g}). Sort the rows"
     deviation = (time - time[0]) / step - np.arange(time.size)
     distance = np.abs(deviation - (deviation.max() + deviation.min()) / 2)
     worst = int(np.argmax(distance))
     if distance[worst] <= MAX_TIME_DEVIATION:
         return step, ""
-    place = f"sample {worst + 1} is {distance[worst]:.2g} steps off an even axis"
-    doubt = "are samples missing, twice there, or not in order?"
-    return step, f"its time steps are uneven: {place}, {MAX_TIME_DEVIATION:g} are taken ({doubt})"
+    place = f"sample {worst + 1} is off by {distance[worst]:.2g} steps (limit {MAX_TIME_DEVIATION:g})"
+    return step, f"the time steps are uneven, {place}. Samples may be missing, repeated or out of order"
 
 
 def infer_printed_step(time: Floats) -> float | None:
     """Return the step of an even axis that was printed with few digits; each time is within half its last digit.
 
-    None where no even axis is printed so, or where the steps are uneven in a few places only.
+    None if no even axis gives these digits, or if the steps are uneven in a few places only.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
     if np.sum(np.abs(np.diff(time) / step - 1) > MAX_TIME_DEVIATION) < MIN_UNEVEN_STEPS:
@@ -230,14 +230,14 @@ def _get_last_digit_exponent(value: float) -> int:
 def _agree_on_rate(in_file: float | None, report: ImportReport) -> float:
     given = report.description.rate
     if given is not None and not (np.isfinite(given) and given > 0):
-        report.reject("rate", f"{given:g}", "give the samples a second, > 0 Hz")
+        report.reject("rate", f"{given:g}", "the sample rate must be above 0 Hz")
     elif in_file is not None and given is not None and abs(given / in_file - 1) > 0.01:
         report.add_contradiction("rate", f"{given:g}", f"{in_file:g} Hz")
     elif (rate := given if in_file is None else in_file) is not None:
         report.add_fact("sample rate", f"{rate:.8g} Hz", "option" if in_file is None else "file")
         return rate
     elif not report.faults:
-        report.add_missing("its sample rate, or the unit of its time", "rate", " 51200")
+        report.add_missing("sample rate or unit of time", "rate", " 51200")
     return 0.0
 
 
@@ -246,17 +246,17 @@ def _check_gravity_offset(responses: Sequence[Signal], report: ImportReport) -> 
     for signal in responses:
         offset = abs(float(np.median(signal.values))) if signal.values.size else 0.0
         if signal.unit.lower() == "g" and abs(offset - STANDARD_GRAVITY) < 0.5:
-            reason = f"called g, rests at {offset:.2f}, which is gravity in m/s^2"
-            report.add_fault(f"unit of {signal.name} in doubt ({reason})")
+            found = f"column {signal.name} has the unit g, but its idle value is {offset:.2f}, gravity in m/s^2"
+            report.add_fault(found, "Give its unit with Description.columns")
 
 
 def apply_full_scale(signals: Sequence[Signal], report: ImportReport) -> list[Signal]:
     """Convert values that are shares of a full scale to their unit."""
     shares, full_scale = [signal for signal in signals if signal.per_full_scale], report.description.full_scale
     if full_scale and not shares:
-        report.reject("full_scale", None, "its values are no shares of a full scale; leave it out")
+        report.reject("full_scale", None, "the values are not shares of a full scale", "Omit the option")
     elif len(full_scale) != len(shares):
-        fact = f"the full scale of its {len(shares)} channels, in their order and units"
+        fact = f"full scale of the {len(shares)} channels, in their order and units"
         report.add_missing(fact, "full_scale", " 500,50")
     elif shares:
         report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in full_scale), "option")

@@ -21,10 +21,10 @@ def convert_to_sensor_units(signals: Sequence[Signal], report: ImportReport) -> 
     given = report.description.sensitivity
     if not wired:
         if given:
-            report.reject("sensitivity", None, "it has no channel in volts; leave it out")
+            report.reject("sensitivity", None, "no channel is in volts", "Omit the option")
         return list(signals)
     if len(given) != len(wired):
-        fact = f"the sensitivity of each of {format_signal_names(wired)}, in their order"
+        fact = f"sensitivity of each of {format_signal_names(wired)}, in their order"
         raise report.add_missing(fact, "sensitivity", _SENSITIVITY_EXAMPLE)
     sensors = [report.attempt(_parse_sensitivity, text) for text in given]
     report.add_fact("sensitivity", ", ".join(given), "option")
@@ -48,17 +48,18 @@ def _resolve_voltage_frf_unit(unit: str, report: ImportReport) -> tuple[str, flo
     ratio, sensitivity = _VOLTAGE_RATIO_PATTERN.fullmatch(unit), report.description.sensitivity
     if ratio is None or not is_voltage(ratio[1]):
         if sensitivity:
-            report.reject("sensitivity", None, "its FRF is not in volts; leave it out")
+            report.reject("sensitivity", None, "the FRF is not in volts", "Omit the option")
         return unit, 1.0
     over_volts = is_voltage(ratio[2])
     whose, example = ("hammer and sensor", _SENSITIVITY_EXAMPLE) if over_volts else ("the sensor", ' "10.2 mV/g"')
     given = ", ".join(sensitivity)
     if len(sensitivity) != 1 + over_volts:
-        raise report.add_missing(f"the sensitivity of {whose}, as its FRF is in {unit}", "sensitivity", example)
+        raise report.add_missing(f"sensitivity of {whose}, because the FRF is in {unit}", "sensitivity", example)
     sensors = [sensor for text in sensitivity if (sensor := report.attempt(_parse_sensitivity, text)) is not None]
     sensors.sort(key=lambda sensor: _is_force_unit(sensor[1]))
     if [_is_force_unit(sensor[1]) for sensor in sensors] != [False, True][: 1 + over_volts]:
-        raise report.reject("sensitivity", given, f"give that of {whose}: Description.sensitivity{example}")
+        found = f"the FRF is in {unit}"
+        raise report.reject("sensitivity", given, found, f"Give the sensitivity of {whose}, as in{example}")
     report.add_fact("sensitivity", given, "option")
     (volts, motion), factor = sensors[0], VOLTAGE_UNITS[ratio[1].lower()]
     if not over_volts:
@@ -75,8 +76,7 @@ def _parse_sensitivity(text: str, report: ImportReport) -> tuple[float, str]:
     """Return the volts per unit, and the unit."""
     match = _SENSITIVITY_PATTERN.fullmatch(text)
     if match is None or parse_unit(match[3]) is None or not is_voltage(match[2]) or not float(match[1]):
-        example = f"Description.sensitivity{_SENSITIVITY_EXAMPLE}"
-        raise report.reject("sensitivity", repr(text), f"give volts a unit of each channel, as in {example}")
+        raise report.reject("sensitivity", repr(text), f"not volts per unit of the sensor, as in{_SENSITIVITY_EXAMPLE}")
     return float(match[1]) * VOLTAGE_UNITS[match[2].lower()], match[3]
 
 
@@ -84,11 +84,11 @@ def choose_signal(signals: Sequence[Signal], noun: str, report: ImportReport) ->
     """Return the signal of the response that the description chooses, or the only one; noun: for people."""
     response = report.description.response
     if response is not None and not 1 <= response <= len(signals):
-        raise report.reject("response", response, f"it holds {len(signals)} of the {noun} asked for")
+        raise report.reject("response", response, f"the file has {len(signals)} {noun}")
     if response is None and len(signals) > 1:
         names = ", ".join(f"{i} {signal.name}" for i, signal in enumerate(signals[:12], 1))
         more = f" and {len(signals) - 12} more" if len(signals) > 12 else ""
-        raise report.add_missing(f"which of its {len(signals)} {noun} is meant: {names}{more}", "response", " 1")
+        raise report.add_missing(f"choice among {len(signals)} {noun}: {names}{more}", "response", " 1")
     signal = signals[(response or 1) - 1]
     report.add_fact("response", signal.name, "file" if response is None else "option")
     return signal
@@ -133,14 +133,14 @@ def _resolve_unit(
     field_name, examples, name = texts
     file_unit, given_unit = parse_unit(in_file) if in_file else None, parse_unit(given) if given else None
     if given and (given_unit is None or given_unit.quantity not in wanted):
-        raise report.reject(field_name, given, f"not known as a unit of {name}; give one like {examples}")
+        raise report.reject(field_name, given, f"not a unit of {name}", f"Give a unit such as {examples}")
     if in_file and (file_unit is None or file_unit.quantity not in wanted):
-        fault = f"{name} is in {in_file!r}, which is not known here as its unit (known are such as {examples})"
-        raise report.add_fault(f"{fault}; where that is wrong say with Description.columns what it is")
+        cure = f"Give its meaning with Description.columns, with a unit such as {examples}"
+        raise report.add_fault(f"unit {in_file!r} of {name} is unknown or of another quantity", cure)
     if file_unit is not None and given_unit is not None and file_unit != given_unit:
         raise report.add_contradiction(field_name, given, in_file)
     if file_unit is None and given_unit is None:
-        raise report.add_missing(f"the unit of {name}", field_name, f", such as {examples}")
+        raise report.add_missing(f"unit of {name}", field_name, f", such as {examples}")
     return (file_unit, "file") if file_unit is not None else (cast(Unit, given_unit), "option")
 
 
@@ -149,12 +149,11 @@ def _resolve_frf_force(unit: Unit, report: ImportReport) -> float:
     given = report.description.force_unit
     if unit.quantity not in MOTION_QUANTITIES:
         if given:
-            report.reject("force_unit", given, "the unit of the FRF holds that of the force")
+            report.reject("force_unit", given, "the unit of the FRF includes the unit of the force", "Omit the option")
         return 1.0
     force = parse_unit(given)
     if force is None or force.quantity != "force":
-        fact = "the unit of the force that the response was divided by"
-        raise report.add_missing(fact, "force_unit", " N, or both as Description.unit g/N")
+        raise report.add_missing("unit of the force in the FRF", "force_unit", " N, or both as Description.unit g/N")
     return force.factor
 
 
@@ -162,8 +161,8 @@ def _check_quantity(by_unit: str, signal: Signal, report: ImportReport) -> None:
     """Check that file and description do not contradict the quantity of the response by its unit."""
     given, unit = report.description.quantity, signal.unit or report.description.unit
     if given and given not in MOTION_QUANTITIES:
-        raise report.reject("quantity", given, f"none of {', '.join(MOTION_QUANTITIES)}")
+        raise report.reject("quantity", given, f"not one of {', '.join(MOTION_QUANTITIES)}")
     if given and given != by_unit:
-        raise report.reject("quantity", given, f"its unit, {unit}, is one of {by_unit}")
+        raise report.reject("quantity", given, f"{unit} is a unit of {by_unit}")
     if signal.quantity and signal.quantity != by_unit:
-        raise report.add_fault(f"it calls {signal.name} {signal.quantity}, and {unit} is a unit of {by_unit}")
+        raise report.add_fault(f"the file calls {signal.name} {signal.quantity}, but {unit} is a unit of {by_unit}")

@@ -63,13 +63,13 @@ class Unit:
     """Known unit."""
 
     quantity: MeasuredQuantity
-    """Quantity that the unit measures; empty where no tap test has it."""
+    """Quantity that the unit measures; empty if no tap test has it."""
     factor: float
     """SI value of one unit."""
 
 
 def parse_unit(text: str) -> Unit | None:
-    """Parse a unit such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where unknown.
+    """Parse a unit such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None if unknown.
 
     Hz, rad/s and rpm are frequencies, in Hz; g is standard gravity.
     """

@@ -34,7 +34,7 @@ def find_window(variables: Mapping[str, Any]) -> str:
 
 
 def _infer_window(before: Any, behind: Any) -> str:
-    """Infer the window between two signals (n, 2) of time and value; empty where they are equal, or none."""
+    """Infer the window between two signals (n, 2) of time and value; empty if they are equal, or none."""
     if not _is_pairs(before) or not _is_pairs(behind):
         return ""
     if before.shape != behind.shape or not np.any(before[:, 1]) or np.array_equal(before[:, 1], behind[:, 1]):

@@ -1,7 +1,7 @@
 """Read the variables of a MATLAB or HDF5 file in a subprocess, as damaged files may crash or hang.
 
 The subprocess returns them as MessagePack: structs as maps, cells as lists, arrays as `numpy.save` writes them, and nil
-for what no layout reads. A text in their place states why the file cannot be read.
+for other types. A text in their place states why the file cannot be read.
 """
 
 import io
@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from acquisition.errors import DataError
-from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_ratio, check_unpacked_size, get_unpacked_limit
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_size, check_unpacked_total, get_unpacked_limit
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 
 READ_CPU_TIME, READ_CPU_TIME_PER_BYTE = 2.0, 0.2e-6
@@ -32,12 +32,12 @@ ARRAY_EXTENSION_CODE = 1
 
 
 def read_mat_variables(path: Path) -> dict[str, Any]:
-    """Read all variables by name; raise DataError where the file is damaged or unpacks out of proportion."""
+    """Read all variables by name; raise DataError if the file is damaged or unpacks out of proportion."""
     try:
         patience = READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
         content = run_in_subprocess(__name__, str(path), patience=patience)
     except subprocess.SubprocessError as error:
-        raise DataError(f"{path}: damaged: its reader crashes or hangs on it; export it anew") from error
+        raise DataError(f"{path}: damaged, it crashes or hangs its reader. Export it again.") from error
     answer: dict[str, Any] | str = msgspec.msgpack.decode(content, ext_hook=_decode_array)
     if isinstance(answer, str):
         raise DataError(answer)
@@ -63,7 +63,7 @@ def _encode_answer(path: Path) -> bytes:
     except DataError as error:
         return encode(str(error))
     except Exception as error:  # noqa: BLE001 - whatever a damaged file leads to
-        return encode(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew")
+        return encode(f"{path}: damaged or truncated ({type(error).__name__}: {error}). Export it again.")
 
 
 def _compute_cpu_limit(size: int) -> float:
@@ -83,7 +83,7 @@ def _read_v5(path: Path) -> dict[str, Any]:
         unpacked = sum(16 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(path))
     except TypeError:  # scipy names no shape of MATLAB's own objects (a table, a system), and passes over them
         unpacked = 0
-    check_unpacked_ratio(unpacked, path)
+    check_unpacked_total(unpacked, path.stat().st_size, path)
     variables = scipy.io.loadmat(path, simplify_cells=True)
     return {name: value for name, value in variables.items() if not name.startswith("__")}
 

@@ -42,7 +42,7 @@ _MISSING_VALUE = re.compile(r"#?N/A|#NUM!|#DIV/0!|#VALUE!|[+-]?1[.,]#(IND|INF|QN
 
 
 def _parse_word(word: str, numerals: NumberFormat) -> complex:
-    """Parse a word, real where possible; raise ValueError with the end of a sentence where it is no number."""
+    """Parse a word, real if possible; raise ValueError with the end of a sentence if it is no number."""
     plain = re.sub(f"[{_BLANK_CHARACTERS}]", "", word) if _WITH_BLANKS.fullmatch(word) else word
     for sign, use in numerals.items():
         if use != "decimal" and sign in plain:
@@ -50,16 +50,16 @@ def _parse_word(word: str, numerals: NumberFormat) -> complex:
     try:
         return _parse_number(plain.replace(",", "."))
     except ValueError:
-        raise ValueError("which is no number") from None
+        raise ValueError("not a number") from None
 
 
 def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
     """Remove the separators of thousands; raise ValueError where their use is unknown or their place is wrong."""
     if not _THOUSANDS_PATTERN[sign].fullmatch(word):
-        raise ValueError("which is no number")
+        raise ValueError("not a number")
     if use == "doubtful":
         either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
-        raise ValueError(f"which may be {either} (Description.decimal comma or Description.decimal point)")
+        raise ValueError(f"either {either} (Description.decimal comma or Description.decimal point)")
     return word.replace(sign, "")
 
 
@@ -74,7 +74,7 @@ def _infer_formats(columns: Sequence[Sequence[str]]) -> list[NumberFormat]:
 
 
 def _infer_sign_use(sign: str, words: Sequence[str]) -> SignUse | None:
-    """Infer the use of a sign from words; None where no number has it."""
+    """Infer the use of a sign from words; None if no number has it."""
     if sign not in "".join(words):
         return None
     uses = (use for word in words if sign in word if (use := _classify_sign(sign, word)) is not None)
@@ -108,7 +108,7 @@ def is_number(word: str) -> bool:
 
 
 def _parse_number(plain: str) -> complex:
-    """Parse a number with a decimal point; raise ValueError where it is none."""
+    """Parse a number with a decimal point; raise ValueError if it is none."""
     try:
         return float(plain)
     except ValueError:
@@ -149,17 +149,17 @@ def _parse_column(cells: Sequence[str], lines: Sequence[int], numerals: NumberFo
     for i, (cell, line) in enumerate(zip(cells[:n], lines, strict=False)):
         try:
             values.append(_parse_word(cell, numerals))
-            fault = "which is no number" if math.isnan(values[-1].real) else ""
+            fault = "not a number" if math.isnan(values[-1].real) else ""
         except ValueError as error:
             values.append(math.nan)
             fault = str(error)
         if fault:
-            flaws[i] = f"holds {cell!r} in line {line}, {fault}" if cell else f"is empty in line {line}"
+            flaws[i] = f"has {cell!r} in line {line}, {fault}" if cell else f"is empty in line {line}"
     return Column(np.array(values), flaws)
 
 
 def _parse_fast(cells: Sequence[str], numerals: NumberFormat) -> Floats | None:
-    """Parse cells at once; None where a number is complex or missing, or has thousands."""
+    """Parse cells at once; None if a number is complex or missing, or has thousands."""
     text = "\n".join(cells)
     if any(use != "decimal" and sign in text for sign, use in numerals.items()):
         return None

@@ -1,4 +1,4 @@
-"""Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files. Known names show what they are."""
+"""Read arrays from MATLAB, NumPy, HDF5 and SEP005 JSON files, with their roles by known names."""
 
 import json
 import re
@@ -14,7 +14,7 @@ import numpy as np
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import infer_role
 from acquisition.files.contents.contents import Contents, Format, Signal, list_array_signals, list_distinct_names
-from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_ratio
+from acquisition.files.hdf5_file import HDF5_SIGNATURE, check_unpacked_total
 from acquisition.files.readers.mat_layouts import find_window, recognize_layout
 from acquisition.files.readers.mat_variables import MAT_V73_SIGNATURE, read_mat_variables
 
@@ -24,7 +24,7 @@ _MAT_V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
 
 
 def read_mat(path: Path) -> Contents:
-    """Read the arrays of a MATLAB file; raise DataError where it is damaged or unpacks out of proportion."""
+    """Read the arrays of a MATLAB file; raise DataError if it is damaged or unpacks out of proportion."""
     variables = read_mat_variables(path)
     return recognize_layout(variables) or Contents(tuple(list_array_signals(variables)), window=find_window(variables))
 
@@ -57,13 +57,13 @@ def read_numpy(path: Path) -> Contents:
         with path.open("rb") as file:
             return _read_numpy_file(file, path)
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise DataError(f"{path}: cannot be read ({error}); save its numbers alone, without Python objects") from error
+        raise DataError(f"{path}: unreadable ({error}). Save arrays of numbers, without Python objects.") from error
 
 
 def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
     if zipfile.is_zipfile(file):
         with zipfile.ZipFile(file) as archive:
-            check_unpacked_ratio(sum(member.file_size for member in archive.infolist()), path)
+            check_unpacked_total(sum(member.file_size for member in archive.infolist()), path.stat().st_size, path)
     file.seek(0)
     loaded = np.load(file, allow_pickle=False)
     if isinstance(loaded, np.ndarray):
@@ -94,11 +94,11 @@ _SEP005_KEYS = ("data", "name", "unit_str")
 
 
 def read_sep005(path: Path) -> Contents:
-    """Read the channels of SEP005 JSON; raise DataError where it is damaged or no list of time series."""
+    """Read the channels of SEP005 JSON; raise DataError if it is damaged or no list of time series."""
     try:
         channels = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise DataError(f"{path}: damaged or cut short ({error})") from error
+        raise DataError(f"{path}: damaged or truncated ({error})") from error
     return parse_sep005(str(path), channels)
 
 
@@ -110,7 +110,7 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         missing = [key for key in _SEP005_KEYS if key not in channel]
         missing += [] if {"fs", "time"} & channel.keys() else ["fs"]
         if missing:
-            raise DataError(f"{where} has no {', '.join(missing)}; SEP005 asks for them")
+            raise DataError(f"{where} lacks {', '.join(missing)}, which SEP005 requires")
         record = groups.setdefault(str(channel.get("group", "")), len(groups))
         try:
             values = np.asarray(channel["data"], dtype=np.float64).ravel()
@@ -119,7 +119,7 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         except (TypeError, ValueError) as error:
             raise DataError(f"{where}: {error}") from error
         if rate is not None and not rate > 0:
-            raise DataError(f"{where}: fs={rate} Hz is not > 0")
+            raise DataError(f"{where}: fs={rate} Hz is not above 0")
         name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]

@@ -20,7 +20,7 @@ MP3_SYNC_BITS = 0xFFE0
 def read_audio(path: Path) -> Contents:
     """Read the channels as shares of the full scale, -1 to 1.
 
-    Raises DataError where the file is damaged or cut short, or soundfile is not installed.
+    Raises DataError if the file is damaged or cut short, or soundfile is not installed.
     """
     with path.open("rb") as file:
         is_wav = _is_wav(file.read(12))
@@ -53,8 +53,8 @@ def _read_flac_or_mp3(path: Path) -> tuple[float, Floats]:
     try:
         import soundfile
     except ImportError as error:
-        cure = 'install it: pip install "lobewatch[sound]", or export WAV'
-        raise DataError(f"{path}: FLAC and MP3 are read by soundfile; {cure}") from error
+        cure = 'Export WAV, or run pip install "lobewatch[sound]".'
+        raise DataError(f"{path}: FLAC and MP3 need the package soundfile. {cure}") from error
     try:
         values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
     except Exception as error:

@@ -31,7 +31,7 @@ def read_lvm(path: Path) -> Contents:
     lines = text.splitlines()
     ends = [i for i, line in enumerate(lines) if line.startswith(_LVM_HEADER_END)]
     if len(ends) < 2:
-        raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
+        raise DataError(f"{path}: incomplete LVM file, {len(ends)} of at least 2 header ends")
     pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator is in one of them
     head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
     starts = [*ends[1:], len(lines)]
@@ -39,7 +39,7 @@ def read_lvm(path: Path) -> Contents:
     for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False)):
         signals += _read_lvm_segment(path, lines, places, head, number)
     if not text.endswith("\n"):
-        raise DataError(f"{path}: its last line has no end, so digits may be missing; the file is cut short")
+        raise DataError(f"{path}: truncated file, its last line has no line end. Export it again.")
     return Contents(tuple(signals), created=_parse_lvm_date(head))
 
 
@@ -58,7 +58,7 @@ def _read_lvm_segment(
         samples = [int(_get_word(header["Samples"], i) or 0) for i in at]
         steps = [float((_get_word(header["Delta_X"], i) or "nan").replace(",", ".")) for i in at]
     except (KeyError, ValueError, IndexError) as error:
-        place = f"{path}: line {before + 2}: the segment's header lacks Channels, Samples or Delta_X"
+        place = f"{path}: line {before + 2}: the segment header lacks Channels, Samples or Delta_X"
         raise DataError(f"{place} ({error})") from error
     units = [_get_word(header.get("Y_Unit_Label", []), i) for i in at]
     names = [_get_word(lines[end + 1].split(split) if end + 1 < after else [], column) for column in columns]
@@ -70,7 +70,7 @@ def _read_lvm_segment(
         if samples[i]:
             n_there = found.values.size
             if n_there < samples[i]:
-                raise DataError(f"{path}: {n_there} of {samples[i]} samples are there; the file is cut short")
+                raise DataError(f"{path}: truncated file, {n_there} of {samples[i]} samples. Export it again.")
             name, by_name = split_heading(names[i] or f"channel {i + 1}")
             unit = units[i] or by_name
             rate, role = 1 / steps[i] if steps[i] > 0 else None, infer_role(name, unit)
@@ -84,7 +84,7 @@ def _get_word(words: Sequence[str], i: int) -> str:
 
 
 def _parse_lvm_date(head: Mapping[str, str]) -> datetime | None:
-    """Return date and time of the header in the local time zone; None where they cannot be read."""
+    """Return date and time of the header in the local time zone; None if they cannot be read."""
     clock = head.get("Time", "").replace(",", ".").partition(".")[0]
     return parse_local_time(f"{head.get('Date', '')} {clock}", "%Y/%m/%d %H:%M:%S")
 
@@ -98,7 +98,7 @@ def read_tdms(path: Path) -> Contents:
     try:
         from nptdms import TdmsFile
     except ImportError as error:
-        raise DataError(f'{path}: TDMS is read by npTDMS; install it: pip install "lobewatch[tdms]"') from error
+        raise DataError(f'{path}: TDMS needs the package npTDMS. Run pip install "lobewatch[tdms]".') from error
     try:
         file = TdmsFile.read(path)
         groups = file.groups()
@@ -106,7 +106,7 @@ def read_tdms(path: Path) -> Contents:
         machines = list_distinct_names(group.name for group, signals in zip(groups, held, strict=True) if signals)
         created = [_get_tdms_start(channel) for group in groups for channel in group.channels()]
     except Exception as error:
-        raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
+        raise DataError(f"{path}: damaged or truncated ({type(error).__name__}: {error}). Export it again.") from error
     return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), machines=machines)
 
 

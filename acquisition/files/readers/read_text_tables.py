@@ -48,9 +48,9 @@ def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
         columns = layout.read_columns(rows, form, str(path), decimal_sign)
         signals += _name_columns(columns, heading, record)
         extras = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
-        notes += [f"beside its columns stands {word!r} in the last row" for word in extras]
+        notes += [f"ignored {word!r} next to the columns in the last row" for word in extras]
     _check_complete(path, keys, rows, columns, text)
-    notes += [f"below its rows stands {line!r}" for line in footer]
+    notes += [f"ignored {line!r} below the rows" for line in footer]
     return replace(_make_table_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
 
 
@@ -105,8 +105,8 @@ def _find_rows(
     plain = NumberedLines([*map(layout.normalize_complex, lines.texts[begin:])], lines.numbers[begin:])
     form = layout.detect_row_layout(plain.texts[first - begin :])
     if not form.columns:
-        cure = "pass over what stands above them with Description.skip"
-        raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
+        cure = "Skip the lines above the table with Description.skip."
+        raise DataError(f"{path}: line {lines.numbers[first]}: no table of numbers found. {cure}")
     width = len(form.split(plain.texts[first - begin :][:2][-1]))
     above = lines.texts[:first]
     if layout.is_unit_line(above, form, width) and not _begins_in_column(plain.texts[first - begin], form):
@@ -132,8 +132,8 @@ def _find_first_row(path: Path, lines: NumberedLines) -> int:
             return i
         begins += [layout.begins_with_number(line) for line in texts[i + MIN_TABLE_ROWS : i + MIN_TABLE_ROWS + 1]]
     if len(texts) < 2:
-        raise DataError(f"{path}: {len(texts)} lines; a heading and rows of numbers are needed")
-    raise DataError(f"{path}: line {lines.numbers[1]}: {texts[1].strip()[:60]!r} is no row of numbers")
+        raise DataError(f"{path}: {len(texts)} lines are too few for a heading and rows of numbers")
+    raise DataError(f"{path}: line {lines.numbers[1]}: {texts[1].strip()[:60]!r} is not a row of numbers")
 
 
 def _reject_broken_row(path: Path, above: NumberedLines, form: layout.RowLayout, width: int) -> None:
@@ -142,26 +142,26 @@ def _reject_broken_row(path: Path, above: NumberedLines, form: layout.RowLayout,
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
     if may_be_row and not layout.is_unit_line(above.texts[-2:-1], form, width):
-        cure = f"mend it, or pass over what stands above the rows with Description.skip {above.numbers[-1]}"
+        cure = f"Correct it, or skip the lines above the table with Description.skip {above.numbers[-1]}."
         place = f"{path}: line {above.numbers[-1]}"
-        raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is no row of numbers; {cure}")
+        raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is not a row of numbers. {cure}")
 
 
 def _check_complete(
     path: Path, keys: Mapping[str, str], rows: NumberedLines, columns: Sequence[Column], text: str
 ) -> None:
     """Raise DataError where the last row is cut short, or a table of lobewatch differs from its heading."""
-    last, has_end = f"{path}: line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
+    last, has_end = f"{path}: truncated at line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
     if not has_end and any(column.values.size == len(rows.texts) - 1 for column in columns):
-        raise DataError(f"{last} ends within its row: the file is cut short; export it anew, or take out that line")
+        raise DataError(f"{last}, an incomplete row. Export the file again, or remove that line.")
     rows_written = keys.get("rows")
     if rows_written is None or keys.get("written by") != "lobewatch":
         return  # of another program, or of our first versions
-    cure = "convert it anew, or take out the line that begins with # rows"
+    cure = "Convert it again, or remove the line that begins with # rows."
     if rows_written != str(len(rows.texts)):
-        raise DataError(f"{last} ends row {len(rows.texts)} of {rows_written}: cut short or altered; {cure}")
+        raise DataError(f"{path}: {len(rows.texts)} of {rows_written} rows, truncated or edited. {cure}")
     if not has_end:
-        raise DataError(f"{last} has no line end, so that its last number may be cut short; {cure}")
+        raise DataError(f"{last}, which has no line end. {cure}")
 
 
 def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[str, str]) -> Contents:
@@ -170,7 +170,7 @@ def _make_table_contents(path: Path, signals: tuple[Signal, ...], keys: Mapping[
         created = datetime.fromisoformat(recorded).astimezone() if recorded else None
         n_averages = int(averages) if averages else None
     except ValueError as error:
-        raise DataError(f"{path}: {error} (lines that begin with #: {dict(keys)})") from error
+        raise DataError(f"{path}: {error} (# lines {dict(keys)})") from error
     return Contents(signals, n_averages, created, direction, tool, window=keys.get("window", ""))
 
 
@@ -179,7 +179,7 @@ _PULSE_DATE_PARTS = (("yyyy", "%Y"), ("yy", "%y"), ("MMM", "%b"), ("MM", "%m"), 
 
 
 def read_pulse(path: Path) -> Contents:
-    """Read the function of every block; raise DataError where it is cut short or its header states too little."""
+    """Read the function of every block; raise DataError if it is cut short or its header states too little."""
     lines, _ = number_lines(read_text(path), 0)
     blocks = _find_pulse_blocks(lines)
     pairs = (line.partition(":") for line in (lines.texts[: blocks[0][0]] if blocks else []))
@@ -188,14 +188,14 @@ def read_pulse(path: Path) -> Contents:
         is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
         form, sign = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
     except (KeyError, ValueError) as error:
-        raise DataError(f"{path}: its header lacks {error}, or no row follows it; export it anew") from error
+        raise DataError(f"{path}: no rows, or the header lacks {error}. Export it again.") from error
     signals = list[Signal]()
     for record, (first, after) in enumerate(blocks):
         columns = layout.read_columns(lines[first:after], form, str(path), sign)
         n_there = min(column.values.size for column in columns)
         if n_there != n:
             place = f"{path}: line {lines.numbers[after - 1]}"
-            raise DataError(f"{place}: {n_there} of {n} rows are there; the file is cut short")
+            raise DataError(f"{place}: truncated file, {n_there} of {n} rows. Export it again.")
         axis, *parts = (column.values for column in columns)
         function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
         flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
@@ -221,7 +221,7 @@ def _infer_pulse_role(header: Mapping[str, str], unit: str) -> Role:
 
 
 def _parse_pulse_date(header: Mapping[str, str]) -> datetime | None:
-    """Return date and time of the first block in the local time zone; None where they cannot be read."""
+    """Return date and time of the first block in the local time zone; None if they cannot be read."""
     pattern = header.get("date format", "")
     for part, directive in _PULSE_DATE_PARTS:
         pattern = re.sub(rf"(?<![%\w]){part}(?!\w)", directive, pattern)

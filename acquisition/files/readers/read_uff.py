@@ -30,7 +30,7 @@ class UffAxis:
     type: int
     """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
     unit: str
-    """Unit; empty where unknown."""
+    """Unit; empty if unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class UffFunction:
     name: str
     """Name for people: the measured points."""
     response_direction: int
-    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where unknown."""
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 if unknown."""
     reference_direction: int
     """Direction of the hammer in the same code."""
     place: tuple[object, ...]
@@ -69,14 +69,14 @@ class UffFunction:
 
     @property
     def averages(self) -> int | None:
-        """Number of averaged hits; None where unknown."""
+        """Number of averaged hits; None if unknown."""
         text = " ".join(self.lines)
         number = self.keys.get("averages", "") or "".join(re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", text)[:1])
         return int(number) if number.strip().isdigit() else None
 
     @property
     def window(self) -> str:
-        """Window over the response; empty where unknown."""
+        """Window over the response; empty if unknown."""
         match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
         return match[1].strip() if match else ""
 
@@ -87,7 +87,7 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
     for _ in range(12):
         end = content.find(b"\n", ends[-1])
         if end < 0:
-            raise DataError(f"{place}: {len(ends) - 1} of 12 header lines are there; it is cut short")
+            raise DataError(f"{place}: truncated header, {len(ends) - 1} of 12 lines. Export it again.")
         ends.append(end + 1)
     lines = [decode_utf8_or_latin1(content[a:b]).rstrip("\r\n") for a, b in pairwise(ends)]
     try:
@@ -97,7 +97,7 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
         if n < 1:
             raise ValueError(n)
     except (ValueError, KeyError) as error:
-        raise DataError(f"{place}: line 7 of its header cannot be read ({lines[7].strip()!r})") from error
+        raise DataError(f"{place}: line 7 of the header is invalid ({lines[7].strip()!r})") from error
     even, width = bool(spacing), per_value + (0 if spacing else 1)
     if lines[0].split()[0] == "58":
         numbers, after = _read_text_values(place, content, ends[-1], n * width)
@@ -152,9 +152,9 @@ def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[F
     numbers = _NUMBER_TOKEN.findall(body)
     strays = _NUMBER_TOKEN.sub(b"", body).split()
     if strays:
-        raise DataError(f"{place}: {strays[0][:20]!r} stands among its values")
+        raise DataError(f"{place}: {strays[0][:20]!r} is not a number")
     if len(numbers) != n or end < 0:
-        raise DataError(f"{place}: {len(numbers)} of {n} numbers are there; it is cut short or damaged")
+        raise DataError(f"{place}: truncated or damaged, {len(numbers)} of {n} numbers. Export it again.")
     return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in numbers]), begin + len(body)
 
 
@@ -166,13 +166,13 @@ def _read_binary_values(
     words = head.split()
     order, form = int(words[1]), int(words[2])
     if form != 2 or order not in (1, 2):
-        raise DataError(f"{place}: binary form {order} {form}; IEEE numbers (1 2 or 2 2) are read")
+        raise DataError(f"{place}: binary form {order} {form} is not supported. Export IEEE numbers (1 2 or 2 2).")
     sign, size = "<>"[order - 1], 4 if kind in (2, 5) else 8
     value = [("value", f"{sign}f{size}", (_NUMBERS_PER_VALUE[kind],))]
     row = np.dtype(value if even else [("abscissa", f"{sign}f{size}"), *value])
     body = content[begin : begin + n * row.itemsize]
     if len(body) < n * row.itemsize:
-        raise DataError(f"{place}: {len(body)} of {n * row.itemsize} bytes of values are there; it is cut short")
+        raise DataError(f"{place}: truncated, {len(body)} of {n * row.itemsize} bytes of values. Export it again.")
     table = np.frombuffer(body, row)
     parts = [table["value"]] if even else [table["abscissa"][:, None], table["value"]]
     return np.hstack(parts).astype(np.float64).ravel(), begin + len(body)
@@ -209,7 +209,7 @@ def read_uff(path: Path) -> Contents:
     signals = list(_make_frf_signals(sets, frfs)) if frfs else list(_make_time_signals(sets))
     if not signals:
         content = f"functions of type {', '.join(map(str, kinds))}" if kinds else "no data set 58"
-        raise DataError(f"{path}: holds {content}; FRFs (type 4) and signals over time (type 1) are read")
+        raise DataError(f"{path}: the file has {content}. Export FRFs (type 4) or signals over time (type 1).")
     first = frfs[0] if frfs else sets.functions[0]
     averages = {function.averages for function in frfs if function.averages}
     n_averages = averages.pop() if len(averages) == 1 else None
@@ -235,13 +235,13 @@ def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
             models |= {name: None} if name not in ("", "NONE") else {}
         closing = _DATA_SET_MARK.match(content, at)
         if closing is None:
-            raise DataError(f"{path}: its last data set has no end (-1); it is cut short or damaged")
+            raise DataError(f"{path}: truncated or damaged, the last data set has no end (-1). Export it again.")
         if kind == [b"164"]:
             code = re.match(rb"[^\n]*\n\s*(\d+)", content[begin:])
             system = _UNIT_SYSTEMS.get(int(code[1])) if code else None
         at = closing.end()
     if content[at:].strip():
-        raise DataError(f"{path}: {content[at:].strip()[:20]!r} stands behind its last data set; it is damaged")
+        raise DataError(f"{path}: damaged, {content[at:].strip()[:20]!r} follows the last data set. Export it again.")
     return UffDataSets(functions, system, tuple(models))
 
 
@@ -298,7 +298,7 @@ def _get_common_direction(sets: UffDataSets) -> str:
 def _list_notes(frfs: Sequence[UffFunction]) -> Iterator[str]:
     turned = sum(frf.response_direction * frf.reference_direction < 0 for frf in frfs)
     if turned:
-        yield f"{turned} FRF(s) of opposite directions, turned round"
+        yield f"sign changed of {turned} FRF(s) with opposite directions of hit and response"
     if any(abs(frf.response_direction) != abs(frf.reference_direction) and frf.reference_direction for frf in frfs):
         yield "hit and response differ in direction"
 

@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from acquisition.errors import DataError
+from acquisition.errors import DataError, join_sentences
 from acquisition.files.contents.column_headings import infer_role, is_unit, split_heading
 from acquisition.files.contents.units import parse_unit
 from acquisition.files.readers.number_format import Column, is_number, parse_columns
@@ -108,7 +108,7 @@ def read_columns(rows: NumberedLines, form: RowLayout, place: str, decimal_sign:
 
 
 def _split_cells_fast(form: RowLayout, rows: Sequence[str]) -> list[list[str]] | None:
-    """Split rows of the same layout at once; None where rows differ."""
+    """Split rows of the same layout at once; None if rows differ."""
     separator, n = (None if form.separator == BLANK_SEPARATOR else form.separator), len(form.columns)
     text = (separator or " ").join(rows)
     widths = {len(row.split()) for row in rows} if separator is None else {row.count(separator) + 1 for row in rows}
@@ -130,13 +130,13 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
         goes_on = goes_on and sum(map(is_number, row)) != width
         if is_short or goes_on:
             n = sum(map(is_number, row))
-            skip = f"pass over it with Description.skip {rows.numbers[0]}"
-            cure = "" if i else f"; {skip}, and name the columns with Description.columns"
-            raise DataError(f"{place}: line {rows.numbers[i]}: {n} numbers where other rows have {width}{cure}")
+            found = f"{place}: line {rows.numbers[i]}: {n} numbers, but the other rows have {width}"
+            skip = f"Skip it with Description.skip {rows.numbers[0]}"
+            raise DataError(join_sentences(found, "" if i else f"{skip}, and give Description.columns"))
 
 
 Heading = list[tuple[str, str]]
-"""Name and unit of each column; empty where unknown."""
+"""Name and unit of each column; empty if unknown."""
 _RATIO_LABEL = "Units: Ratio"
 _UNIT_PRODUCT = re.compile(r"(\(.+\))(\(.+\))")
 _LETTER = re.compile(r"[^\W\d_]")
@@ -189,7 +189,7 @@ def is_unit_line(lines: Sequence[str], form: RowLayout, width: int) -> bool:
 
 
 def _split_words(line: str, form: RowLayout, width: int) -> list[str]:
-    """Split a line into a word per column with any separator; empty where there are more or fewer words."""
+    """Split a line into a word per column with any separator; empty if there are more or fewer words."""
     joined = _SPACE_BEFORE_BRACKET.sub("", line)
     for separator in (form.separator, "\t", ";", ",", "[ \t]{2,}", BLANK_SEPARATOR):
         if separator in ",;\t":

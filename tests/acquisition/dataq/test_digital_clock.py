@@ -98,14 +98,14 @@ def test_bytes_that_are_lost_are_reported_once() -> None:
 
 @pytest.mark.parametrize("period", [3.0, 150.0, np.inf])
 def test_a_wave_that_cannot_be_followed_is_rejected(period: float) -> None:
-    with pytest.raises(DeviceError, match=r"digital input 0 of the DAQ has no even square wave.*6 to 100 scans"):
+    with pytest.raises(DeviceError, match=r"digital input 0.* 6 to 100 "):
         decoded(scans(period).tobytes(), [])
 
 
 def test_a_generator_that_is_unplugged_is_reported() -> None:
     words = scans(50.0)
     words[2000:, 2] |= 0x0100
-    with pytest.raises(DeviceError, match="connect the generator again"):
+    with pytest.raises(DeviceError, match=r"digital input 0.* digital_clock"):
         decoded(words.tobytes(), [])
 
 
@@ -113,5 +113,5 @@ def test_an_uneven_wave_is_rejected() -> None:
     words = scans(50.0)
     high = np.repeat(np.random.default_rng(2).random(N // 10) < 0.5, 10)
     words[:, 2] = 0x7E00 + 0x0100 * high
-    with pytest.raises(DeviceError, match="no even square wave"):
+    with pytest.raises(DeviceError, match="digital input 0"):
         decoded(words.tobytes(), [])

@@ -129,26 +129,24 @@ def test_a_command_without_its_echo_is_sent_three_times() -> None:
 def test_a_rejected_command_is_reported_with_the_words_of_the_device(answer: bytes) -> None:
     script = [*IDENTITY, *SET_UP[:2], *[(b"slist 1 1027\r", answer)] * 3]
     words = answer.decode().strip()
-    with pytest.raises(DeviceError, match=rf"COM9 does not take 'slist 1 1027' \(3 tries\); it says '{words}'"):
+    with pytest.raises(DeviceError, match=rf"COM9.*'slist 1 1027'.*'{words}'.*3"):
         connect(script)
 
 
 def test_a_silent_device_gets_the_hint_to_cdc_mode() -> None:
-    with pytest.raises(
-        DeviceError, match=r"no DATAQ device answers on COM9 \(info 0, 3 tries\); its LED must blink ye"
-    ):
+    with pytest.raises(DeviceError, match=r"COM9.*info 0, 3 .*CDC"):
         connect([IDENTITY[0], *[(b"info 0\r", b"")] * 3])
 
 
 @pytest.mark.parametrize(
     ("at", "answer", "message"),
     [
-        (1, b"info 0 ACME\r", "maker 'ACME' is not DATAQ"),
-        (2, b"info 1 1100\r", "model '1100' is none of DI-1120, DI-2108"),
-        (3, b"info 2 1.20\r", "has firmware 1.20; 1.35 or newer is needed"),
-        (3, b"info 2 78\r", "has firmware 1.20; 1.35 or newer is needed"),
-        (4, b"info 6\r", "it names no serial number"),
-        (5, b"info 9 fast\r", "is none that this driver knows"),
+        (1, b"info 0 ACME\r", "'ACME'"),
+        (2, b"info 1 1100\r", "'1100'.* DI-1120, DI-2108"),
+        (3, b"info 2 1.20\r", r"1\.20.* 1\.35 "),
+        (3, b"info 2 78\r", r"1\.20.* 1\.35 "),
+        (4, b"info 6\r", "serial number"),
+        (5, b"info 9 fast\r", "'fast'"),
     ],
 )
 def test_a_device_that_cannot_be_used_is_rejected(at: int, answer: bytes, message: str) -> None:
@@ -161,7 +159,7 @@ def test_a_device_that_cannot_be_used_is_rejected(at: int, answer: bytes, messag
 def test_a_range_that_the_model_does_not_have_is_rejected() -> None:
     script = list(IDENTITY)
     script[2] = (b"info 1\r", b"info 1 DI-4208\r")
-    with pytest.raises(ValueError, match=r"range_v=0.5 is no range of the DI-4208; it has \+-100, 50, 20, 10, 5, 2 V"):
+    with pytest.raises(ValueError, match=r"range_v=0\.5 .*DI-4208 .*100, 50, 20, 10, 5, 2 V"):
         connect(script)
 
 
@@ -189,7 +187,7 @@ def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_rejec
         assert 375 <= chosen.srate <= 65_535
         assert 1 <= chosen.dec <= 512
         assert 1 <= chosen.deca <= 40_000
-    with pytest.raises(ValueError, match=r"sample rate 200000 Hz is not between .* and 160000 Hz"):
+    with pytest.raises(ValueError, match=r"200000 Hz .*160000 Hz"):
         choose_rate(200_000.0, 60_000_000)
 
 
@@ -211,7 +209,7 @@ def test_small_facts_of_the_protocol() -> None:
     assert [parse_firmware(text) for text in ("1.35", "87", "newest")] == [1.35, 1.35, None]
     assert [encode_range("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
     assert [encode_range("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]
-    with pytest.raises(ValueError, match="input=8 is none of 0 to 7"):
+    with pytest.raises(ValueError, match=r"input=8 .*0 to 7"):
         DataqSource("COM9", (replace(INPUTS[0], number=8),))
-    with pytest.raises(ValueError, match=r"inputs \[0, 0\] of a DATAQ device must be different"):
+    with pytest.raises(ValueError, match=r"inputs \[0, 0\]"):
         DataqSource("COM9", (INPUTS[0], INPUTS[0]))

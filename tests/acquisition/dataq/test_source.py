@@ -246,13 +246,13 @@ def test_a_device_that_never_stops_is_rejected(emulated: Make, monkeypatch: pyte
     monkeypatch.setattr("acquisition.dataq.protocol.MAX_DRAIN_TIME", 0.2)
     with (
         emulated(streaming_at_connect=True, ignores_commands=True) as device,
-        pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),
+        pytest.raises(DeviceError, match="3 tries"),
     ):
         DataqSource(device.port, INPUTS, RATE)
 
 
 def test_old_firmware_is_rejected(emulated: Make) -> None:
-    with emulated(firmware="1.34") as device, pytest.raises(DeviceError, match=r"firmware 1\.34; 1\.35 or newer"):
+    with emulated(firmware="1.34") as device, pytest.raises(DeviceError, match=r"1\.34.* 1\.35 "):
         DataqSource(device.port, INPUTS, RATE)
 
 
@@ -260,14 +260,14 @@ def test_a_silent_device_is_given_up(emulated: Make, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("acquisition.dataq.source.SILENCE_TIMEOUT", 0.3)
     with emulated(stall_after=9000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
-        with pytest.raises(DeviceError, match=r"has sent no samples for 0\.3 s; switch it off and on"):
+        with pytest.raises(DeviceError, match=r"no samples .*0\.3 s"):
             list(source.blocks())
 
 
 def test_hanging_up_is_reported_in_one_sentence(emulated: Make) -> None:
     with emulated(unplug_after=9000) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
-        with pytest.raises(DeviceError, match="unplugged or switched off"):
+        with pytest.raises(DeviceError, match="unplugged"):
             list(source.blocks())
 
 
@@ -275,7 +275,7 @@ def test_digital_inputs_that_do_not_hold_still_are_reported(emulated: Make, monk
     monkeypatch.setattr("acquisition.dataq.source.SILENCE_TIMEOUT", 0.3)
     with emulated(digital_word=0x0001) as device, DataqSource(device.port, INPUTS, RATE) as source:
         source.start()
-        with pytest.raises(DeviceError, match=r"do not hold still.*loss_detection = false"):
+        with pytest.raises(DeviceError, match=r"digital inputs .*loss_detection = false"):
             list(source.blocks())
 
 
@@ -384,7 +384,7 @@ def test_a_port_in_use_is_rejected_with_the_cure(emulated: Make) -> None:
     with (
         emulated() as device,
         DataqSource(device.port, INPUTS, RATE),
-        pytest.raises(DeviceError, match="another program uses it"),
+        pytest.raises(DeviceError, match="fuser"),
     ):
         DataqSource(device.port, INPUTS, RATE)
 
@@ -407,5 +407,5 @@ def test_a_clock_shows_the_loss_of_whole_scans(emulated: Make, signal_at: Signal
 def test_a_clock_that_is_not_there_is_reported(emulated: Make) -> None:
     with emulated() as device, DataqSource(device.port, INPUTS, RATE, digital_clock=True) as source:
         source.start()
-        with pytest.raises(DeviceError, match="digital input 0 of the DAQ has no even square wave"):
+        with pytest.raises(DeviceError, match="digital input 0"):
             take(source, 5000)

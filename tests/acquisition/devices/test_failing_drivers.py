@@ -29,8 +29,6 @@ from acquisition.devices.registry import convert_driver_errors
 from acquisition.ports import SerialLink
 
 WHO = DeviceIdentity("X", "1", "2")
-FAILS = "fails when asked who is on PORT "
-TEXTS = " when asked who is on PORT, not a DeviceIdentity of texts"
 METADATA = "Metadata-Version: 2.1\nName: bad-daq\nVersion: 1.0\n"
 
 
@@ -90,19 +88,19 @@ def answering(link: SerialLink) -> DeviceIdentity:
 @pytest.mark.parametrize(
     ("probe", "reason"),
     [
-        (raising(KeyError("model")), FAILS + "(KeyError: 'model')"),
-        (raising(ValueError("two\nlines")), FAILS + "(ValueError: two lines)"),
-        (raising(SystemExit("enough")), FAILS + "(SystemExit: enough)"),
-        (raising(KeyboardInterrupt()), FAILS + "(KeyboardInterrupt)"),
-        (raising(Stranger()), FAILS + "(test_failing_drivers.Stranger)"),
-        (raising(UnprintableError()), FAILS + "(test_failing_drivers.UnprintableError: <exception str() failed>)"),
-        (closing, FAILS + "(KeyError: 'link')"),
-        (lambda _: "X 1 2", "answers str" + TEXTS),
-        (lambda _: ("X", "1", "2"), "answers tuple" + TEXTS),
-        (lambda _: DeviceIdentity, "answers type" + TEXTS),
-        (lambda _: DeviceIdentity(None), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
-        (lambda _: DeviceIdentity("X", 17), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
-        (lambda _: DeviceIdentity("X", b"1"), "answers DeviceIdentity" + TEXTS),  # type: ignore[arg-type]
+        (raising(KeyError("model")), "(KeyError: 'model')"),
+        (raising(ValueError("two\nlines")), "(ValueError: two lines)"),
+        (raising(SystemExit("enough")), "(SystemExit: enough)"),
+        (raising(KeyboardInterrupt()), "(KeyboardInterrupt)"),
+        (raising(Stranger()), "(test_failing_drivers.Stranger)"),
+        (raising(UnprintableError()), "(test_failing_drivers.UnprintableError: <exception str() failed>)"),
+        (closing, "(KeyError: 'link')"),
+        (lambda _: "X 1 2", "str"),
+        (lambda _: ("X", "1", "2"), "tuple"),
+        (lambda _: DeviceIdentity, "type"),
+        (lambda _: DeviceIdentity(None), "DeviceIdentity"),  # type: ignore[arg-type]
+        (lambda _: DeviceIdentity("X", 17), "DeviceIdentity"),  # type: ignore[arg-type]
+        (lambda _: DeviceIdentity("X", b"1"), "DeviceIdentity"),  # type: ignore[arg-type]
     ],
 )  # fmt: skip
 def test_a_probe_that_fails_or_talks_rubbish_is_named_and_the_next_is_asked(
@@ -112,10 +110,10 @@ def test_a_probe_that_fails_or_talks_rubbish_is_named_and_the_next_is_asked(
     found = probe_port(port, [driver("bad", probe), driver("good", answering)], None, remarks)
     assert found is not None
     assert (found.driver, found.identity) == ("good", WHO)
-    reason = f"the package bad-daq {reason}; update or remove that package".replace("PORT", port)
-    assert [(remark.code, str(remark).replace("tests.acquisition.devices.", "")) for remark in remarks] == [
-        ("package-not-loaded", f"driver 'bad': {reason}")
-    ]
+    (remark,) = remarks
+    assert (remark.code, remark.about) == ("package-not-loaded", "driver 'bad'")
+    text = remark.text.replace("tests.acquisition.devices.", "")
+    assert all(fact in text for fact in ("bad-daq", port, reason)), text
 
 
 def test_a_probe_that_hangs_is_left_behind(port: str, bad_daq: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,9 +123,9 @@ def test_a_probe_that_hangs_is_left_behind(port: str, bad_daq: None, monkeypatch
     end.set()
     assert found is not None
     assert found.driver == "good"
-    assert [remark.text for remark in remarks] == [
-        f"the package bad-daq has not answered within 0.2 s who is on {port}"
-    ]
+    (remark,) = remarks
+    assert remark.code == "package-not-loaded"
+    assert all(fact in remark.text for fact in ("bad-daq", "0.2 s", port)), remark.text
 
 
 def test_a_probe_that_says_the_device_is_gone_ends_nothing(port: str) -> None:
@@ -139,22 +137,22 @@ def test_a_probe_that_says_the_device_is_gone_ends_nothing(port: str) -> None:
 
 def test_ports_goes_on_without_a_package_that_ends_the_program_when_loaded(port: str, bad_daq: None) -> None:
     survey = scan_ports(port)
-    assert [seen.text for seen in survey.ports] == ["no answer"]
-    assert [remark.text for remark in survey.remarks] == [
-        "the package bad-daq cannot be loaded (SystemExit: not today)"
-    ]
+    assert [(seen.answer, seen.failure) for seen in survey.ports] == [(None, None)]
+    (remark,) = survey.remarks
+    assert remark.code == "package-not-loaded"
+    assert all(fact in remark.text for fact in ("bad-daq", "SystemExit: not today")), remark.text
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
 def test_settings_that_make_a_driver_fail_are_rejected_with_its_package(bad_daq: None, error: BaseException) -> None:
-    with pytest.raises(DataError, match=r"driver 'bad': the package bad-daq fails when checking \[daq\] \(.*update or"):
+    with pytest.raises(DataError, match=rf"driver 'bad': .*bad-daq .*\[daq\] \({type(error).__name__}"):
         check_settings(driver("bad", lambda _: None, check=raising(error)), DeviceSettings())
 
 
 @pytest.mark.parametrize("error", [KeyError("x"), SystemExit(0), RuntimeError("a\nb")])
 def test_a_driver_that_fails_when_opened_is_a_device_that_is_not_there(bad_daq: None, error: BaseException) -> None:
     with (
-        pytest.raises(DeviceError, match="the package bad-daq fails when opening COM1"),
+        pytest.raises(DeviceError, match=rf"bad-daq .*opening COM1 .*{type(error).__name__}"),
         convert_driver_errors("bad", "opening COM1"),
     ):
         raise error

@@ -57,10 +57,10 @@ def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("no_such_module:DRIVER", "cannot be loaded (ModuleNotFoundError: No module named 'no_such_module')"),
-        ("acquisition.devices.drivers:NOTHING", "cannot be loaded (AttributeError: "),
-        ("acquisition.devices.registry:DRIVER_ENTRY_POINTS", "of the package bad is no acquisition.Driver"),
-        ("acquisition.devices.drivers:BUILT_IN_DRIVERS.__class__", "of the package bad is no acquisition.Driver"),
+        ("no_such_module:DRIVER", "ModuleNotFoundError: No module named 'no_such_module'"),
+        ("acquisition.devices.drivers:NOTHING", "AttributeError: "),
+        ("acquisition.devices.registry:DRIVER_ENTRY_POINTS", "acquisition.Driver"),
+        ("acquisition.devices.drivers:BUILT_IN_DRIVERS.__class__", "acquisition.Driver"),
     ],
 )
 def test_what_is_no_driver_is_rejected_with_the_name_of_its_package(
@@ -70,8 +70,8 @@ def test_what_is_no_driver_is_rejected_with_the_name_of_its_package(
     with pytest.raises(DataError) as caught:
         find_driver("odd")
     assert str(caught.value).startswith("driver 'odd': ")
+    assert "package bad " in str(caught.value)
     assert message in str(caught.value)
-    assert str(caught.value).endswith("; update or remove that package")
     drivers, (remark,) = load_drivers()
     assert drivers == BUILT_IN_DRIVERS
     assert (remark.code, str(remark)) == ("package-not-loaded", str(caught.value))
@@ -80,19 +80,19 @@ def test_what_is_no_driver_is_rejected_with_the_name_of_its_package(
 def test_a_driver_under_another_name_is_rejected(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
     install("liar", "lobewatch_dummy_device:DRIVER")
-    with pytest.raises(DataError, match="driver 'odd': the package liar calls it 'dummy' elsewhere"):
+    with pytest.raises(DataError, match=r"driver 'odd': .*liar .*'dummy'"):
         find_driver("odd")
 
 
 def test_two_packages_with_one_driver_are_both_named(install: Install) -> None:
     install("first", "a:b")
     install("second", "c:d")
-    with pytest.raises(DataError, match="the packages first and second both bring it; remove one of them"):
+    with pytest.raises(DataError, match=r"driver 'odd': .*first and second"):
         find_driver("odd")
 
 
 def test_a_name_that_nobody_brings() -> None:
-    with pytest.raises(DataError, match=r"driver='odd' is none of taps, dataq, .*ljm; correct the name, or install"):
+    with pytest.raises(DataError, match=r"driver='odd' .*taps, dataq, .*ljm"):
         find_driver("odd")
 
 

@@ -152,13 +152,13 @@ def test_zero_hertz_is_left_out_and_forms_agree() -> None:
 
 def test_bad_calls_are_rejected(tapper: Tapper, channels: Pair) -> None:
     (hit,) = hits(tapper, channels, 1)
-    with pytest.raises(ValueError, match="no hit to average"):
+    with pytest.raises(ValueError, match="0 hits"):
         estimate_frf([])
-    with pytest.raises(ValueError, match="'H3' is none of H1, H2, Hv"):
+    with pytest.raises(ValueError, match=r"'H3' .*H1, H2, Hv"):
         estimate_frf([hit], "H3")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="differ in length or sample rate"):
+    with pytest.raises(ValueError, match=r"\(\d+, \d+\.0\), \(\d+, \d+\.0\)"):
         estimate_frf([hit, replace(hit, sample_rate=51200.0)])
-    with pytest.raises(ValueError, match="no force pulse"):
+    with pytest.raises(ValueError, match="pulse"):
         estimate_frf([replace(hit, force=np.zeros(6400))])
 
 
@@ -167,10 +167,10 @@ def test_bad_calls_are_rejected(tapper: Tapper, channels: Pair) -> None:
     [
         (([1.0, 2.0], [1.0, np.nan]), "not finite at 1 lines, first at 2 Hz"),
         (([1.0, 2.0], [1.0, 1e60]), "larger than 1e\\+50 at 1 lines, first at 2 Hz"),
-        (([1.0, 2.0], [1.0]), "differ in shape"),
-        (([2.0, 1.0], [1.0, 1.0]), "strictly rising"),
-        (([1.0], [1.0]), "at least 2 lines"),
-        (([1.0, 2.0], [1.0, 1.0], [0.5, 1.5]), "coherence must lie between 0 and 1"),
+        (([1.0, 2.0], [1.0]), r"\(1,\) .*\(2,\)"),
+        (([2.0, 1.0], [1.0, 1.0]), "frequency"),
+        (([1.0], [1.0]), r"2 lines.*\(1,\)"),
+        (([1.0, 2.0], [1.0, 1.0], [0.5, 1.5]), "coherence .*0 and 1"),
         (([1.0, 2.0], [1.0, 1.0], [0.5]), "coherence"),
         (([1.0, 2.0], [1.0, 1.0], None, 0), "n_averages=0"),
         (([1.0, 2.0], [1.0, 1.0], None, 1, "compliance"), "measured_as='compliance'"),
@@ -182,5 +182,5 @@ def test_an_frf_that_is_none_is_rejected(arguments: tuple[object, ...], message:
 
 
 def test_a_band_outside_the_axis_is_rejected() -> None:
-    with pytest.raises(ValueError, match=r"band 10\.\.20 Hz holds 0 lines"):
+    with pytest.raises(ValueError, match=r"band 10\.\.20 Hz .*0 lines"):
         Frf(np.array([1.0, 2.0]), np.array([1.0, 1.0])).in_band((10.0, 20.0))

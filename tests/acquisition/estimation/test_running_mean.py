@@ -119,11 +119,11 @@ def test_noise_keeps_it_from_settling() -> None:
 def test_what_cannot_join_or_leave_is_rejected() -> None:
     mean = mean_of([pulse(1.0)])
     other = Hit(np.r_[pulse(1.0).force, 0.0], np.r_[pulse(1.0).acceleration, 0.0], 1024.0)
-    with pytest.raises(ValueError, match="1025 samples at 1024 Hz cannot join a mean of hits of 1024 samples"):
+    with pytest.raises(ValueError, match=r"1025 samples at 1024 Hz .*1024 samples"):
         mean.add(other)
     with pytest.raises(ValueError, match="not in the mean"):
         mean.remove(pulse(1.0))
     silent: NDArray[np.float64] = np.zeros(1024)
-    with pytest.raises(ValueError, match="no force pulse"):
+    with pytest.raises(ValueError, match="pulse"):
         mean.add(Hit(silent, silent, 1024.0))
     assert len(mean.hits) == 1

@@ -110,11 +110,11 @@ def test_a_tap_file_becomes_each_format(tmp_path: Path) -> None:
         assert back.frf is not None
         assert back.frf.receptance == pytest.approx(frf.receptance, rel=1e-10)
         assert (back.direction, back.tool, back.created) == ("y", "cutter", WHEN)
-    with pytest.raises(DataError, match="holds an FRF, not the hits"):
+    with pytest.raises(DataError, match=r"FRF.*\.uff, \.unv, \.csv, \.mat"):
         convert(tap, tmp_path / "out.json", NOTHING)
-    with pytest.raises(ValueError, match=r"out\.xyz: files that end with \.uff"):
+    with pytest.raises(ValueError, match=r"out\.xyz: '\.xyz' .*\.uff, \.unv, \.csv, \.mat, \.json"):
         convert(tap, tmp_path / "out.xyz", NOTHING)
-    with pytest.raises(ValueError, match="the file that is read"):
+    with pytest.raises(ValueError, match="input file"):
         convert(tmp_path / "out.csv", tmp_path / "out.csv", NOTHING)
 
 
@@ -143,8 +143,8 @@ def test_sep005_in_g_is_converted_and_without_a_unit_asked_for(tmp_path: Path) -
     assert read_hits(path)[0].acceleration == pytest.approx(hit.acceleration * 9.80665)
     channels[1]["unit_str"] = ""
     path.write_text(json.dumps(channels))
-    assert "the unit of acc (Description.unit" in inspect_file(path).problems
+    assert "unit of acc (Description.unit" in inspect_file(path).problems
     del channels[1]["fs"]
     path.write_text(json.dumps(channels))
-    with pytest.raises(DataError, match="channel 2 has no fs"):
+    with pytest.raises(DataError, match=r"channel 2 .*fs"):
         inspect_file(path)

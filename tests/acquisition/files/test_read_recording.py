@@ -41,7 +41,7 @@ def test_real_cnc_table_is_rejected_with_all_its_faults(cnc_csv: Path) -> None:
     message = str(caught.value)
     assert "no force channel" in message
     assert "uneven" in message
-    assert "unit of accel_y in doubt" in message
+    assert "column accel_y has the unit g" in message
     assert "\n" not in message
 
 
@@ -72,11 +72,11 @@ def test_columns_are_distinguished_by_their_units_not_their_order(tmp_path: Path
 def test_the_unit_of_time_is_read_and_never_guessed(tmp_path: Path) -> None:
     in_ms = table(tmp_path / "ms.csv", "time_ms,force_N,acc_g", TIME * 1e3, FORCE, ACCELERATION)
     assert read_hits(in_ms)[0].sample_rate == pytest.approx(RATE)
-    with pytest.raises(DataError, match="its sample rate, or the unit of its time"):
+    with pytest.raises(DataError, match=r"Description.rate"):
         read_hits(table(tmp_path / "none.csv", "time,force_N,acc_g", TIME, FORCE, ACCELERATION))
     in_khz = table(tmp_path / "frf.csv", "Freq (kHz),Real (m/N),Imag", TIME + 1, FORCE, FORCE)
     assert read_frf(in_khz).frequency == pytest.approx(1e3 * (TIME + 1))
-    with pytest.raises(DataError, match="the frequency is in 'ms'; Hz, kHz and rad/s are known"):
+    with pytest.raises(DataError, match=r"'ms' .*Hz, kHz, rad/s"):
         read_frf(table(tmp_path / "ms.csv", "Freq (ms),Real (m/N),Imag", TIME + 1, FORCE, FORCE))
 
 
@@ -94,13 +94,11 @@ def test_swapped_columns_are_rejected(tmp_path: Path) -> None:
 def test_an_frf_table_without_a_unit_is_asked_for_it(tmp_path: Path) -> None:
     frequency = np.arange(1.0, 50.0)
     path = table(tmp_path / "frf.txt", "Freq Real Imag", frequency, 1e-6 / frequency, -2e-6 / frequency, separator=" ")
-    with pytest.raises(
-        DataError, match=r"does not say: the unit of Real \(Description.unit, such as m/N, um/N, g/N\)$"
-    ):
+    with pytest.raises(DataError, match=r"unit of Real \(Description.unit, such as m/N, um/N, g/N\)$"):
         read_frf(path)
     frf = read_frf(path, Description(unit="m/N"))
     assert frf.receptance == pytest.approx((1e-6 - 2e-6j) / frequency)
-    with pytest.raises(DataError, match="holds an FRF"):
+    with pytest.raises(DataError, match=r"\.txt: .*FRF"):
         read_hits(path, Description(unit="m/N"))
 
 
@@ -113,18 +111,18 @@ def write(path: Path, text: str) -> Path:
     ("text", "message"),
     [
         ("", "the file is empty"),
-        ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
+        ("time_s,force_N,acc_g\n", "1 lines"),
         (
             "time_s,force_N,acc_g\n0,1,x\n",
-            "acc holds 'x' in line 2, which is no number; mend it there, or leave acc out of Description.columns",
+            "acc has 'x' in line 2, .*acc .*Description.columns",
         ),
-        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n0.2,1,2\n", "line 3: 2 numbers where other rows have 3"),
+        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n0.2,1,2\n", "line 3: 2 .*3"),
         ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),
-        ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples; at least 8 are needed"),
-        ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "Imag holds 'nan' in line 2"),
+        ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples .*8"),
+        ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "Imag has 'nan' in line 2"),
         (
             "\x00\x01\x02garbage",
-            r"of no format that is known here; export it as one of these: tap file of lobewatch \(\.h5\), univ",
+            r"tap file of lobewatch \(\.h5\), univ",
         ),
     ],
 )
@@ -139,7 +137,7 @@ def test_nan_in_a_hit_is_rejected_with_the_file(tmp_path: Path) -> None:
     broken = FORCE.copy()
     broken[77] = np.nan
     path = table(tmp_path / "nan.csv", "time_s,force_N,acc_g", TIME, broken, ACCELERATION)
-    with pytest.raises(DataError, match=r"nan\.csv.*force holds 'nan' in line 79"):
+    with pytest.raises(DataError, match=r"nan\.csv.*force has 'nan' in line 79"):
         read_hits(path)
 
 
@@ -154,20 +152,20 @@ def test_an_lvm_that_was_saved_in_another_encoding_is_the_same(beam: Path, tmp_p
 
 def test_a_truncated_lvm_is_rejected(beam: Path, tmp_path: Path) -> None:
     lines = beam.read_text(encoding="latin-1").splitlines()
-    with pytest.raises(DataError, match="9977 of 50030 samples are there; the file is cut short"):
+    with pytest.raises(DataError, match="9977 of 50030 samples"):
         read_hits(write(tmp_path / "cut.lvm", "\n".join(lines[:10000])))
-    with pytest.raises(DataError, match="is it cut short"):
+    with pytest.raises(DataError, match="1 of at least 2 header ends"):
         read_hits(write(tmp_path / "head.lvm", "\n".join(lines[:15])))
-    with pytest.raises(DataError, match="line 13: the segment's header lacks"):
+    with pytest.raises(DataError, match=r"line 13: .*Delta_X"):
         read_hits(write(tmp_path / "bad.lvm", "\n".join(line.replace("Delta_X", "Delta") for line in lines)))
     garbled = [*lines[:5000], "\tabc\t1,0", *lines[5001:]]
-    with pytest.raises(DataError, match="holds 'abc' in line 5001"):
+    with pytest.raises(DataError, match="'abc' in line 5001"):
         read_hits(write(tmp_path / "garbled.lvm", "\n".join(garbled)))
 
 
 def test_an_lvm_in_an_unknown_unit_or_without_force_is_rejected(beam: Path, tmp_path: Path) -> None:
     text = beam.read_text(encoding="latin-1")
-    with pytest.raises(DataError, match="Force is in 'Pascal', which is not known here as its unit"):
+    with pytest.raises(DataError, match="'Pascal' of Force"):
         read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Pascal")))
     with pytest.raises(DataError, match="no force channel among"):
         read_hits(write(tmp_path / "b.lvm", text.replace("Newtons", "g").replace("Force", "Top")))

@@ -177,7 +177,7 @@ def test_an_altered_hit_in_progress_is_reported_before_hdf5_sees_it(
     content[place] ^= 4
     path.write_bytes(content)
     monkeypatch.setattr(h5py, "File", None)
-    with pytest.raises(DataError, match=r"0000\.h5: altered since it was written"):
+    with pytest.raises(DataError, match=r"0000\.h5: .*SHA-256"):
         read_tap_hits(path)
 
 
@@ -207,16 +207,16 @@ def test_a_small_file_that_unpacks_to_much_is_rejected_unread(tap: TapTest, tmp_
         file.create_dataset("raw/codes", shape, np.int16, maxshape=limits, chunks=chunk, compression="gzip")
     assert (tmp_path / "bomb.h5").stat().st_size < 1_000_000
     for read in (read_tap, read_tap_hits, read_frf):
-        with pytest.raises(DataError, match=r"bomb\.h5: .* MB that unpack to (800|1.6e\+04)"):
+        with pytest.raises(DataError, match=r"bomb\.h5: .* MB .* (800|1\.6e\+04)"):
             read(tmp_path / "bomb.h5")
 
 
 def test_foreign_hdf5_is_no_tap_test(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
-    with pytest.raises(DataError, match="no tap test of lobewatch"):
+    with pytest.raises(DataError, match="lobewatch-tap"):
         read_tap(tmp_path / "other.h5")
-    with pytest.raises(DataError, match="holds no columns of numbers"):
+    with pytest.raises(DataError, match="no columns"):
         read_frf(tmp_path / "other.h5")
 
 

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, DataError, HammeredStructure, Hit, HitFlags, average_good_hits, check_hit, read_hits
+from acquisition.hit_fault import HIT_FAULTS
 
 RATE = 25600.0
 TIME = np.arange(6400) / RATE - 0.02
@@ -136,10 +137,10 @@ def test_real_clean_hit_is_good_and_real_clipped_hit_is_rejected(beam: Path, cli
 def test_flags_print_as_words_with_the_cure() -> None:
     both = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
     assert both.words == "double hit, overload (force)"
-    assert "Let the hammer bounce back" in str(both)
+    assert HIT_FAULTS[HitFlags.DOUBLE_HIT].remedy in str(both)
     assert HitFlags.from_words(both.words) == both
     assert not HitFlags.from_words(HitFlags.OK.words)
-    with pytest.raises(ValueError, match="no hit verdict"):
+    with pytest.raises(ValueError, match=r"'bad luck' .*double hit"):
         HitFlags.from_words("bad luck")
 
 
@@ -149,12 +150,12 @@ def test_flags_print_as_words_with_the_cure() -> None:
 def test_a_record_with_nan_or_inf_or_what_no_sensor_measures_is_rejected(broken: float, flaw: str) -> None:
     force = pulse(200)
     force[700] = broken
-    with pytest.raises(ValueError, match=rf"force is {flaw} at 1 samples, first at sample 700"):
+    with pytest.raises(ValueError, match=rf"force .*{flaw} .*1 samples.* 700"):
         Hit(force, force, RATE)
 
 
 def test_records_of_different_length_and_wrong_rates_are_rejected() -> None:
-    with pytest.raises(ValueError, match="equal length"):
+    with pytest.raises(ValueError, match=r"force \(\d+,\) .*acceleration \(\d+,\)"):
         Hit(np.zeros(100), np.zeros(99), RATE)
     with pytest.raises(ValueError, match="sample_rate=0"):
         Hit(np.zeros(100), np.zeros(100), 0.0)

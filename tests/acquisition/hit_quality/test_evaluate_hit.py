@@ -64,10 +64,7 @@ def test_a_good_hit_has_no_reason() -> None:
 def test_a_double_hit_is_reported_with_its_time_and_size(start: float, when: str) -> None:
     verdict = evaluate_hit(hit((200, 0, 0.6e-3), (36, start, 0.6e-3)))
     assert verdict.flags == HitFlags.DOUBLE_HIT
-    told = re.fullmatch(
-        rf"Second peak {when} the main one \((\d+) %\): let the hammer bounce back after the first touch\.",
-        verdict.text,
-    )
+    told = re.fullmatch(rf".*\b{when} .*\((\d+) %\).*", verdict.text)
     assert told is not None
     assert int(told[1]) == pytest.approx(18, abs=1)
 
@@ -98,12 +95,14 @@ def test_strength_is_evaluated_against_the_range() -> None:
     assert evaluate_hit(coded(hit((200, 0, 0.6e-3)), 230)).flags == HitFlags.OK
     hard = evaluate_hit(coded(hit((200, 0, 0.6e-3)), 205))
     assert hard.flags == HitFlags.TOO_HARD
-    assert "97% of the range of 205 N: hit softer or choose a larger force range." in hard.text
+    assert "97% of the range of 205 N" in hard.text
+    assert HitFlags.TOO_HARD.cure in hard.text
     soft = evaluate_hit(coded(hit((200, 0, 0.6e-3)), 12_000))
-    assert soft.text == "Peak of 198.1 N is below 2% of the range of 12000 N: hit harder."
+    assert soft.flags == HitFlags.TOO_SOFT
+    assert all(figure in soft.text for figure in ("198.1 N", "2%", "12000 N"))
     noisy = evaluate_hit(hit((60, 0, 0.6e-3), noise=5.0))
     assert noisy.flags == HitFlags.TOO_SOFT
-    assert "below 20 times the noise" in noisy.text
+    assert "20 times the noise" in noisy.text
 
 
 @pytest.mark.parametrize(("bits", "range_over_peak"), [(12, 10), (14, 5)])
@@ -128,7 +127,8 @@ def test_a_force_that_begins_20_db_below_its_largest_value_reaches_no_line(hits:
     assert check_hit(swinging) == HitFlags.OK
     for verdict in (evaluate_hit(swinging, estimate_frf(hits[:3])), evaluate_hit(swinging, band=(500.0, 2000.0))):
         assert verdict.flags == HitFlags.TOO_SOFT
-        assert verdict.text == "The force at 4 Hz is 20 dB below its largest value: no line can be used: hit harder."
+        assert "20 dB" in verdict.text
+        assert " 4 Hz" in verdict.text
 
 
 def test_clipped_is_not_too_hard_as_well() -> None:
@@ -139,18 +139,18 @@ def test_overload_is_certain_by_codes_and_inferred_by_shape() -> None:
     loud = hit((200, 0, 2e-3))
     certain = evaluate_hit(coded(loud, 120))
     assert "inferred" not in certain.text
-    assert "Force cut off at 120 N" in certain.text
+    assert "120 N" in certain.text
     noise = 0.1 * np.random.default_rng(7).normal(size=TIME.size)
     saturated = evaluate_hit(replace(loud, force=np.minimum(loud.force, 120) + noise))
     assert saturated.flags == HitFlags.OVERLOAD_FORCE
-    assert "(inferred from its flat top): hit softer" in saturated.text
-    with pytest.raises(DataError, match=r"hit 1: overload \(force\)\. Force cut off at .* N .*inferred"):
+    assert "inferred" in saturated.text
+    with pytest.raises(DataError, match=r"1 \(overload \(force\)\): .* N .*inferred"):
         average_good_hits([replace(loud, force=np.minimum(loud.force, 120))])
 
 
 def test_lost_scans_are_counted_in_the_reason() -> None:
     verdict = evaluate_hit(replace(hit((200, 0, 0.6e-3)), lost_scans=7))
-    assert verdict.text.startswith("7 scans are missing in this record: hit again;")
+    assert verdict.text.startswith("7 scans ")
 
 
 def test_a_band_that_the_force_does_not_reach_is_narrow() -> None:
@@ -163,7 +163,8 @@ def test_a_band_that_the_force_does_not_reach_is_narrow() -> None:
     assert evaluate_hit(one, band=(100, reach)).flags == HitFlags.OK
     narrow = evaluate_hit(one, band=(100, 1.3 * reach))
     assert narrow.flags == HitFlags.NARROW_BAND
-    assert narrow.text.endswith("(-20 dB) of the 1306.5 Hz wanted: use a harder hammer tip.")
+    assert "(-20 dB)" in narrow.text
+    assert "1306.5 Hz" in narrow.text
 
 
 @pytest.mark.parametrize("gain", [-1.0, 0.6, 1.6])
@@ -174,7 +175,7 @@ def test_another_spot_or_side_is_inconsistent_with_the_mean(hits: list[Hit], gai
     assert check_hit(other) == HitFlags.OK
     verdict = evaluate_hit(other, mean)
     assert verdict.flags == HitFlags.INCONSISTENT
-    assert "away from the mean of 3 hits (limit 30%): hit the same spot" in verdict.text
+    assert "mean of 3 hits (limit 30%)" in verdict.text
 
 
 def test_a_hand_that_is_ten_percent_off_is_consistent(hits: list[Hit]) -> None:
@@ -196,7 +197,7 @@ def test_a_hit_with_another_fault_is_not_called_inconsistent_too(hits: list[Hit]
 def test_a_mean_of_another_set_up_is_rejected(hits: list[Hit]) -> None:
     mean = estimate_frf(hits[:3])
     shorter = Frf(mean.frequency[:-1], mean.receptance[:-1], np.ones(mean.frequency.size - 1), 3)
-    with pytest.raises(ValueError, match="compare hits of one set-up only"):
+    with pytest.raises(ValueError, match=r"has \d+ lines .*mean \d+ "):
         evaluate_hit(hits[3], shorter)
 
 

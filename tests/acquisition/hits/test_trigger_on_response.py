@@ -52,15 +52,15 @@ def test_of_several_accelerations_that_of_the_direction_is_taken() -> None:
     assert TapInputs.select(axes, "acceleration", "x").rows == (0,)
     assert TapInputs.select((HAMMER, *axes), "force", "y").rows == (0, 2)
     assert TapInputs.select((HAMMER, *axes), "force", "xy").rows == (0, 2)  # hit in x, seen in y
-    with pytest.raises(DataError, match=r'acceleration x, acceleration y, acceleration; .* direction = "x"$'):
+    with pytest.raises(DataError, match=r'acceleration x, acceleration y, acceleration\. .* direction = "x"'):
         TapInputs.select(axes, "acceleration")
-    with pytest.raises(DataError, match=r'direction = "y"$'):
+    with pytest.raises(DataError, match='direction = "y"'):
         TapInputs.select((x, SENSOR), "acceleration", "y")
 
 
 def test_the_force_is_left_out_where_the_response_triggers() -> None:
     assert TapInputs.select((HAMMER, SENSOR), "acceleration").rows == (1,)
-    with pytest.raises(DataError, match="channels for force; one acceleration channel is needed"):
+    with pytest.raises(DataError, match=r"for force\. .*one acceleration"):
         TapInputs.select((HAMMER,), "acceleration")
     with pytest.raises(DataError, match="one force and one acceleration"):
         TapInputs.select((SENSOR,))

@@ -114,7 +114,7 @@ def test_two_programs_on_one_port(cable: Cable) -> None:
     ) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == b"open\n"
-        with pytest.raises(DeviceError, match="another program uses it: close that program"):
+        with pytest.raises(DeviceError, match="fuser"):
             SerialLink(cable.port)
         other.communicate(b"\n")
     SerialLink(cable.port).close()
@@ -128,7 +128,7 @@ def test_a_pulled_cable_is_one_error_with_its_cure(state: str, cable: Cable, lin
         assert read_until(link, 10) == b"some bytes"
     use = (lambda: link.write(b"?")) if state == "writing" else (lambda: link.read(5.0))
     cable.pull()
-    with pytest.raises(DeviceError, match="unplugged or switched off; plug it in and repeat"):
+    with pytest.raises(DeviceError, match="unplugged"):
         use()
     link.close()
     link.close()
@@ -150,17 +150,17 @@ def test_a_device_that_takes_no_bytes_is_not_called_unplugged(
         raise serial.SerialTimeoutException("Write timeout")
 
     monkeypatch.setattr("serial.Serial.write", full)
-    with pytest.raises(DeviceError, match="takes no commands; switch it off and on"):
+    with pytest.raises(DeviceError, match="accept commands"):
         link.write(b"?")
 
 
 @pytest.mark.parametrize(
     ("error", "cure"),
     [
-        (OSError(errno.EBUSY, "Device or resource busy"), "another program uses it: close that program"),
+        (OSError(errno.EBUSY, "Device or resource busy"), "fuser -v /dev/ttyACM0"),
         (PermissionError(errno.EACCES, "Permission denied"), "sudo usermod -aG dialout"),
-        (FileNotFoundError(errno.ENOENT, "No such file or directory"), "check the cable and the port's name"),
-        (pytest.importorskip("termios").error(5, "Input/output error"), "check the port's name and the cable"),
+        (FileNotFoundError(errno.ENOENT, "No such file or directory"), "No such file .*acquisition.scan_ports"),
+        (pytest.importorskip("termios").error(5, "Input/output error"), "Input/output error"),
     ],
     ids=["busy", "forbidden", "missing", "gone while opening"],
 )

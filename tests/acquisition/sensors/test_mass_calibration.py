@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
@@ -85,7 +86,7 @@ def test_right_sensitivities_agree(true_hits: list[Hit]) -> None:
     assert found.agrees
     assert found.n_hits == 10
     assert found.remarks == ()
-    assert str(found).endswith("\nBoth sensitivities agree within 5%.")
+    assert "5%" in str(found).splitlines()[-1]
 
 
 def test_a_force_sensitivity_believed_too_small_reads_the_force_too_large(true_hits: list[Hit]) -> None:
@@ -93,16 +94,16 @@ def test_a_force_sensitivity_believed_too_small_reads_the_force_too_large(true_h
     assert found.ratio == pytest.approx(1.2, rel=1e-3)
     assert not found.agrees
     assert found.force_sensitivity == pytest.approx(2.25e-3, rel=1e-3)
-    assert "the force is read 20.0% too large" in str(found)
-    assert "the hammer has 2.25 mV/N instead of 1.875" in str(found)
+    assert "force reads 20.0%" in str(found)
+    assert re.search(r"2\.25 mV/N .*1\.875", str(found))
 
 
 def test_an_acceleration_sensitivity_believed_too_small_reads_the_acceleration_too_large(true_hits: list[Hit]) -> None:
     found = calibrate_by_mass(misread(true_hits, acceleration=1 / 1.1), MASS)
     assert found.ratio == pytest.approx(1 / 1.1, rel=1e-3)
     assert found.acceleration_sensitivity == pytest.approx(1.02e-3, rel=1e-3)
-    assert "the acceleration is read 10.0% too large" in str(found)
-    assert "per m/s^2 instead of 0.9273" in str(found)
+    assert "acceleration reads 10.0%" in str(found)
+    assert re.search(r"1\.02 mV per m/s\^2 .*0\.9273", str(found))
 
 
 def test_a_wrong_mass_counts_like_a_wrong_sensitivity(true_hits: list[Hit]) -> None:
@@ -110,7 +111,7 @@ def test_a_wrong_mass_counts_like_a_wrong_sensitivity(true_hits: list[Hit]) -> N
     assert heavy.ratio == pytest.approx(plain.ratio / 1.25, rel=1e-9)
     (remark,) = heavy.remarks
     assert remark.code == "sensitivities-disagree"
-    assert "with accelerometer and mount?" in remark.cure
+    assert "mass" in remark.cure
 
 
 @given(st.floats(0.01, 100), st.floats(0.01, 100))
@@ -143,7 +144,7 @@ def test_the_foot_of_a_mounts_resonance_does_not_bend_the_ratio() -> None:
 
 
 def test_a_soft_mount_leaves_no_band() -> None:
-    with pytest.raises(ValueError, match=r"keep no fixed ratio: \d+ lines from 50 Hz up, 20 are needed"):
+    with pytest.raises(ValueError, match=r"\d+ lines from 50 Hz .*20 "):
         calibrate_by_mass(hits_on(hung_mass(MASS, mount=200.0)), MASS)
 
 
@@ -158,12 +159,12 @@ def test_the_standard_error_is_that_over_the_hits() -> None:
 @pytest.mark.parametrize(
     ("force", "acceleration", "words"),
     [
-        (1.0, 9.80665, "in g, not m/s^2"),
-        (1.0, 1 / 9.80665, "divided by 9.80665 as if it were V/g"),
-        (4.44822, 1.0, "in lbf, not N"),
-        (1 / 4.44822, 1.0, "divided by 4.44822 as if it were V/lbf"),
-        (1e-3, 1.0, "one sensitivity in mV, the other in V (force 1000 times too large"),
-        (1e3, 1.0, "one sensitivity in mV, the other in V (force 1000 times too small"),
+        (1.0, 9.80665, "by 9.80665"),
+        (1.0, 1 / 9.80665, "V per m/s^2"),
+        (4.44822, 1.0, "V/lbf"),
+        (1 / 4.44822, 1.0, "V/N"),
+        (1e-3, 1.0, "force 1000 times too large"),
+        (1e3, 1.0, "force 1000 times too small"),
     ],
 )
 def test_unit_mistakes_are_named(true_hits: list[Hit], force: float, acceleration: float, words: str) -> None:
@@ -176,14 +177,15 @@ def test_a_skewed_phase_is_reported(true_hits: list[Hit]) -> None:
     skewed = [replace(hit, channels=(TRUE[0], replace(TRUE[1], skew=60e-6))) for hit in true_hits]
     (remark,) = calibrate_by_mass(skewed, MASS).remarks
     assert remark.code == "phase-not-rigid"
-    assert "is not that of a rigid mass; measure the skew" in str(remark)
+    assert re.search(r"[+-]\d+\.\d deg", remark.text)
+    assert "skew" in remark.cure
 
 
 def test_bad_calls_are_rejected(true_hits: list[Hit]) -> None:
     for mass in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="is not > 0; give the total moving mass"):
+        with pytest.raises(ValueError, match=f"mass={mass} kg"):
             calibrate_by_mass(true_hits, mass)
-    with pytest.raises(ValueError, match="2 good hits; at least 3"):
+    with pytest.raises(ValueError, match=r"2 good hits .*3"):
         calibrate_by_mass(true_hits[:2], MASS)
 
 
@@ -192,4 +194,4 @@ def test_hits_without_channels_have_no_new_sensitivities(true_hits: list[Hit]) -
     found = calibrate_by_mass([bare(hit) for hit in true_hits], MASS)
     assert found.force_sensitivity is None
     assert found.acceleration_sensitivity is None
-    assert "instead of" not in str(found)
+    assert "mV" not in str(found)

@@ -134,27 +134,27 @@ def test_a_stall_of_the_host_changes_nothing() -> None:
 def test_chaos_is_rejected() -> None:
     arrival = even(25600.0)
     chaos = measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
-    with pytest.raises(DeviceError, match=r"arrive too unevenly .* close other programs"):
+    with pytest.raises(DeviceError, match=r"± \d+\.\d\d%.* ± 0\.20%"):
         check_rate(chaos, 25600.0)
 
 
 def test_too_few_blocks_a_stream_that_ends_and_no_time_are_rejected() -> None:
-    with pytest.raises(DeviceError, match=r"sent 6 blocks of samples in 5 s; .* at least 10 over 5 s are needed"):
+    with pytest.raises(DeviceError, match=r"6 blocks .*10 in 5 s"):
         measured(even(512.0, seconds=7.0))
-    with pytest.raises(DeviceError, match=r"sent 50 blocks of samples in 0\.98 s"):
+    with pytest.raises(DeviceError, match=r"50 blocks .*0\.98 s"):
         measured(even(25600.0, seconds=1.0))
-    with pytest.raises(DeviceError, match="sent 0 blocks"):
+    with pytest.raises(DeviceError, match="0 blocks"):
         measured(np.array([]))
-    with pytest.raises(ValueError, match="seconds=0 is not > 0"):
+    with pytest.raises(ValueError, match="seconds=0"):
         measured(even(25600.0), seconds=0)
 
 
 def test_half_the_rate_is_rejected_with_the_error_of_every_frequency() -> None:
     check_rate(MeasuredRate(25600 * 1.0019, 0.5, 128000, 5.0), 25600.0)
     check_rate(MeasuredRate(25600 * 0.9981, 0.5, 128000, 5.0), 25600.0)
-    with pytest.raises(DeviceError, match=r"12800\.00 ± 0\.50 .*not 25600: every frequency would be 100\.0% too high"):
+    with pytest.raises(DeviceError, match=r"12800\.00 ± 0\.50 .* 25600 .*100\.0% too high"):
         check_rate(MeasuredRate(12800.0, 0.5, 64000, 5.0), 25600.0)
-    with pytest.raises(DeviceError, match=r"every frequency would be 0\.2% too low"):
+    with pytest.raises(DeviceError, match=r"0\.2% too low"):
         check_rate(MeasuredRate(25600 * 1.0021, 0.5, 128000, 5.0), 25600.0)
 
 
@@ -226,7 +226,7 @@ def test_the_measured_rate_is_worked_with_where_the_machine_file_says_so(folder:
         check(trusting, halved)
         assert halved.starts == starts
     assert len(json.loads((folder.path / "daq.json").read_text())) == 1
-    with pytest.raises(DeviceError, match="not 25600"):
+    with pytest.raises(DeviceError, match=" 25600 "):
         check(folder, Stream(even(12800.0)))
 
 
@@ -268,7 +268,7 @@ def test_an_emulated_device_through_a_pseudo_terminal(folder: MachineFolder) -> 
         found = measure_rate(source, 3.0)
         assert found.rate == pytest.approx(102400, abs=5 * found.std)
         source.sample_rate = 51200.0
-        with pytest.raises(DeviceError, match="not 51200: every frequency would be 50"):
+        with pytest.raises(DeviceError, match=r" 51200 .*50\.\d% too low"):
             check_device_rate(folder, source, 3.0)
 
 
@@ -300,7 +300,7 @@ def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(fo
     assert check_device_rate(folder, stream, clock=stream.clock, remarks=remarks) == 25600.0
     assert stream.starts == 3
     assert [remark.code for remark in remarks] == ["rate-not-sure"]
-    assert re.match(r"the DAQ's sample rate is known to ±0\.\d\d% only", remarks[0].text)
+    assert re.search(r"±0\.\d\d%", remarks[0].text)
     assert not (folder.path / "daq.json").exists()
     quiet = Stream(even(25600.0))
     assert check_device_rate(folder, quiet, clock=quiet.clock, remarks=remarks) == 25600.0
@@ -308,6 +308,6 @@ def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(fo
 
 
 def test_a_wrong_rate_is_rejected_on_a_busy_computer_too_and_never_worked_with(folder: MachineFolder) -> None:
-    with pytest.raises(DeviceError, match="not 25600"):
+    with pytest.raises(DeviceError, match=" 25600 "):
         check(accepting(folder), Stream(busy(12800.0)))
     assert not (folder.path / "daq.json").exists()

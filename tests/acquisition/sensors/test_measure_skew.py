@@ -70,21 +70,21 @@ def test_exchanged_channels_have_the_opposite_skew() -> None:
 def test_different_signals_a_hum_and_an_inverted_channel_are_rejected() -> None:
     first, second = SIGNALS
     random = np.random.default_rng(1)
-    with pytest.raises(ValueError, match=r"do not carry one broad-band signal \(coherence .* at 0% .* T-piece"):
+    with pytest.raises(ValueError, match=r"coherence over .* 0% .* 10%"):
         measure_skew(first, random.normal(size=first.size), RATE)
     hum = np.sin(2 * np.pi * 50 * np.arange(first.size) / RATE)
     one, other = hum + 1e-3 * random.normal(size=(2, first.size))
-    with pytest.raises(ValueError, match="do not carry one broad-band signal"):
+    with pytest.raises(ValueError, match="coherence over "):
         measure_skew(one, other, RATE)
-    with pytest.raises(ValueError, match="opposite sign of the first"):
+    with pytest.raises(ValueError, match="opposite signs"):
         measure_skew(first, -second, RATE)
 
 
 def test_records_that_are_none_are_rejected() -> None:
     first, second = SIGNALS
-    with pytest.raises(ValueError, match="at least 16384 finite samples"):
+    with pytest.raises(ValueError, match=r"first record .*16384 "):
         measure_skew(first[:1000], second[:1000], RATE)
-    with pytest.raises(ValueError, match="the second record"):
+    with pytest.raises(ValueError, match="second record"):
         measure_skew(first, np.where(np.arange(second.size) == 7, np.nan, second), RATE)
     with pytest.raises(ValueError, match="differ in length"):
         measure_skew(first, second[:-1], RATE)

@@ -41,24 +41,25 @@ def test_real_sensors_are_believed(quantity: str, sensitivity: float) -> None:
 @pytest.mark.parametrize(
     ("channel", "code", "words", "cure"),
     [
-        (Channel("acceleration", 100.0, 5.0), "sensitivity", "100 V per m/s^2 is not believed", "did you mean mV?"),
-        (Channel("force", 2.25, 5.0), "sensitivity", "2.25 V per N is not believed", "did you mean mV?"),
-        (Channel("force", 2.25e-6, 5.0), "sensitivity", "2.25e-06 V per N", "was it divided by 1000 twice?"),
+        (Channel("acceleration", 100.0, 5.0), "sensitivity", "100 V per m/s^2", "mV"),
+        (Channel("force", 2.25, 5.0), "sensitivity", "2.25 V per N", "mV"),
+        (Channel("force", 2.25e-6, 5.0), "sensitivity", "2.25e-06 V per N", "1000 twice"),
         (
             Channel("acceleration", 1e9, 5.0),
             "sensitivity",
-            "1e+09 V per m/s^2 is not believed (accelerometers have 1 to 1000 mV/g without gain)",
+            "1e+09 V per m/s^2",
             "",
         ),
-        (Channel("force", 2.25e-3, 5000.0), "input-range", "±5000 V is not believed", "did you mean mV?"),
+        (Channel("force", 2.25e-3, 5000.0), "input-range", "±5000 V", "mV"),
     ],
 )
 def test_a_sensitivity_or_range_that_no_device_has_is_not_believed(
     channel: Channel, code: str, words: str, cure: str
 ) -> None:
     (doubt,) = channel_remarks(channel)
-    assert (doubt.code, doubt.about, doubt.cure) == (f"{code}-not-believed", channel.quantity, cure)
+    assert (doubt.code, doubt.about, bool(doubt.cure)) == (f"{code}-not-believed", channel.quantity, bool(cure))
     assert words in doubt.text
+    assert cure in doubt.cure
 
 
 @given(st.floats(0.11, 24), st.sampled_from([1, -1]))
@@ -70,10 +71,10 @@ def test_a_believed_hammer_entered_in_millivolts_is_caught(millivolts: float, si
 @pytest.mark.parametrize(
     ("factor", "word"),
     [
-        (9.80665, "in g, not"),
-        (1 / 9.80665, "V/g"),
-        (4.44822, "V/lbf"),
-        (1 / 4.44822, "in lbf"),
+        (9.80665, "V/g by 9.80665"),
+        (1 / 9.80665, "V per m/s^2"),
+        (4.44822, "V/N"),
+        (1 / 4.44822, "V/lbf by 4.44822"),
         (1e3, "force 1000 times too large or acceleration too small"),
         (1e-3, "force 1000 times too small or acceleration too large"),
     ],
@@ -99,7 +100,9 @@ def test_stiffnesses_of_machine_tools_are_believed(stiffness: float) -> None:
 @pytest.mark.parametrize("stiffness", [3.5e4, 3.5e10, -9e4])
 def test_other_stiffnesses_are_not(stiffness: float) -> None:
     shown = f"{stiffness:.0f} N/m" if stiffness < 1e5 else f"{stiffness / 1e6:.0f} N/um"
-    assert f"K = {shown} is outside 0.1 to 10000 N/um" in str(stiffness_remark(stiffness))
+    found = stiffness_remark(stiffness)
+    assert found is not None
+    assert f"K = {shown} is outside 0.1 to 10000 N/um" in found.text
 
 
 @pytest.mark.parametrize(("stiffness", "noted"), [(3.5e7, False), (3.5e4, True)])
@@ -114,13 +117,13 @@ def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float,
     ("calibrated", "today", "months", "code", "words"),
     [
         ("2026-01-15", TODAY, 12.0, "", ""),
-        ("2026-01-15", TODAY, 6.0, "calibration-old", "calibrated 2026-01-15, 10 months ago (interval 6)"),
+        ("2026-01-15", TODAY, 6.0, "calibration-old", "2026-01-15, 10 months ago (interval 6)"),
         ("2026-01-15", date(2027, 1, 15), 12.0, "", ""),
         ("2026-01-15", date(2027, 1, 16), 12.0, "calibration-old", "12 months ago (interval 12)"),
-        ("", TODAY, 12.0, "calibration-unknown", "not known; enter it"),
+        ("", TODAY, 12.0, "calibration-unknown", ""),
         ("2026-01-15", date(2026, 1, 15), 12.0, "", ""),
-        ("2026-01-15", date(2026, 1, 14), 12.0, "calibration-in-future", "in the future (today is 2026-01-14)"),
-        ("15.1.26", TODAY, 12.0, "calibration-no-date", "'15.1.26' is no date; give YYYY-MM-DD"),
+        ("2026-01-15", date(2026, 1, 14), 12.0, "calibration-in-future", "2026-01-14"),
+        ("15.1.26", TODAY, 12.0, "calibration-no-date", "'15.1.26'"),
     ],
 )
 def test_the_date_of_calibration(calibrated: str, today: date, months: float, code: str, words: str) -> None:
@@ -132,6 +135,6 @@ def test_the_date_of_calibration(calibrated: str, today: date, months: float, co
 
 @pytest.mark.parametrize("direction", ["z", "X", "xy"])
 def test_a_channel_of_no_direction_of_the_tool_tip_is_rejected(direction: str) -> None:
-    with pytest.raises(ValueError, match=f"direction='{direction}' is (none of x, y|that of a tap across)"):
+    with pytest.raises(ValueError, match=f"direction='{direction}'"):
         replace(HAMMER, direction=direction)  # type: ignore[arg-type]
     assert [replace(HAMMER, direction=one).direction for one in ("", "x", "y")] == ["", "x", "y"]

@@ -104,7 +104,7 @@ def test_overload_and_events_go_through(tapper: Tapper, channels: Pair) -> None:
         for _ in islice(host.blocks(), 5000):
             if host.fault:
                 break
-        assert host.fault.startswith("the cable of the acceleration sensor")
+        assert "cable of the acceleration sensor" in host.fault
         assert host.events.popleft().kind == EventKind.BUTTON
         assert host.status is not None
         assert host.status.samples_taken == host.status.samples_sent
@@ -122,13 +122,13 @@ def test_a_device_that_is_pulled_is_waited_for(
             host.start()
             next(host.blocks())
             device.unplug()
-            with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+            with pytest.raises(DeviceError, match="unplugged"):
                 list(host.blocks())
         with pytest.raises(DeviceError, match=bridge.port):
             TapsSource(bridge.port)
         device.replug()
         deadline = time.monotonic() + 60
-        while "is back" not in (told := capsys.readouterr().out):
+        while "again" not in (told := capsys.readouterr().out):
             assert time.monotonic() < deadline, told
             time.sleep(0.05)
         with TapsSource(bridge.port) as host:
@@ -237,7 +237,7 @@ def test_a_dataq_with_its_sensors_goes_through(structure: Structure, monkeypatch
 
 
 def test_no_device_and_no_address_are_rejected(tapper: Tapper, channels: Pair) -> None:
-    with pytest.raises(DeviceError, match="check the cable and the port"):
+    with pytest.raises(DeviceError, match=r"acquisition.scan_ports"):
         TapsBridge(lambda: TapsSource("/dev/ttyNOT_THERE"), print)
     with TapsEmulator(tapper(), channels, RATE) as device, pytest.raises(OSError, match="assign requested address"):
         TapsBridge(lambda: TapsSource(device.port), print, address="192.0.2.1")

@@ -191,7 +191,7 @@ def test_faults_stand_until_they_are_gone() -> None:
     for seq, event in enumerate(events):
         log.add(Frame(MessageType.EVENT, seq, encode_event(event)))
         said.append(log.fault({}))
-    assert said[0].startswith("the cable of the (channel 5) sensor is broken")
-    assert said[1].count(";") == said[2].count(";") == 1
-    assert said[3].startswith("the force or acceleration sensor has no proper supply")
+    assert "cable of the (channel 5) sensor" in said[0]
+    assert said[1] == said[2] == f"{said[0]} {said[3]}"
+    assert "voltage of the force or acceleration sensor" in said[3]
     assert len(log.new) == 4

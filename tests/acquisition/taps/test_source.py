@@ -134,7 +134,7 @@ def test_unplugging_is_reported_in_one_sentence(tapper: Tapper, channels: Pair) 
         TapsSource(device.port) as source,
     ):
         source.start()
-        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+        with pytest.raises(DeviceError, match="unplugged"):
             list(source.blocks())
 
 
@@ -145,7 +145,7 @@ def test_a_silent_device_is_given_up(tapper: Tapper, channels: Pair, monkeypatch
         TapsSource(device.port) as source,
     ):
         source.start()
-        with pytest.raises(DeviceError, match="has sent no samples"):
+        with pytest.raises(DeviceError, match=r"no samples .*0\.3 s"):
             list(source.blocks())
 
 
@@ -168,16 +168,16 @@ def test_a_slow_host_loses_scans_and_is_told_how_many(
 def test_a_port_in_use_is_rejected_with_the_cure(device: TapsEmulator) -> None:
     if device.port.startswith("socket"):
         pytest.skip("a TCP port is not exclusive")
-    with TapsSource(device.port), pytest.raises(DeviceError, match="another program uses it"):
+    with TapsSource(device.port), pytest.raises(DeviceError, match="fuser"):
         TapsSource(device.port)
 
 
 @pytest.mark.parametrize(
     ("port", "cure"),
     [
-        ("/dev/ttyNOT_THERE", "check the cable and the port's name"),
-        ("socket://127.0.0.1:1", "start the device or emulator first"),
-        ("socket://nowhere", "socket://HOST:PORT is expected"),
+        ("/dev/ttyNOT_THERE", "acquisition.scan_ports"),
+        ("socket://127.0.0.1:1", "refused"),
+        ("socket://nowhere", "socket://HOST:PORT"),
     ],
 )
 def test_a_port_that_does_not_exist_is_rejected_with_the_cure(port: str, cure: str) -> None:
@@ -189,7 +189,7 @@ def test_something_that_is_no_daq_is_rejected(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     master, slave = os.openpty()
     try:
-        with pytest.raises(DeviceError, match="no TAPS/1 device answers"):
+        with pytest.raises(DeviceError, match=r"TAPS/1 .*STOP, 3 "):
             TapsSource(os.ttyname(slave))
     finally:
         os.close(master)
@@ -201,7 +201,7 @@ def test_a_device_that_describes_itself_wrongly_is_rejected(tapper: Tapper) -> N
     object.__setattr__(impossible, "quantity", "temperature")
     with (
         TapsEmulator(tapper(), (impossible,), RATE) as device,
-        pytest.raises(DeviceError, match=r"describes itself wrongly .*quantity='temperature'"),
+        pytest.raises(DeviceError, match="quantity='temperature'"),
     ):
         TapsSource(device.port)
 
@@ -209,10 +209,10 @@ def test_a_device_that_describes_itself_wrongly_is_rejected(tapper: Tapper) -> N
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("serial", "", "serial is empty"),
-        ("fs_choices", [], r"fs_choices=\[\] are no sample rates"),
-        ("fs_choices", [0], r"fs_choices=\[0\] are no sample rates"),
-        ("skew_s", float("nan"), "skew=nan s is not a finite number"),
+        ("serial", "", "serial "),
+        ("fs_choices", [], r"fs_choices=\[\]"),
+        ("fs_choices", [0], r"fs_choices=\[0\]"),
+        ("skew_s", float("nan"), "skew=nan s"),
     ],
 )
 def test_an_info_that_would_spoil_the_time_base_is_rejected(
@@ -221,7 +221,7 @@ def test_an_info_that_would_spoil_the_time_base_is_rejected(
     said = device._info()  # noqa: SLF001
     (said if key in said else said["channels"][1])[key] = value
     monkeypatch.setattr(device, "_info", lambda: said)
-    with pytest.raises(DeviceError, match=rf"describes itself wrongly .*{message}"):
+    with pytest.raises(DeviceError, match=rf"ValueError: .*{message}"):
         TapsSource(device.port)
 
 
@@ -325,7 +325,7 @@ def test_events_and_standing_faults_reach_the_user(device: TapsEmulator) -> None
         source.start()
         blocks = source.blocks()
         wait_for(blocks, lambda: bool(source.events))
-        assert source.fault.startswith("the cable of the acceleration sensor is broken or not plugged in")
+        assert "cable of the acceleration sensor" in source.fault
         device.send_event(Event(EventKind.BUTTON))
         device.send_event(Event(EventKind.CABLE, begins=False, channel=1))
         source.events.clear()
@@ -349,7 +349,7 @@ def test_a_fault_names_the_sensor_by_the_number_that_info_gives_it(
         for _ in source.blocks():
             if source.fault:
                 break
-        assert source.fault.startswith("the cable of the acceleration sensor")
+        assert "cable of the acceleration sensor" in source.fault
 
 
 def test_a_fault_from_before_the_start_is_reported_again(device: TapsEmulator) -> None:
@@ -357,7 +357,7 @@ def test_a_fault_from_before_the_start_is_reported_again(device: TapsEmulator) -
     for _ in range(2):
         with TapsSource(device.port) as source:
             source.start()
-            wait_for(source.blocks(), lambda: source.fault.startswith("the force sensor has no proper supply"))
+            wait_for(source.blocks(), lambda: "voltage of the force sensor" in source.fault)
 
 
 def wait_for(blocks: Iterator[Block], happened: Callable[[], bool]) -> None:
@@ -404,7 +404,7 @@ def test_a_device_whose_info_never_arrives_is_rejected(
     monkeypatch.setattr("acquisition.taps.source.TAPS_ANSWER_TIMEOUT", 0.05)
     with (
         TapsEmulator(tapper(), channels, RATE, faults=TapsFaults(cut_infos=99)) as device,
-        pytest.raises(DeviceError, match=r"no TAPS/1 device answers .*HELLO, 3 tries"),
+        pytest.raises(DeviceError, match=r"TAPS/1 .*HELLO, 3 "),
     ):
         TapsSource(device.port)
 
@@ -418,7 +418,7 @@ def test_a_device_that_restarts_by_itself_is_distinguished_from_a_silent_one(
         TapsSource(device.port) as source,
     ):
         source.start()
-        with pytest.raises(DeviceError, match="has begun another stream by itself"):
+        with pytest.raises(DeviceError, match="another stream"):
             list(source.blocks())
         source.start()
         assert next(source.blocks()).first_scan == 0
@@ -442,7 +442,7 @@ def test_a_device_that_is_plugged_in_again_goes_on(tcp: bool, tapper: Tapper, ch
                 source.start()
                 assert next(source.blocks()).first_scan == 0
                 device.unplug()
-                with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+                with pytest.raises(DeviceError, match="unplugged"):
                     list(source.blocks())
                 device.replug()
         assert not tcp or device.port == port
@@ -460,19 +460,19 @@ def test_unplugged_in_any_state_it_is_the_same_sentence(
             return link
 
         monkeypatch.setattr("acquisition.taps.source.SerialLink", opened)
-        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+        with pytest.raises(DeviceError, match="unplugged"):
             TapsSource(device.port)
         return
     with TapsSource(device.port) as source:
         if state == "stopping":
             source.start()
         device.unplug()
-        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+        with pytest.raises(DeviceError, match="unplugged"):
             (source.stop if state == "stopping" else source.start)()
 
 
 def test_a_rate_that_the_device_does_not_have_is_rejected(device: TapsEmulator) -> None:
-    with pytest.raises(ValueError, match="sample rate 1000 Hz is none of this device's: 25600 Hz"):
+    with pytest.raises(ValueError, match=r"1000 Hz .*25600 Hz"):
         TapsSource(device.port, sample_rate=1000.0)
 
 

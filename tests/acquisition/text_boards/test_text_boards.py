@@ -194,7 +194,8 @@ def test_ports_names_a_board_that_prints_by_listening_alone(signal: SignalFuncti
     with TextBoardEmulator(signal, sensitivities, 5.0, RATE, traits=TextBoardTraits(counter_bits=bits)) as board:
         answer = probe_port(board.port, BUILT_IN_DRIVERS)
     assert answer is not None
-    assert (answer.driver, answer.identity.model) == ("lines", f"a board that prints {numbers} a line")
+    assert answer.driver == "lines"
+    assert f" {numbers} " in answer.identity.model
 
 
 @contextmanager
@@ -213,7 +214,7 @@ def test_a_board_that_prints_something_else_is_a_device_error(monkeypatch: pytes
     with silent_port() as (master, port), TextBoardSource(port, INPUTS, RATE) as source:
         source.start()
         os.write(master, b"hello\nthe answer is 42\n" * 10)
-        with pytest.raises(DeviceError, match=r"has printed no samples for 0.3 s; check its program and baud_rate"):
+        with pytest.raises(DeviceError, match=r"no samples .*0\.3 s.*baud_rate"):
             list(islice(source.blocks(), 1))
 
 
@@ -232,10 +233,10 @@ def test_an_unplugged_board_is_a_device_error() -> None:
 @pytest.mark.parametrize(
     ("driver", "settings", "reason"),
     [
-        ("lines", DeviceSettings(None, INPUTS), "sample_rate_hz is missing: a board with driver"),
-        ("lines", DeviceSettings(RATE, (INPUTS[0], SensorInput(2, ACCELERATION))), "are the inputs 0 and 1"),
-        ("lines", DeviceSettings(RATE, (SensorInput(1, ACCELERATION),)), "are input 0, and there is one alone"),
-        ("dataq", DeviceSettings(RATE, INPUTS, printing=OutputFormat()), r"\[daq.printing\] is for driver = .lines."),
+        ("lines", DeviceSettings(None, INPUTS), "sample_rate_hz"),
+        ("lines", DeviceSettings(RATE, (INPUTS[0], SensorInput(2, ACCELERATION))), "input: 0, 2 .*0 to 1"),
+        ("lines", DeviceSettings(RATE, (SensorInput(1, ACCELERATION),)), "input: 1 .*0 to 0"),
+        ("dataq", DeviceSettings(RATE, INPUTS, printing=OutputFormat()), r"\[daq\.printing\]"),
     ],
 )
 @pytest.mark.quick

@@ -132,11 +132,11 @@ def test_lost_scans_are_counted(name: str, lost: int, plugged: Any, wiring: Wiri
     ("name", "fault", "reason"),
     [
         ("nidaqmx", "overrun", "no longer available"),
-        ("mcc172", "overrun", "has lost scans and stopped; end other programs"),
-        ("nidaqmx", "unplugged", r"cDAQ1Mod1 has failed \(Device is not available"),
-        ("mcc172", "unplugged", r"mcc172:0 has failed \(Addr 0: Incorrect response"),
-        ("uldaq", "unplugged", r"has failed \(UL Error: 9"),
-        ("ljm", "unplugged", r"has failed \(LJM library error code 1301"),
+        ("mcc172", "overrun", "lost scans"),
+        ("nidaqmx", "unplugged", "cDAQ1Mod1 .*Device is not available"),
+        ("mcc172", "unplugged", "mcc172:0 .*Addr 0: Incorrect response"),
+        ("uldaq", "unplugged", "UL Error: 9"),
+        ("ljm", "unplugged", "LJM library error code 1301"),
     ],
 )
 def test_a_device_that_goes_away_is_a_device_error(
@@ -160,7 +160,7 @@ def test_a_silent_device_is_a_device_error(
     wiring.faults.add("silent")
     with plugged(name) as device:
         device.start()
-        with pytest.raises(DeviceError, match=r"has sent no samples for 0.2 s; unplug it"):
+        with pytest.raises(DeviceError, match=r"no samples .*0\.2 s"):
             list(device.blocks())
 
 
@@ -184,7 +184,7 @@ def test_an_open_loop_is_reported(plugged: Any, wiring: Wiring) -> None:
         assert device.fault == ""
         device.start()
         next(iter(device.blocks()))
-        assert device.fault.startswith("No sensor, or a broken cable, at cDAQ1Mod1/ai1")
+        assert "cDAQ1Mod1/ai1" in device.fault
 
 
 @pytest.mark.parametrize(("name", "asked", "actual"), [("nidaqmx", 20000.0, 25600.0), ("mcc172", 20000.0, 51200 / 3)])
@@ -196,19 +196,19 @@ def test_the_rate_is_one_that_the_device_has(name: str, asked: float, actual: fl
 @pytest.mark.parametrize(
     ("name", "wrong", "error", "reason"),
     [
-        ("audio", {"port": "audio:Scarlett"}, DeviceError, r'no sound device fits "audio:Scarlett" \(1: 485B39'),
-        ("audio", {"rate": 51200.0}, ValueError, "sample_rate_hz=51200: 485B39 .* has no such rate"),
-        ("audio", {"range_v": 5.0}, ValueError, "range_v=5: the calibration of 485B39 says 9.916 V for input 0"),
-        ("audio", {"numbers": (0, 2)}, ValueError, "input=2: 485B39 .* has the inputs 0 to 1"),
-        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 cannot be opened .*invalid.*acquisition.scan_ports"),
-        ("nidaqmx", {"numbers": (0, 4)}, ValueError, "input=4: NI 9234 has the inputs 0 to 3"),
-        ("mcc172", {"port": "mcc172:first"}, ValueError, "address of the board, 0 to 7"),
+        ("audio", {"port": "audio:Scarlett"}, DeviceError, r'"audio:Scarlett" \(1: 485B39'),
+        ("audio", {"rate": 51200.0}, ValueError, "sample_rate_hz=51200 .*485B39"),
+        ("audio", {"range_v": 5.0}, ValueError, r"range_v=5 .*485B39 .*9\.916 for input 0"),
+        ("audio", {"numbers": (0, 2)}, ValueError, "input=2 .*485B39 .*0 to 1"),
+        ("nidaqmx", {"port": "nidaqmx:Dev7"}, DeviceError, "Dev7 .*invalid.*acquisition.scan_ports"),
+        ("nidaqmx", {"numbers": (0, 4)}, ValueError, "input=4 .*NI 9234 .*0 to 3"),
+        ("mcc172", {"port": "mcc172:first"}, ValueError, "mcc172:first.* 0 to 7"),
         ("mcc172", {"port": "mcc172:3"}, DeviceError, "Addr 3: Board not responding"),
-        ("mcc172", {"range_v": 10.0}, ValueError, "range_v=10: an MCC 172 has 5 V alone"),
-        ("uldaq", {"port": "uldaq:77"}, DeviceError, "'77' is not plugged in"),
-        ("uldaq", {"range_v": 3.0}, ValueError, "range_v=3: both inputs need one range of this device: 1, 10, 2, 5 V"),
+        ("mcc172", {"range_v": 10.0}, ValueError, "range_v=10 .*MCC 172 .*5 V"),
+        ("uldaq", {"port": "uldaq:77"}, DeviceError, "'77'"),
+        ("uldaq", {"range_v": 3.0}, ValueError, "range_v=3 .*1, 10, 2, 5 V"),
         ("ljm", {"port": "ljm:1"}, DeviceError, "LJME_DEVICE_NOT_FOUND"),
-        ("ljm", {"range_v": 5.0}, ValueError, "range_v=5 is none of 10, 1, 0.1, 0.01"),
+        ("ljm", {"range_v": 5.0}, ValueError, r"range_v=5 .*10, 1, 0\.1, 0\.01"),
     ],
 )
 def test_what_cannot_be_opened_is_one_clear_error(
@@ -221,9 +221,9 @@ def test_what_cannot_be_opened_is_one_clear_error(
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("audio", r"audio:485B39 cannot be opened \(.*Device unavailable.*check that no other program uses it"),
+        ("audio", "audio:485B39 .*Device unavailable"),
         ("nidaqmx", "reserved"),
-        ("mcc172", r"has failed \(Addr 0: A scan is already active.*no other program uses it"),
+        ("mcc172", "Addr 0: A scan is already active"),
         ("uldaq", "Device in use"),
         ("ljm", "CLAIMED_BY_ANOTHER_PROCESS"),
     ],
@@ -236,7 +236,7 @@ def test_a_device_in_use_is_reported(name: str, reason: str, plugged: Any, wirin
 
 def test_a_sound_device_that_gives_no_numbers_of_32_bits(plugged: Any, wiring: Wiring) -> None:
     wiring.faults.add("no 32 bits")
-    with pytest.raises(DeviceError, match=r"audio:485B39 cannot be opened \(Sample format not supported"):
+    with pytest.raises(DeviceError, match=r"audio:485B39 .*Sample format not supported"):
         plugged("audio")
 
 
@@ -258,15 +258,15 @@ def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPat
     settings = DeviceSettings(48000.0, inputs(10.0))
     two = fake_sounddevice(wiring, ("USB Audio", "USB Audio", "Mono Mic"), 10.0)
     monkeypatch.setitem(sys.modules, "sounddevice", two)
-    with pytest.raises(DeviceError, match=r"2 sound devices fit .*0: USB Audio, 1: USB Audio.*give its number"):
+    with pytest.raises(DeviceError, match=r"2 .*0: USB Audio, 1: USB Audio"):
         audio.open("audio:USB Audio", settings)
     with audio.open("audio:1", settings) as device:
         assert device.channels[0].full_scale == 10.0  # no calibration in its name: range_v is believed
-    with pytest.raises(ValueError, match=r"input=1: Mono Mic has the inputs 0 to 0"):
+    with pytest.raises(ValueError, match=r"input=1 .*Mono Mic .*0 to 0"):
         audio.open("audio:Mono", settings)
     slow = fake_sounddevice(wiring, ("USB Audio",), 10.0, actual_rate=44100.0)
     monkeypatch.setitem(sys.modules, "sounddevice", slow)
-    with pytest.raises(DeviceError, match="samples at 44100 Hz where 48000 Hz was asked"):
+    with pytest.raises(DeviceError, match=r"44100 Hz .*48000 Hz"):
         audio.open("audio:USB", settings)
 
 
@@ -282,9 +282,9 @@ def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytes
         device.start()
         block = next(iter(device.blocks()))
     np.testing.assert_allclose(block.codes[0] * device.channels[0].scale, 20.0, rtol=1e-6)
-    with pytest.raises(ValueError, match="333D01 measures acceleration itself, and no force"):
+    with pytest.raises(ValueError, match=r"input=0: .*333D01"):
         audio.open("audio:333D01", DeviceSettings(48000.0, inputs(10.0)))
-    with pytest.raises(ValueError, match=r"range_v=5: the calibration of 333D01 says 1\.579 V for input 0"):
+    with pytest.raises(ValueError, match=r"range_v=5 .*333D01 .*1\.579 for input 0"):
         audio.open("audio:333D01", DeviceSettings(48000.0, (SensorInput(0, Channel("acceleration", 0.01, 5.0)),)))
 
 
@@ -332,14 +332,14 @@ def test_ports_lists_them_all(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -
     (only,) = scan_ports("uldaq:01F2A3B4").ports
     assert only.answer is not None
     assert only.answer.identity.model == "USB-1608FS-Plus"
-    assert scan_ports("mcc172:5").ports[0].text == "no answer"
+    assert scan_ports("mcc172:5").ports[0].answer is None
 
 
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (RuntimeError("bus error"), r"fails when asked which devices there are \(RuntimeError: bus error\)"),
-        (["somewhere"], "lists what is no DeviceAddress that begins with uldaq:"),
+        (RuntimeError("bus error"), "RuntimeError: bus error"),
+        (["somewhere"], 'DeviceAddress .*"uldaq:"'),
     ],
 )
 def test_a_search_that_fails_is_a_remark_and_disables_nothing(

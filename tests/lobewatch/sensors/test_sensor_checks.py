@@ -119,15 +119,12 @@ def test_the_list_names_channels_rate_and_uncertainties(sensors: Sensors, folder
     absurd = replace(ACCELERATION, sensitivity=100.0, calibration_date="")
     code, out, err = sensors(silence, (old, absurd), rate=102400.0, realtime=True)
     assert code == 0, err
-    assert "lobewatch emulator, serial number EMU-1" in out
+    assert re.search("lobewatch emulator.* EMU-1", out)
     assert re.search(r"0 +force +2\.25 mV/N +±2222 N +±5 V +16 +0 +- +2020-01-15", out)
     assert re.search(r"1 +acceleration +9\.807e\+05 mV/g +±0\.005099 g +±5 V +16 +0 +- +-", out)
-    assert re.search(r"rate: 102400 Hz, measured 102[34]\d\d(\.\d)? ± \d+", out)
-    assert "warning: force: calibrated 2020-01-15, " in out
-    assert "warning: acceleration: a sensitivity of 100 V per m/s^2 is not believed (accelerometers have " in out
-    assert "without gain); did you mean mV?" in out
-    assert "warning: acceleration: date of calibration not known" in out
-    assert "warning: nobody says that a filter keeps out what lies above 51200 Hz, half the sample rate" in out
+    assert re.search(r"102400 Hz, .*102[34]\d\d(\.\d)? ± \d+", out)
+    for facts in ("force: .*2020-01-15", "acceleration: .*100 V per m/s", "acceleration: .*calibration", "51200 Hz"):
+        assert re.search(f"warning: .*{facts}", out)
     assert "102400.0" in (folder.path / "daq.json").read_text()
 
 
@@ -149,7 +146,7 @@ def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
     assert said["sample_rate_hz"] == RATE
     (error,) = said["errors"]
     assert (error["code"], error["about"]) == ("calibration-in-future", "force")
-    assert "2999-01-15 lies in the future" in error["text"]
+    assert "2999-01-15" in error["text"]
     assert error in said["remarks"]
 
 
@@ -164,7 +161,7 @@ def test_a_device_at_half_its_rate_is_rejected(
         with pytest.raises(SystemExit) as end:
             main()
     assert end.value.code == 2
-    assert re.search("error: the DAQ delivers .* not 50000: every frequency would be", capsys.readouterr().out)
+    assert re.search(r"error: .* 2[45]\d{3}\.\d+ ± .* 50000 ", capsys.readouterr().out)
     assert not (folder.path / "daq.json").exists()
 
 
@@ -173,20 +170,20 @@ def test_a_hung_mass_whose_sensitivities_are_right(sensors: Sensors) -> None:
     assert code == 0, err
     assert " 10 / 10  ✓ GOOD" in err
     assert "F/(m a) = 1.000" in out or "F/(m a) = 0.999" in out
-    assert "Both sensitivities agree within 5%." in out
-    assert "To change" not in out
+    assert "5%" in out
+    assert "sens_V_per_EU" not in out
 
 
 def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors) -> None:
     """The wrong mass stands for a wrong sensitivity: F/(m a) cannot tell them apart, and the text says so."""
     code, out, err = sensors(hung_mass(1.1 * MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
     assert code == 0, err
-    assert "the force is read 10.0% too large" in out
-    assert "the hammer has 2.475 mV/N instead of 2.25" in out
-    factor = re.search(r"multiply sens_V_per_EU of the force channel by (\S+),", out)
+    assert "force reads 10.0%" in out
+    assert re.search(r"2\.475 mV/N .*2\.25\b", out)
+    factor = re.search(r"sens_V_per_EU of the force channel by (\S+),", out)
     assert factor is not None
     assert float(factor[1]) == pytest.approx(1.1, abs=2e-3)
-    assert "is the mass the total that moves" in out
+    assert "total moving mass" in out
 
 
 def test_json_of_a_hung_mass(sensors: Sensors) -> None:
@@ -203,8 +200,9 @@ def test_the_skew_of_both_inputs(sensors: Sensors, skew: float) -> None:
     signal = CommonNoise(skew, (FORCE, ACCELERATION))
     code, out, err = sensors(signal, (FORCE, ACCELERATION), "--skew")
     assert code == 0, err
-    assert f"({skew:.4f} samples) after channel 0; entered is 0.000 us" in out
-    assert f"To enter: skew_s = {skew / RATE:.3e} in the device's own channel data" in out
+    assert f"({skew:.4f} samples)" in out
+    assert "0.000 us" in out
+    assert re.search(re.escape(f"skew_s = {skew / RATE:.3e}") + ".*INFO", out)
     said = json.loads(sensors(signal, (FORCE, ACCELERATION), "--skew", "--json")[1])
     assert said["skew_samples"] == pytest.approx(skew, abs=5e-5)
     assert said["skew_us"] == pytest.approx(1e6 * skew / RATE, abs=5 * said["skew_us_std"])
@@ -213,14 +211,14 @@ def test_the_skew_of_both_inputs(sensors: Sensors, skew: float) -> None:
 def test_two_different_signals_have_no_skew(sensors: Sensors) -> None:
     code, out, err = sensors(hung_mass(MASS), (FORCE, replace(ACCELERATION, sensitivity=1e-9)), "--skew")
     assert (code, out) == (2, "")
-    assert "do not carry one broad-band signal" in err
+    assert "coherence" in err
     assert "T-piece" in err
 
 
 def test_wrong_use(sensors: Sensors, folder: MachineFolder) -> None:
     code, _, err = sensors(silence, (FORCE, ACCELERATION), "--skew", "--mass-kg", 1)
     assert code == 2
-    assert "error: --mass-kg and --skew need different cabling" in err
+    assert re.search("error: --mass-kg .*--skew", err)
     code, _, err = sensors(lambda _, n: np.zeros((1, n)), (ACCELERATION,), "--skew")
-    assert (code, "a skew is that of two inputs; the DAQ has 1" in err) == (2, True)
-    assert "mass=-1.0 kg is not > 0" in sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", -1)[2]
+    assert (code, "[[daq.channel]]" in err) == (2, True)
+    assert "mass=-1.0 kg" in sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", -1)[2]

@@ -90,7 +90,7 @@ class DummySource:
         while self._going:
             data = self._link.read(3.0)
             if not data:
-                raise DeviceError("the dummy device has sent no samples for 3 s", "switch it off and on")
+                raise DeviceError("the dummy device has sent no samples for 3 s", "Switch it off and on")
             *packets, received = packets_in(received + data)
             for packet in packets:
                 _, first = HEADER.unpack_from(packet)

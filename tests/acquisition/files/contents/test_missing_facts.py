@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,9 +57,7 @@ def test_headings_and_options_in_any_unit_give_the_same_receptance(
 
 def test_all_that_is_missing_is_reported_in_one_message(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", rows(F, H.real, H.imag))
-    with pytest.raises(
-        DataError, match=r'what its columns are .*Description.columns "frequency \[Hz\],real \[m/N\],imag"'
-    ):
+    with pytest.raises(DataError, match=r'Description.columns "frequency \[Hz\],real \[m/N\],imag"'):
         read_recording(path)
     said = complaint(path, columns=("frequency", "real", "imag"))
     assert "Description.unit, such as m/N" in said
@@ -82,23 +81,23 @@ def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
     level = 20 * np.log10(size / 1e-6)
     in_db = put(tmp_path / "b.csv", "f (Hz);Mag (dB re 1 um/N);Phase (rad)\n" + rows(F, level, phase, separator=";"))
     assert read_frf(in_db).receptance == pytest.approx(H, rel=1e-6)
-    assert "Description.unit m/N: the file says 1 um/N" in complaint(in_db, unit="m/N")
+    assert re.search("Description.unit m/N: .*1 um/N", complaint(in_db, unit="m/N"))
     path = put(tmp_path / "c.csv", "f (Hz);Mag (dB);Phase (rad)\n" + rows(F, level, phase, separator=";"))
-    assert "the unit of Mag" in complaint(path)
+    assert "unit of Mag (Description.unit" in complaint(path)
     assert read_frf(path, Description(unit="um/N")).receptance == pytest.approx(H, rel=1e-6)
     no_phase = put(tmp_path / "d.csv", "f (Hz);Mag (dB);Phase\n" + rows(F, level, phase, separator=";"))
-    assert "the unit of its phase" in complaint(no_phase, unit="um/N")
+    assert "phase (Description.columns" in complaint(no_phase, unit="um/N")
 
 
 def test_options_that_the_file_contradicts_are_rejected(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", "Freq (Hz)\tReal (um/N)\tImag (um/N)\n" + rows(F, H.real, H.imag))
-    assert "Description.unit m/N: the file says um/N" in complaint(path, unit="m/N")
+    assert re.search("Description.unit m/N: .*um/N", complaint(path, unit="m/N"))
     assert not complaint(path, unit="µm/N")
     assert "Description.quantity acceleration" in complaint(path, quantity="acceleration")
-    assert "leave the option out" in complaint(path, rate=100.0)
+    assert "Description.rate: " in complaint(path, rate=100.0)
     assert "Description.averages 0" in complaint(path, averages=0)
-    assert "Description.response 2: it holds 1" in complaint(path, response=2)
-    assert "'nonsense' is none of time" in complaint(path, columns=("nonsense", "real", "imag"))
+    assert re.search("Description.response 2: .* 1 FRFs", complaint(path, response=2))
+    assert "Description.columns 'nonsense': " in complaint(path, columns=("nonsense", "real", "imag"))
     assert "no column 4" in complaint(path, columns=("frequency", "-", "real", "imag"))
 
 
@@ -114,7 +113,7 @@ def test_the_heading_of_an_frf_file_stands_behind_its_first_row(tmp_path: Path) 
 def test_several_responses_are_asked_for_by_number(tmp_path: Path) -> None:
     heading = "Freq (Hz),Real (m/N),Imag,Real (m/N),Imag\n"
     path = put(tmp_path / "two.csv", heading + rows(F, H.real, H.imag, 2 * H.real, 2 * H.imag, separator=","))
-    assert "which of its 2 FRFs is meant" in complaint(path)
+    assert "2 FRFs" in complaint(path)
     assert read_frf(path, Description(response=2)).receptance == pytest.approx(2 * H, rel=1e-6)
 
 
@@ -161,7 +160,7 @@ def test_a_time_axis_is_evaluated_as_a_whole(tmp_path: Path, form: str) -> None:
 def test_a_time_axis_that_is_not_even_is_rejected(tmp_path: Path, spoil: Callable[..., np.ndarray]) -> None:
     time, force, response = hit_signals(2000)
     path = put(tmp_path / "hit.txt", "time_s\tforce_N\tacc_g\n" + rows(spoil(time), force, response, form="%.12g"))
-    with pytest.raises(DataError, match=r"uneven|does not rise|time holds 'nan' in line 11,"):
+    with pytest.raises(DataError, match=r"uneven|not increase|time .*'nan' in line 11,"):
         read_hits(path)
 
 
@@ -181,12 +180,12 @@ def test_text_of_two_bytes_a_character(tmp_path: Path) -> None:
 
 def test_mixed_units_and_damaged_numbers_are_rejected(tmp_path: Path) -> None:
     mixed = put(tmp_path / "a.csv", "Freq (Hz),Real (um/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=","))
-    assert "Real is in 'um/N', Imag in 'm/N'; they must be the same" in complaint(mixed)
+    assert re.search("Real .*'um/N'.* Imag .*'m/N'", complaint(mixed))
     volts = put(tmp_path / "b.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + rows(F, H.real, H.imag, separator=","))
-    assert "the sensitivity of the sensor, as its FRF is in V/N" in complaint(volts)
+    assert re.search("sensor.* V/N .*Description.sensitivity", complaint(volts))
     for spoilt in (F[::-1], np.where(F == 9, F - 1, F)):
         path = put(tmp_path / "c.csv", "Freq (Hz),Real (m/N),Imag\n" + rows(spoilt, H.real, H.imag, separator=","))
-        assert "frequency must be finite, >= 0 Hz and strictly rising" in complaint(path)
+        assert "frequency must" in complaint(path)
     word = put(tmp_path / "d.csv", "Freq (Hz),Real (m/N),Imag\n1,2,3\n2,overflow,3\n3,4,5\n")
-    with pytest.raises(DataError, match=r"d\.csv: Real holds 'overflow' in line 3, which is no number"):
+    with pytest.raises(DataError, match=r"d\.csv: .*Real .*'overflow' in line 3,"):
         read_recording(word)

@@ -110,7 +110,7 @@ def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> No
     assert ("sensitivity", "option") in [(fact.name, fact.origin) for fact in inspect_file(path, said).facts]
     for wrong in ("2.25", "2.25 N/mV", "0 mV/N", "2.25 mV/furlong"):
         text = inspect_file(path, Description(sensitivity=(wrong, "10 mV/g"))).problems
-        assert f"Description.sensitivity {wrong!r}: give volts a unit" in text
+        assert f"Description.sensitivity {wrong!r}: " in text
     three = put(tmp_path / "c.txt", "time\tx_V\ty_V\tz_V", time, force, response, response)
     asked = inspect_file(three).problems
     assert [word in asked for word in ("Description.sensitivity", "Description.response", "Description.rate")] == [
@@ -119,7 +119,7 @@ def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> No
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g", "10 mV/g"), response=2, rate=RATE)
     assert inspect_file(three, said).problems == ""
     named = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g", time, force, response)
-    assert "it has no channel in volts" in inspect_file(named, said).problems
+    assert "Description.sensitivity: " in inspect_file(named, said).problems
 
 
 @pytest.mark.parametrize(("unit", "order", "factor"), [("mm/s", 1, 1e3), ("um", 2, 1e6)])
@@ -135,7 +135,8 @@ def test_velocity_and_displacement_over_time_give_the_frf_of_that_motion(
     ours, exact = read_frf(path), read_frf(direct)
     near = (exact.frequency > 100) & (exact.frequency < 1500)
     assert ours.receptance[near] == pytest.approx(exact.receptance[near], rel=1e-3)
-    assert "is differentiated" in {fact.name: fact.value for fact in inspect_file(path).facts}["note"]
+    quantity = "velocity" if order == 1 else "displacement"
+    assert quantity in {fact.name: fact.value for fact in inspect_file(path).facts}["note"]
 
 
 def test_a_velocity_that_was_cut_off_is_an_overload(tmp_path: Path) -> None:
@@ -205,7 +206,7 @@ def test_the_last_hit_of_signal_calc_is_taken_before_the_window(tmp_path: Path, 
     assert recording.hits[0].force == pytest.approx(force)
     assert recording.window is None
     whole = inspect_file(tmp_path / "a.mat", Description(columns=("force=X1", "acceleration=X2:2"), rate=RATE)).problems
-    assert "2 columns are called 'X1'" in whole
+    assert "2 columns " in whole
 
 
 def test_two_machines_in_one_file_are_rejected(tmp_path: Path) -> None:
@@ -213,10 +214,10 @@ def test_two_machines_in_one_file_are_rejected(tmp_path: Path) -> None:
     convert(path, tmp_path / "a.uff", Description())
     text = (tmp_path / "a.uff").read_text()
     (tmp_path / "two.uff").write_text(text + text.replace("a.csv", "mill 4"))
-    assert "it holds a.csv, mill 4, not one machine" in inspect_file(tmp_path / "two.uff").problems
+    assert "(a.csv, mill 4)" in inspect_file(tmp_path / "two.uff").problems
     text = path.read_text()
     path.write_text(f"# machine: mill 3\n# machine: mill 4\n{text}")
-    assert "it holds mill 3, mill 4, not one machine" in inspect_file(path).problems
+    assert "(mill 3, mill 4)" in inspect_file(path).problems
 
 
 def test_records_of_two_directions_or_machines_are_not_averaged(tmp_path: Path) -> None:
@@ -228,10 +229,10 @@ def test_records_of_two_directions_or_machines_are_not_averaged(tmp_path: Path) 
     assert not inspect_file(both).problems
     assert len(read_hits(both)) == 2
     both.write_text("".join((tmp_path / f"{one}.uff").read_text() for one in "xy"))
-    with pytest.raises(DataError, match=r"which force of 1 x over 1 x .* goes with which response"):
+    with pytest.raises(DataError, match=r"\(1 x over 1 x .*Description\.columns"):
         read_hits(both)
     convert(path, tmp_path / "a.json", Description(), hits=True)
     text = (tmp_path / "a.json").read_text()
     one, other = text.replace("hit 1", "mill 3"), text.replace("hit 1", "lathe 1")
     (tmp_path / "a.json").write_text(f"{one[:-1]}, {other[1:]}")
-    assert "it holds mill 3, lathe 1, not one machine" in inspect_file(tmp_path / "a.json").problems
+    assert "(mill 3, lathe 1)" in inspect_file(tmp_path / "a.json").problems

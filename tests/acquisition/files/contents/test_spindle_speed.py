@@ -46,11 +46,11 @@ def test_a_pulse_that_is_missing_leaves_the_speed_unknown_not_halved() -> None:
 @pytest.mark.parametrize(
     ("signal", "each", "text"),
     [
-        (np.full(2000, 4.9), 1, "0 pulses in 0.2 s, less than two turns of 1; is the tachometer connected"),
+        (np.full(2000, 4.9), 1, "0 pulses in 0.2 s .*two turns of 1"),
         (pulses(3000.0, seconds=0.05), 1, "2 pulses in 0.05 s"),
-        (pulses(3000.0, 10, seconds=0.05), 60, "less than two turns of 60"),
-        (np.random.default_rng(0).normal(size=5000), 1, "pulses at no even times; is the tachometer connected"),
-        (pulses(3000.0), 0, "0 pulses a turn; give 1 or more"),
+        (pulses(3000.0, 10, seconds=0.05), 60, "two turns of 60"),
+        (np.random.default_rng(0).normal(size=5000), 1, "pulses are irregular"),
+        (pulses(3000.0), 0, "0 pulses per turn"),
     ],
 )
 def test_what_is_no_tachometer_is_rejected(signal: np.ndarray, each: int, text: str) -> None:

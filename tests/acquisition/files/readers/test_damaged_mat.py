@@ -153,10 +153,10 @@ def outcome(path: Path) -> str:
     """Return how a file was read."""
     try:
         if inspect_file(path).problems:
-            return "asked about"
+            return "incomplete"
         read_frf(path)
     except DataError as error:
-        return "refused" if str(path) in str(error) else str(error)
+        return "rejected" if str(path) in str(error) else str(error)
     return "read"
 
 
@@ -167,8 +167,8 @@ def assert_read_or_refused(folder: Path, count: int, forks: Forks) -> None:
     for seed in range(count):
         path.write_bytes(damaged(contents[seed % len(contents)], random.Random(seed)))
         outcomes[outcome(path)] += 1
-    assert set(outcomes) <= {"refused", "asked about", "read"}
-    assert outcomes["refused"] > 0.3 * count
+    assert set(outcomes) <= {"rejected", "incomplete", "read"}
+    assert outcomes["rejected"] > 0.3 * count
     assert set(forks.ended_by) <= {"SIGSEGV", "SIGBUS", "SIGABRT", "SIGXCPU"}
 
 
@@ -189,7 +189,7 @@ def test_a_file_that_would_be_read_for_hours_is_rejected_after_seconds(tmp_path:
     content[at : at + 4] = struct.pack("<i", 3_000_000)
     (tmp_path / "a.mat").write_bytes(content)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    with pytest.raises(DataError, match=r"a\.mat: damaged: its reader crashes or hangs on it; export it anew"):
+    with pytest.raises(DataError, match=r"a\.mat: .*hangs"):
         inspect_file(tmp_path / "a.mat")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -68,19 +69,18 @@ def doubtful(decimal: str, force: str, *others: str) -> str:
 @pytest.mark.parametrize(
     ("decimal", "force", "message"),
     [
-        (".", "1,234", "Force holds '1,234' in line 2, which may be 1.234 or 1234"),
-        (".", "-12,345", "Force holds '-12,345' in line 2, which may be -12.345 or -12345"),
-        (",", "1.234", "Force holds '1.234' in line 2, which may be 1.234 or 1234"),
+        (".", "1,234", r"Force .*'1,234' in line 2, .*1\.234 or 1234 "),
+        (".", "-12,345", r"Force .*'-12,345' in line 2, .*-12\.345 or -12345 "),
+        (",", "1.234", r"Force .*'1\.234' in line 2, .*1\.234 or 1234 "),
     ],
 )
 def test_a_number_that_may_be_another_is_rejected_where_it_is_used(
     tmp_path: Path, decimal: str, force: str, message: str
 ) -> None:
     path = put(tmp_path / "a.csv", doubtful(decimal, force))
-    assert complaint(path).startswith(message)
-    assert complaint(put(tmp_path / "b.csv", doubtful(decimal, force, "7"))).startswith(
-        message.replace("line 2", "line 3")
-    )
+    assert re.search(message, complaint(path))
+    later = put(tmp_path / "b.csv", doubtful(decimal, force, "7"))
+    assert re.search(message.replace("line 2", "line 3"), complaint(later))
     said = Description(columns=("time [s]", "-", "acceleration [g]"), without_force=True)
     assert read_hits(path, said)[0].acceleration == pytest.approx(9.80665 * RESPONSE, abs=1e-6)
 
@@ -113,27 +113,25 @@ def test_a_person_says_which_sign_is_the_decimal_one(tmp_path: Path, force: str,
     whole = "".join(f"{place};{force if place else 7};{place % 7}\n" for place in range(len(HIT)))
     path = put(tmp_path / "a.csv", "Time (ms);Force (N);Acc (g)\n" + whole)
     remedy = "Description.decimal comma or Description.decimal point"
-    doubt = f"Force holds '1,234' in line 3, which may be 1.234 or 1234 ({remedy})"
-    assert complaint(path).partition(";")[0] == (doubt if "," in force else "")
+    fault = rf"Force .*'1,234' in line 3, .*1\.234 or 1234 \({remedy}\)"
+    assert re.search(fault, complaint(path)) if "," in force else complaint(path) == ""
     assert read_hits(path, Description(decimal=said))[0].force[1:] == pytest.approx(value, rel=1e-12)
 
 
 def test_a_decimal_sign_that_is_none_or_of_no_text_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"Description\.decimal dot: is no decimal sign; give comma or point"):
+    with pytest.raises(DataError, match=r"Description\.decimal dot .*comma or point"):
         read_hits(put(tmp_path / "a.csv", doubtful(".", "1,234")), Description(decimal="dot"))
     np.save(tmp_path / "a.npy", np.ones((8, 2)))
-    with pytest.raises(
-        DataError, match=r"Description\.decimal comma: a NumPy file is no text of lines; leave the option out"
-    ):
+    with pytest.raises(DataError, match=r"Description\.decimal comma: .*NumPy"):
         read_hits(tmp_path / "a.npy", Description(decimal="comma"))
 
 
 @pytest.mark.parametrize(
     ("decimal", "force", "other", "message"),
     [
-        (",", "1,234.5", "0,5", "Force holds '1,234.5' in line 3, which is no number"),
-        (".", "0,5", "1,234,567", "Force holds '0,5' in line 3, which is no number"),
-        (".", "1,234", "7", "Force holds '1,234' in line 3, which may be 1.234 or 1234"),
+        (",", "1,234.5", "0,5", r"Force .*'1,234\.5' in line 3, "),
+        (".", "0,5", "1,234,567", "Force .*'0,5' in line 3, "),
+        (".", "1,234", "7", r"Force .*'1,234' in line 3, .*1\.234 or 1234 "),
     ],
 )
 def test_columns_that_contradict_themselves_or_each_other_are_rejected(
@@ -142,7 +140,7 @@ def test_columns_that_contradict_themselves_or_each_other_are_rejected(
     text = doubtful(decimal, force, other).splitlines()
     beside = [";Temp;More", *(";0,5;1,234.5" for _ in HIT)]
     path = put(tmp_path / "a.csv", "".join(f"{a}{b}\n" for a, b in zip(text, beside, strict=True)))
-    assert complaint(path).startswith(message)
+    assert re.search(message, complaint(path))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])

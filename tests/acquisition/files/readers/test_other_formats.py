@@ -241,7 +241,7 @@ def test_a_time_that_is_there_twice_is_rejected(tmp_path: Path, make: Callable[.
     path, signals = tmp_path / f"a{suffix}", np.random.default_rng(1).normal(size=(2, 64))
     said = Description(unit="g", force_unit="N") if suffix == ".mat" else Description()
     make(path, TWICE, *signals)
-    with pytest.raises(DataError, match=r"its time steps are uneven: .* twice there"):
+    with pytest.raises(DataError, match="uneven"):
         read_hits(path, said)
     make(path, np.arange(64.0) / 25600, *signals)
     assert "uneven" not in inspect_file(path, said).problems
@@ -252,7 +252,7 @@ def test_a_frequency_that_is_there_twice_is_rejected(tmp_path: Path) -> None:
     said = Description(columns=("frequency=f", "frf=H"), unit="m/N")
     for make in (scipy.io.savemat, mat_73):
         make(tmp_path / "a.mat", {"f": twice, "H": H})
-        with pytest.raises(DataError, match="frequency must be finite, >= 0 Hz and strictly rising"):
+        with pytest.raises(DataError, match="frequency must"):
             read_frf(tmp_path / "a.mat", said)
 
 
@@ -298,7 +298,7 @@ def test_a_mat_file_on_which_its_reader_crashes_is_rejected(tmp_path: Path, monk
     scipy.io.savemat(path, {"freq": F, "frf": H})
     assert not inspect_file(path, Description(unit="m/N")).problems
     monkeypatch.setattr(sys, "executable", "false")
-    with pytest.raises(DataError, match="its reader crashes or hangs on it"):
+    with pytest.raises(DataError, match="hangs"):
         inspect_file(path)
 
 
@@ -306,5 +306,5 @@ def test_a_small_mat_file_that_unpacks_to_much_is_rejected_unread(tmp_path: Path
     path = mat_73(tmp_path / "bomb.mat", {"freq": F, "frf": H})
     with h5py.File(path, "r+") as file:
         file.create_dataset("big", shape=(100_000_000,), dtype="f8", chunks=(100_000,), compression="gzip")
-    with pytest.raises(DataError, match=r"bomb\.mat: .* MB that unpack to 800"):
+    with pytest.raises(DataError, match=r"bomb\.mat: .* MB .* 800"):
         inspect_file(path)

@@ -17,7 +17,7 @@ from acquisition import DataError, Description, inspect_file, read_frf, read_hit
 def test_a_file_of_the_force_is_rejected_next_to_an_frf(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
     force = put(tmp_path / "b.txt", rows(TIME, FORCE))
-    assert "Description.force: the file holds an FRF; leave the option out" in complaint(path, force=force)
+    assert "Description.force: " in complaint(path, force=force)
 
 
 def test_two_files_with_headings_need_no_word(tmp_path: Path) -> None:
@@ -30,7 +30,7 @@ def test_two_files_with_headings_need_no_word(tmp_path: Path) -> None:
 def test_a_file_a_channel(tmp_path: Path) -> None:
     force = put(tmp_path / "impact.txt", rows(TIME, FORCE, end="\r\n"))
     response = put(tmp_path / "accel.txt", rows(TIME, RESPONSE, end="\r\n"))
-    assert "Description.force FILE where the force stands in another" in complaint(response)
+    assert "Description.columns" in complaint(response)
     columns = ("time [s]", "acceleration [m/s^2]", "time [s]", "force [N]")
     (hit,) = read_hits(response, Description(force=force, columns=columns))
     assert hit.force == pytest.approx(FORCE, abs=1e-9)
@@ -39,9 +39,9 @@ def test_a_file_a_channel(tmp_path: Path) -> None:
     assert names in complaint(response, force=force)
     for spoilt in (TIME + 0.1, 2 * TIME):
         put(force, rows(spoilt, FORCE))
-        assert "its time axes differ" in complaint(response, force=force, columns=columns)
+        assert "time axes differ" in complaint(response, force=force, columns=columns)
     put(force, rows(TIME[:-3], FORCE[:-3]))
-    assert "its channels differ in length: column 2 of impact.txt [N] (397), column 2 [m/s^2] (400)" in complaint(
+    assert "(column 2 of impact.txt [N] (397), column 2 [m/s^2] (400))" in complaint(
         response, force=force, columns=columns
     )
     with pytest.raises(FileNotFoundError, match="nowhere"):
@@ -66,7 +66,7 @@ def test_a_lost_sample_is_no_want_of_digits(tmp_path: Path, lost: int) -> None:
     time = np.delete(np.arange(1000.0 + lost), np.arange(600, 600 + lost))  # whole milliseconds
     path = put(tmp_path / "a.txt", rows(time, np.resize(FORCE, 1000), np.resize(RESPONSE, 1000)))
     said = complaint(path, columns=("time [ms]", "force [N]", "acceleration [g]"))
-    assert "its time steps are uneven" in said
+    assert "time steps are uneven" in said
     assert "give Description.rate" in said
 
 
@@ -83,7 +83,7 @@ def test_text_of_signalcalc(tmp_path: Path) -> None:
     assert not complaint(path)
     assert is_h(read_frf(path))
     product = put(tmp_path / "other.txt", SIGNAL_CALC.replace("Units: Ratio", "Units: Product") + text)
-    assert "which is not known here as its unit" in complaint(product)
+    assert "Description.columns" in complaint(product)
 
 
 def pulse(header: dict[str, str], *blocks: str) -> str:
@@ -116,14 +116,14 @@ def test_text_of_pulse(tmp_path: Path, sign: str) -> None:
     assert is_h(found.frf)
     assert f"{found.created:%Y-%m-%d %H:%M:%S}" == "2019-05-24 18:23:06"
     volts = put(path, pulse(HEADER | {"AmplitudeUnit": "V/N"}, BLOCK))
-    assert complaint(volts).startswith("it does not say: the sensitivity of the sensor")
+    assert complaint(volts).startswith("missing sensitivity of the sensor")
     two = put(path, pulse(HEADER, BLOCK, BLOCK))
-    assert "which of its 2 FRFs is meant" in complaint(two)
+    assert "2 FRFs: " in complaint(two)
     assert is_h(read_frf(two, Description(response=2)))
     cut = put(path, pulse(HEADER, BLOCK[: BLOCK.rindex("\r\n59") + 2]))
-    with pytest.raises(DataError, match=r"line \d+: 58 of 59 rows are there; the file is cut short"):
+    with pytest.raises(DataError, match=r"line \d+: .*58 of 59 rows"):
         inspect_file(cut)
-    with pytest.raises(DataError, match="its header lacks 'x-axis size'"):
+    with pytest.raises(DataError, match="'x-axis size'"):
         inspect_file(put(path, pulse({key: HEADER[key] for key in ("Decimal Symbol", "Data Type")}, BLOCK)))
 
 

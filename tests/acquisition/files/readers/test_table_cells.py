@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from written_tables import FORCE, HIT, RESPONSE, F, H, complaint, is_h, numeral, put, rows
 
-from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
+from acquisition import DataError, Description, inspect_file, read_frf, read_hits
 from acquisition.files.read_cut import read_cut_recording
 
 pytestmark = pytest.mark.quick
@@ -30,9 +31,7 @@ def test_a_gap_in_a_column_that_is_used_is_rejected_with_its_place(
     tmp_path: Path, separator: str, column: int, name: str
 ) -> None:
     path = put(tmp_path / "a.csv", cells_of(separator, (40, column, "")))
-    assert complaint(path).startswith(
-        f"{name} is empty in line 42; mend it there, or leave {name} out of Description.columns"
-    )
+    assert re.search(rf"\b{name} is empty in line 42\..* {name} .*Description\.columns", complaint(path))
 
 
 @pytest.mark.parametrize("text", ["", "overflow", "1,234"])
@@ -60,7 +59,8 @@ def test_columns_are_cut_to_the_shortest_that_is_used(
     found = inspect_file(put(tmp_path / "a.csv", text)).require_valid()
     (hit,), n = found.hits, min(ends[:3])
     name = ("Time", "Force", "Acc")[ends.index(n)]
-    assert Fact("rows", f"{n} of {max(ends[:3])}, as {name} ends there", "default") in found.facts
+    (cut,) = (fact.value for fact in found.facts if fact.name == "rows" and fact.origin == "default")
+    assert re.fullmatch(rf"{n} of {max(ends[:3])}, .*\b{name}\b.*", cut)
     assert hit.force == pytest.approx(FORCE[:n], abs=1e-7)
     assert hit.acceleration == pytest.approx(RESPONSE[:n], abs=1e-7)
     assert hit.sample_rate == pytest.approx(4000)
@@ -76,16 +76,14 @@ def test_numbers_next_to_the_first_rows_are_notes_where_all_rows_have_as_many_ce
     assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-7)
     longer = path.read_text().splitlines()
     longer[n] += f"{separator}5"
-    with pytest.raises(DataError, match=f"line {n + 1}: 5 numbers where other rows have 3"):
+    with pytest.raises(DataError, match=rf"line {n + 1}: 5 .*3"):
         inspect_file(put(tmp_path / "b.csv", "\n".join(longer) + "\n"))
 
 
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
     text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
     path = put(tmp_path / "a.csv", text)
-    assert (
-        complaint(path) == "it does not say: which of its 2 responses is meant: 1 Acc, 2 Acc y (Description.response 1)"
-    )
+    assert complaint(path).endswith("2 responses: 1 Acc, 2 Acc y (Description.response 1)")
     assert read_hits(path, Description(response=1))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
     assert "Acc y is empty in line 9" in complaint(path, response=2)
 
@@ -106,7 +104,7 @@ def test_of_several_time_columns_that_of_another_channel_may_end_early(tmp_path:
 def test_a_row_that_ends_early_above_one_that_does_not_has_lost_a_number(tmp_path: Path) -> None:
     lines = cells_of(",").splitlines(keepends=True)
     lines[50] = "0.01,3,20\n"
-    with pytest.raises(DataError, match="line 51: 3 numbers where other rows have 4"):
+    with pytest.raises(DataError, match=r"line 51: 3 .*4"):
         read_hits(put(tmp_path / "a.csv", "".join(lines)))
 
 
@@ -115,7 +113,7 @@ def test_of_columns_between_blanks_none_can_end_early(tmp_path: Path) -> None:
         "Time(s) Force(N) Acc(g) Temp\n",
         *(" ".join(row[: 4 if i < 300 else 3]) + "\n" for i, row in enumerate(HIT)),
     ]
-    with pytest.raises(DataError, match="line 302: 3 numbers where other rows have 4"):
+    with pytest.raises(DataError, match=r"line 302: 3 .*4"):
         read_hits(put(tmp_path / "a.txt", "".join(lines)))
 
 
@@ -123,13 +121,13 @@ def test_of_columns_between_blanks_none_can_end_early(tmp_path: Path) -> None:
 def test_of_a_few_rows_that_stop_early_each_may_have_lost_a_number(tmp_path: Path, n_short: int) -> None:
     lines = cells_of(",").splitlines(keepends=True)
     lines[-n_short:] = ["0.0995,3,20\n"] * n_short
-    with pytest.raises(DataError, match=f"line {402 - n_short}: 3 numbers where other rows have 4"):
+    with pytest.raises(DataError, match=rf"line {402 - n_short}: 3 .*4"):
         read_hits(put(tmp_path / "a.csv", "".join(lines)))
 
 
 @pytest.mark.parametrize("end", ["9.9e-2", "9.9e-2,1", "9.9e-2,1,", "9.9e-2,1,2", "9.9e-2,1,2,"])
 def test_a_file_that_ends_within_its_last_row_is_cut_short(tmp_path: Path, end: str) -> None:
-    with pytest.raises(DataError, match=r"line 402: \d numbers where|line 402 ends within its row: .* cut short"):
+    with pytest.raises(DataError, match=r"line 402: \d numbers|truncated at line 402,"):
         read_hits(put(tmp_path / "a.csv", cells_of(",") + end))
 
 
@@ -141,7 +139,8 @@ def test_an_frf_is_cut_where_its_coherence_ends_and_rejected_for_a_gap(tmp_path:
     assert found.frf is not None
     assert found.frf.frequency.tolist() == F[:40].tolist()
     assert found.frf.receptance == pytest.approx(H[:40], rel=1e-9)
-    assert Fact("rows", "40 of 59, as Coherence ends there", "default") in found.facts
+    (cut,) = (fact.value for fact in found.facts if fact.name == "rows" and fact.origin == "default")
+    assert re.fullmatch("40 of 59, .*Coherence.*", cut)
     lines[9] = lines[9].replace(f"{H[9].imag:.12g}", "")
     assert "Imag is empty in line 11" in complaint(put(tmp_path / "b.csv", head + "".join(lines)))
 

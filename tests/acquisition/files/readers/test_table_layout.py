@@ -70,7 +70,7 @@ def test_separators_behind_the_last_column(tmp_path: Path, end: str) -> None:
 
 def test_headings_of_another_width_are_no_hindrance_where_columns_are_named(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq\tReal\n" + rows(F, H.real, H.imag))
-    assert "what its columns are (column 1, column 2, column 3)" in complaint(path)
+    assert "columns column 1, column 2, column 3 (Description.columns" in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency", "real [m/N]", "imag"))))
 
 
@@ -103,9 +103,9 @@ def test_words_below_the_rows_are_reported_and_a_broken_last_row_is_rejected(tmp
     found = inspect_file(put(tmp_path / "a.txt", f"{text}End of file\n")).require_valid()
     assert found.frf is not None
     assert is_h(found.frf)
-    assert "below its rows stands 'End of file'" in [fact.value for fact in found.facts]
+    assert "ignored 'End of file' below the rows" in [fact.value for fact in found.facts]
     for last in ("60\toverflow\tx\n", "nan\tnan\tnan\n", "x\t2\t3\n"):
-        with pytest.raises(DataError, match=r"line 61|not finite|rising"):
+        with pytest.raises(DataError, match=r"line 61|not finite|increasing"):
             inspect_file(put(tmp_path / "a.txt", text + last)).require_valid()
 
 
@@ -127,14 +127,12 @@ def test_a_column_of_words_is_reported(tmp_path: Path) -> None:
     found = inspect_file(
         put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n" + lines)
     ).require_valid()
-    assert "beside its columns stands 'ok' in the last row" in [fact.value for fact in found.facts]
+    assert "ignored 'ok' next to the columns in the last row" in [fact.value for fact in found.facts]
 
 
 def test_numbers_above_a_text_are_no_table(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "1 a\n2 b\n3 c\n" + "words alone\n" * 20 + "4 words\n")
-    with pytest.raises(
-        DataError, match=r"a\.txt: line 1: no rows of numbers begin here; pass over .* Description.skip"
-    ):
+    with pytest.raises(DataError, match=r"a\.txt: line 1: .* Description\.skip"):
         inspect_file(path)
 
 
@@ -153,16 +151,14 @@ def test_notes_to_the_right_in_a_few_rows(tmp_path: Path) -> None:
     assert hit.acceleration == pytest.approx(RESPONSE, abs=1e-9)
     lines[5] += ",7.5"
     put(path, "Time (s),Force (N),Acc (m/s2)\n" + "\n".join(lines) + "\n")
-    with pytest.raises(DataError, match=r"a\.csv: line 7: 4 numbers where other rows have 3"):
+    with pytest.raises(DataError, match=r"a\.csv: line 7: 4 .*3"):
         read_hits(path)
 
 
 def test_a_broken_first_row_is_no_heading(tmp_path: Path) -> None:
     text = rows(F, H.real, H.imag, separator=",")
     path = put(tmp_path / "a.csv", "Freq (Hz),Real (m/N),Imag (m/N)\nx,1e-6,2e-7\n" + text)
-    with pytest.raises(
-        DataError, match=r"line 2: 'x,1e-6,2e-7' is no row of numbers; mend it, or .* Description.skip 2$"
-    ):
+    with pytest.raises(DataError, match=r"line 2: 'x,1e-6,2e-7' .* Description\.skip 2\.$"):
         read_recording(path)
     assert is_h(read_frf(path, Description(skip=2, columns=("frequency", "real [m/N]", "imag"))))
 

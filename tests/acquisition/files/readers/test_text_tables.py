@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
-from acquisition import DataError, Description, Fact, inspect_file, read_frf, read_hits
+from acquisition import DataError, Description, inspect_file, read_frf, read_hits
 
 HIT = rows(TIME, FORCE, RESPONSE, form="%.9g", separator=",")
 LEVEL, DEGREES = 20 * np.log10(np.abs(H)), np.degrees(np.angle(H))
@@ -72,13 +73,13 @@ def test_a_level_says_what_it_is_a_multiple_of(tmp_path: Path, unit: str, refere
     text = f"Frequency (Hz)\tMagnitude ({unit})\tPhase (deg)\n" + rows(F, level, DEGREES)
     path = put(tmp_path / "a.txt", text)
     assert is_h(read_frf(path))
-    assert "Description.unit m/N: the file says" in complaint(path, unit="m/N")
+    assert "Description.unit m/N: " in complaint(path, unit="m/N")
 
 
 @pytest.mark.parametrize("unit", ["dB", "dBMag", "dB (rms)", "dB re 1"])
 def test_a_level_of_nothing_known_asks_for_its_unit(tmp_path: Path, unit: str) -> None:
     path = put(tmp_path / "a.txt", f"Frequency (Hz)\tMag [{unit}]\tPhase (deg)\n" + rows(F, LEVEL, DEGREES))
-    assert "it does not say: the unit of Mag" in complaint(path)
+    assert "unit of Mag (Description.unit" in complaint(path)
     assert is_h(read_frf(path, Description(unit="m/N")))
 
 
@@ -95,13 +96,13 @@ def test_a_name_says_that_a_column_is_in_db(tmp_path: Path, name: str, unit: flo
 def test_a_magnitude_below_zero_is_no_magnitude_but_a_level(tmp_path: Path) -> None:
     text = "Freq (Hz),Magnitude (m/N),Phase (deg)\n" + rows(F, LEVEL, DEGREES, separator=",")
     path = put(tmp_path / "a.csv", text)
-    assert "whether Magnitude, which falls below 0, is in dB" in complaint(path)
+    assert 'Description.columns "frequency,db,' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency", "db", "phase [deg]"))))
 
 
 def test_one_real_column_called_frf_is_asked_about(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "Frequency (Hz),FRF (m/N)\n" + rows(F, np.abs(H), separator=","))
-    assert "what its columns are (Frequency [Hz], FRF [m/N])" in complaint(path)
+    assert "columns Frequency [Hz], FRF [m/N] (Description.columns" in complaint(path)
 
 
 @pytest.mark.parametrize("label", ["Unit", "Units", "Einheit:", "単位"])
@@ -116,7 +117,7 @@ def test_notes_next_to_rows_do_not_make_names_and_units_alternate(tmp_path: Path
     first, *others = HIT.splitlines()
     notes = f"CH No.,CH6,CH8,,,\nUnit,N,cm/s2,,,\n{first},,Mass,2.5\n" + "".join(f"{row},,,\n" for row in others)
     path = put(tmp_path / "a.csv", notes)
-    assert "which are CH No., CH6 [N], CH8 [cm/s2]" in complaint(path, columns=("time",))
+    assert "(CH No., CH6 [N], CH8 [cm/s2])" in complaint(path, columns=("time",))
     (hit,) = read_hits(path, Description(columns=("time [s]", "force", "acceleration")))
     assert hit.acceleration == pytest.approx(RESPONSE / 100, abs=1e-10)
 
@@ -134,7 +135,7 @@ def test_notes_below_the_rows_may_hold_a_number(tmp_path: Path, footer: str) -> 
 
 def test_a_row_below_the_rows_that_is_none_is_rejected(tmp_path: Path) -> None:
     text = "Freq (Hz),Real (m/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=",") + "sixty,1e-8,2e-8\n"
-    with pytest.raises(DataError, match="Freq holds 'sixty' in line 61, which is no number"):
+    with pytest.raises(DataError, match=r"Freq .*'sixty' in line 61"):
         read_frf(put(tmp_path / "a.csv", text))
 
 
@@ -142,7 +143,7 @@ def test_tables_beneath_each_other_are_as_many_frfs(tmp_path: Path) -> None:
     heading = "Frequency (Hz)\tReal (um/N)\tImag (um/N)\n"
     tables = (f"Point {i}\n\n{heading}" + rows(F, i * H.real * 1e6, i * H.imag * 1e6) for i in (3, 1, 2))
     path = put(tmp_path / "a.txt", "".join(tables))
-    assert "which of its 3 FRFs is meant" in complaint(path)
+    assert "3 FRFs: " in complaint(path)
     assert is_h(read_frf(path, Description(response=2)))
 
 
@@ -160,7 +161,7 @@ def test_the_line_at_0_hz_may_be_missing_in_words(tmp_path: Path, missing: str) 
     path = put(tmp_path / "a.csv", text)
     assert is_h(read_frf(path))
     path.write_text(text.replace("\n30,", f"\n30,{missing},0\n#"))
-    assert f"Real holds '{missing}' in line 32" in complaint(path)
+    assert re.search(f"Real .*'{missing}' in line 32", complaint(path))
 
 
 def test_numbers_in_quotes_may_have_a_decimal_comma(tmp_path: Path) -> None:
@@ -205,8 +206,9 @@ def test_lvm_whose_channels_are_of_several_lengths_is_cut_to_the_shortest(tmp_pa
     values = [f",{f:.9g},{cell}\n" for f, cell in zip(FORCE, cells, strict=True)]
     path = put(tmp_path / "a.lvm", LVM + "".join(values))
     found = inspect_file(path).require_valid()
-    assert Fact("rows", "390 of 400, as sensor ends there", "default") in found.facts
+    (cut,) = (fact.value for fact in found.facts if fact.name == "rows" and fact.origin == "default")
+    assert re.fullmatch("390 of 400, .*sensor.*", cut)
     assert found.hits[0].force == pytest.approx(FORCE[:390], abs=1e-7)
     path.write_text(LVM.replace("390", "391") + "".join(values))
-    with pytest.raises(DataError, match="390 of 391 samples are there"):
+    with pytest.raises(DataError, match="390 of 391 samples"):
         inspect_file(path)

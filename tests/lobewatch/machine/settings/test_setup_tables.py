@@ -111,7 +111,7 @@ BOARD = HEAD + '[tap]\nhammer = "none"\n[daq]\ndriver = "lines"\nsample_rate_hz 
         ([(0, ""), (1, ""), (2, "")], "3 channels of acceleration.* direction"),
         ([(0, 'direction = "x"'), (1, 'direction = "x"')], "2 channels of acceleration.* direction"),
         ([(0, 'direction = "x"'), (1, ""), (1, "")], "channel 3: input=1 .*channel 2"),
-        ([(0, 'direction = "x"'), (1, ""), (3, "")], "inputs 0, 1 and 2"),
+        ([(0, 'direction = "x"'), (1, ""), (3, "")], "0 to 2"),
     ],
 )
 def test_axes_that_cannot_be_classified_apart_are_rejected(axes: list[tuple[int, str]], facts: str) -> None:

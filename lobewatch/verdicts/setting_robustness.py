@@ -43,7 +43,7 @@ def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     clause = "constant stiffness (no model)"
     if ratios.size > 1:
         drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        clause = f"stiffness of the model ({change:+.1f} % at {drop:.0f} % frequency drop)"
+        clause = f"stiffness from the model ({change:+.1f} % at {drop:.0f} % frequency drop)"
     text = f"f1 margin: all modes drop alike, constant damping, {clause}"
 
     def stiffness_at(drop: float) -> float:

@@ -113,7 +113,7 @@ def _check_sensor(codes: Codes, channel: Channel) -> Check:
         return Check(name, False, "signal at the end of its range. Check the cable and the power supply.")
     if np.ptp(codes) == 0:
         return Check(name, False, f"constant signal of {codes[0] * channel.scale:.3g}. Check the cable and its plugs.")
-    return Check(name, True, "signal present")
+    return Check(name, True, "OK")
 
 
 def _check_force_noise(rms: float, level: float | None) -> Check:

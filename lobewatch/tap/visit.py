@@ -102,7 +102,7 @@ class TapVisit:
             tap = DIRECTION_CHOICES[missing]
             turn = "Turn hammer and sensor to"
             turn = f"{cross_tap.text} Leave the sensor. Turn the hammer to" if cross_tap else turn
-            reason = f'{self._direction} is saved. {turn} {missing}, then choose "{tap.text}".'
+            reason = f'Direction {self._direction} is saved. {turn} {missing}, then choose "{tap.text}".'
             choices: Sequence[Choice] = (tap, DONE_CHOICE)
             state = replace(state, word=TapStep.MOVE, direction=missing, reason=reason, outcome=None)
             state = replace(state, sensor_stays=cross_tap is not None)

@@ -25,7 +25,7 @@ function figures({ heard, kind, left, cut_seconds: cut }) {
     const speed = heard.speed_rpm === null ? "" : `${heard.speed_rpm.toFixed(0)} rpm`;
     const chatter = heard.chatter_frequency_hz;
     if (kind === "cannot-tell") return ["", ""];
-    return chatter === null ? [speed, "detected"] : [`${chatter.toFixed(0)} Hz`, kind === "flip" ? `period 2\n${speed}` : speed];
+    return chatter === null ? [speed, "speed"] : [`${chatter.toFixed(0)} Hz`, kind === "flip" ? `period 2\n${speed}` : speed];
   }
   if (cut !== null) return [`${cut.toFixed(1)} s`, "recorded"];
   return left === null ? ["", ""] : [`${Math.ceil(left)} s`, "left"];

@@ -69,7 +69,7 @@ function showGuide() {
 function showMean() {
   const { mean_change: change, good, settled } = state;
   const percent = change === null ? "" : `${(100 * change).toPrecision(2)} %`;
-  if (settled) put("change", percent ? `✓ Settled, last change ${percent}` : "✓ Settled");
+  if (settled) put("change", percent ? `✓ Settled (change ${percent})` : "✓ Settled");
   else if (percent) put("change", `Last change ${percent}`);
   else put("change", good ? "One good hit, no change yet" : "No good hit yet");
 }

@@ -125,7 +125,7 @@ def test_the_page_goes_from_air_to_the_verdict_by_itself(
             browser.open(address("".join(told)), SIZES[0])
             browser.see("title", PROGRAM)
             is_open.set()
-            browser.see("text", CutStep.LISTENING)
+            browser.see("text", CutStep.LISTENING.replace(" ", "\n"))
             browser.see("reason", cut_recording.SENSOR_ON_HOUSING_TEXT)
             seen[CutStep.LISTENING].set()
             browser.see("text", "CUTTING")

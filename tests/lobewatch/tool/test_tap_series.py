@@ -59,9 +59,7 @@ def codes(row: HistoryRow) -> set[str]:
         (Conditions(stick_out_mm=80.0, state="cold"), ("state", "'cold'", "'warm'")),
     ],
 )
-def test_another_stick_out_or_state_begins_a_new_series(
-    shop: Shop, changed: Conditions, facts: tuple[str, ...]
-) -> None:
+def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Conditions, said: tuple[str, ...]) -> None:
     first, _, last = rows = rows_of(shop, WARM, WARM, changed)
     assert series_of(rows) == [0, 0, 2]
     assert codes(first) == set()

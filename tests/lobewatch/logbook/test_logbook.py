@@ -437,7 +437,7 @@ def test_the_report_of_an_older_series_stands_on_what_is_known_now(path: Path) -
     tap(path, 2, 1650.0, tool="another")
     html = render_report(Logbook.open(path), "reference", "x")
     assert "x and y directions" in html
-    assert "modes in the x direction alone" not in html
+    assert "modes only in direction" not in html
 
 
 def test_a_program_is_charted_with_its_own_tool(path: Path) -> None:

@@ -145,7 +145,7 @@ def _print_failures(brokers: Iterable[Broker], failures: Mapping[Broker, str]) -
     for broker in brokers:
         failure = failures.get(broker, "")
         if failure:
-            text = join_sentences(f"note: status not published: {failure}", "The next command publishes it")
+            text = join_sentences(f"note: status not published to {failure}", "The next command publishes it")
             notes.print(text, markup=False)
         if broker.password_warning and broker.password_warning not in failure:
             notes.print(f"note: {broker.address}: {broker.password_warning}", markup=False)

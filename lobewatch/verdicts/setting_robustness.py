@@ -36,7 +36,7 @@ StiffnessAt = Callable[[float], float]
 def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
 
-    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a
+    All modes drop alike. K follows the model (bearings softer until its frequency has dropped as far); without a
     model it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)

@@ -49,7 +49,7 @@ def find_machines(path: Path) -> dict[str, Path]:
     except OSError:
         names = []
     if not names:
-        raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: make_machine_folder")
+        raise DataError(f"{path} is no machine folder and contains none. Make one with make_machine_folder.")
     return {format_path(name): path / name for name in names}
 
 

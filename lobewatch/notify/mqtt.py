@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from acquisition import DataError
+from acquisition.errors import join_sentences
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
 from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
@@ -77,7 +78,7 @@ class _BrokerThread(threading.Thread):
             from paho.mqtt import client as paho
             from paho.mqtt.enums import CallbackAPIVersion
         except ImportError as error:
-            raise DataError('MQTT needs paho-mqtt; install it with: pip install "lobewatch[mqtt]"') from error
+            raise DataError('MQTT needs paho-mqtt. Install it with: pip install "lobewatch[mqtt]"') from error
         client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
         # For each address of a name: the second has a chance where one is silent.
         client.connect_timeout = MQTT_TIMEOUT / 2
@@ -112,14 +113,15 @@ class _BrokerThread(threading.Thread):
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            raise DataError(f"refuses ({reason}); {self._broker.password_warning or 'see user and password'}")
+            cure = self._broker.password_warning or "Check user and password"
+            raise DataError(join_sentences(f"rejects the connection ({reason})", cure))
         self._set_stage("has not acknowledged")
         for topic, content in self._messages.items():
             client.publish(topic, content, qos=1, retain=True)
 
     def _on_publish(self, _client: Any, _data: Any, _number: int, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            self._rejection = f"refuses a message ({reason}); see what the user may write"
+            self._rejection = f"rejects a message ({reason}). Check the write permissions of the user."
         self._n_left -= 1
 
 

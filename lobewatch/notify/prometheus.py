@@ -11,22 +11,20 @@ SECONDS_PER_DAY = 86400.0
 MetricSample = tuple[str, dict[str, str], float]
 """Family without its prefix, further labels, and the value in the unit of the metric."""
 METRIC_FAMILIES = {
-    "lobewatch_judged_timestamp_seconds": "When the machine was judged last.",
-    "lobewatch_can_be_judged": "1 where the machine can be judged, 0 where its files do not let.",
-    "lobewatch_light": "1 for the light that the machine has, 0 for the others.",
-    "lobewatch_reasons": "How many reasons of a code the light has.",
-    "lobewatch_alarms": "How many alarms are open.",
-    "lobewatch_alarms_acknowledged": "How many of them a person has acknowledged.",
-    "lobewatch_alarm_raised_timestamp_seconds": "When each open alarm was raised.",
-    "lobewatch_frequency_fall_ratio": "Fall of the followed frequency since the first tests, 0.05 for 5 %.",
-    "lobewatch_frequency_hertz": "Followed frequency at the newest point of its series.",
-    "lobewatch_last_tap_timestamp_seconds": "When the machine was tapped last.",
-    "lobewatch_tap_due_timestamp_seconds": "When the next tap test is due.",
-    "lobewatch_limit_timestamp_seconds": "When a fixed limit is probably reached; none where not in sight.",
-    "lobewatch_program_timestamp_seconds": (
-        "When a program probably becomes doubtful, or not stable; none where not in sight."
-    ),
-    "lobewatch_program_word": "1 for the word on each cutting program.",
+    "lobewatch_judged_timestamp_seconds": "Time of the last assessment.",
+    "lobewatch_can_be_judged": "1 if the machine can be assessed, 0 if its files are unreadable.",
+    "lobewatch_light": "1 for the status of the machine, 0 for all others.",
+    "lobewatch_reasons": "Number of reasons for the status, by code.",
+    "lobewatch_alarms": "Number of open alarms.",
+    "lobewatch_alarms_acknowledged": "Number of open alarms that are acknowledged.",
+    "lobewatch_alarm_raised_timestamp_seconds": "Start time of each open alarm.",
+    "lobewatch_frequency_fall_ratio": "Frequency drop since the first tests, 0.05 for 5 %.",
+    "lobewatch_frequency_hertz": "Newest natural frequency of the series.",
+    "lobewatch_last_tap_timestamp_seconds": "Time of the newest tap test.",
+    "lobewatch_tap_due_timestamp_seconds": "Due time of the next tap test.",
+    "lobewatch_limit_timestamp_seconds": "Forecast time of a frequency-drop limit, missing if unknown.",
+    "lobewatch_program_timestamp_seconds": "Forecast time of a new verdict on a program, missing if unknown.",
+    "lobewatch_program_word": "1 for the verdict on each cutting program.",
 }
 """Meaning of the metric families of machines, by name."""
 
@@ -39,7 +37,7 @@ def format_prometheus(machines: Sequence[FleetMachine]) -> str:
         for family, labels, value in (*_sample_status(machine), *_sample_series(machine), *_sample_dates(machine)):
             name = f"lobewatch_{family}"
             samples[name].append(f"{name}{{{_format_labels(common | labels)}}} {value!r}")
-    lines = ["# HELP lobewatch_up 1 as long as anybody answers.", "# TYPE lobewatch_up gauge", "lobewatch_up{} 1.0"]
+    lines = ["# HELP lobewatch_up 1 while lobewatch answers.", "# TYPE lobewatch_up gauge", "lobewatch_up{} 1.0"]
     for name, meaning in METRIC_FAMILIES.items():
         lines += [f"# HELP {name} {meaning}", f"# TYPE {name} gauge", *samples[name]]
     return "\n".join(lines) + "\n"

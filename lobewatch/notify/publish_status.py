@@ -15,7 +15,7 @@ from typing import Any, Self
 import msgspec
 
 from acquisition import DataError, atomic_write
-from acquisition.errors import format_error
+from acquisition.errors import format_error, join_sentences
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.fleet.machine_summary import MachineSummary, software_version, summarize_unreadable
 from lobewatch.fleet.summarize import learn_scatter, summarize_machine
@@ -34,9 +34,7 @@ LAST_PUBLISHED_FILE, FLEET_LAST_PUBLISHED_FILE = "told.json", ".lobewatch-told.j
 """Files of the last published messages, in a machine folder and in the folder of a fleet."""
 REPUBLISH_INTERVAL = timedelta(hours=23)
 """Time after which an unchanged status is published again, for daily jobs; chosen."""
-MISSING_FOLDER_REASON = (
-    "its folder is gone; `lobewatch status {folder} --notify --forget {key}` takes it out of the broker"
-)
+MISSING_FOLDER_REASON = "its folder is missing (to forget it: lobewatch status {folder} --notify --forget {key})"
 """Reason for a machine that was published and is missing now."""
 
 
@@ -111,10 +109,10 @@ def _forget_machine(fleet_folder: Path, key: str, present: Collection[str]) -> N
     """
     published = _read_fleet_published(fleet_folder)
     if key in present:
-        raise ValueError(f"--forget {key}: is there; move its folder out of {fleet_folder} first")
+        raise ValueError(f"--forget {key}: this machine exists. Move its folder out of {fleet_folder} first.")
     if key not in published:
         gone = ", ".join(sorted(published.keys() - present)) or "none"
-        raise ValueError(f"--forget {key}: nobody was told of it; gone and not forgotten: {gone}")
+        raise ValueError(f"--forget {key}: this machine was never published. Missing machines: {gone}.")
     broker = published[key].target
     failure = send_messages({broker: {published[key].topic: b""}}).get(broker)
     if failure:
@@ -147,7 +145,8 @@ def _print_failures(brokers: Iterable[Broker], failures: Mapping[Broker, str]) -
     for broker in brokers:
         failure = failures.get(broker, "")
         if failure:
-            notes.print(f"note: nobody was told by MQTT: {failure}; it goes with the next command", markup=False)
+            text = join_sentences(f"note: status not published to {failure}", "The next command publishes it")
+            notes.print(text, markup=False)
         if broker.password_warning and broker.password_warning not in failure:
             notes.print(f"note: {broker.address}: {broker.password_warning}", markup=False)
 

@@ -199,9 +199,9 @@ def check_tokens(full: str | None, watch: str | None) -> AccessTokens:
     """Check both tokens, or make them for None. ValueError for equal or invalid tokens."""
     tokens = [secrets.token_urlsafe(24) if token is None else token for token in (full, watch)]
     if not all(re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token) for token in tokens):
-        raise ValueError("the token must be 12 to 200 characters of A-Z, a-z, 0-9, _ and -; leave it out for a new one")
+        raise ValueError("a token has 12 to 200 characters of A-Z, a-z, 0-9, _ and -. Leave it out for a random one.")
     if tokens[0] == tokens[1]:
-        raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
+        raise ValueError("both tokens are the same. Give two different tokens, or leave one out.")
     return tokens[0], tokens[1]
 
 
@@ -226,7 +226,7 @@ def make_guarded_application(tokens: AccessTokens, listen: str, limiter: Connect
                 return _respond_with_error(format_error(error), 409)
             except Exception:  # noqa: BLE001 - the traceback goes to the log, not to the page
                 _log.exception("%s %s failed", request.method, request.path)
-                return _respond_with_error("lobewatch failed here; see its terminal", 500)
+                return _respond_with_error("lobewatch has failed. See its terminal for the error.", 500)
 
     application = web.Application(middlewares=[guard], client_max_size=4096)
     application.on_response_prepare.append(_add_headers)
@@ -249,7 +249,7 @@ def _check_host(request: web.Request, listen: str) -> None:
         if host not in ("localhost", listen):
             ipaddress.ip_address(host)
     except ValueError:
-        raise web.HTTPForbidden(text="this host name is not ours; use the address that lobewatch printed") from None
+        raise web.HTTPForbidden(text="unknown host name. Use the address that lobewatch printed.") from None
 
 
 def _check_origin(request: web.Request) -> None:
@@ -257,7 +257,7 @@ def _check_origin(request: web.Request) -> None:
     origin = request.headers.get("Origin")
     needs_origin = request.method != "GET" or "Upgrade" in request.headers
     if origin != f"http://{request.host}" and (needs_origin or origin is not None):
-        raise web.HTTPForbidden(text="this request does not come from lobewatch's own page")
+        raise web.HTTPForbidden(text="this request does not come from a lobewatch page")
 
 
 def _check_request_token(request: web.Request, tokens: AccessTokens, changes: bool) -> None:
@@ -267,9 +267,9 @@ def _check_request_token(request: web.Request, tokens: AccessTokens, changes: bo
     given += [name.strip().removeprefix("token.") for name in protocols]
     request[HAS_FULL_ACCESS], can_watch = (_matches_any(given, token) for token in tokens)
     if not (request[HAS_FULL_ACCESS] or can_watch):
-        raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")
+        raise web.HTTPUnauthorized(text="no valid token. Open the complete address that lobewatch printed.")
     if changes and not request[HAS_FULL_ACCESS]:
-        raise web.HTTPForbidden(text="this address is only to watch; open the other one that lobewatch printed")
+        raise web.HTTPForbidden(text="this address is read-only. Open the other address that lobewatch printed.")
 
 
 def _matches_any(given: list[str], token: str) -> bool:

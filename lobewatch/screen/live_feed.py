@@ -12,6 +12,7 @@ import numpy as np
 from aiohttp import WSCloseCode, web
 from numpy.typing import NDArray
 
+from acquisition.errors import join_sentences
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.recorded_cuts import NEXT_STEP_TEXTS, reason_text, recorded_cut_texts
 from lobewatch.show.terminal.option_names import with_option_names_inside
@@ -39,7 +40,7 @@ def encode_tap_state(state: TapState) -> str:
         "title": state.title,
         "direction": state.direction,
         "has_plots": state.plots is not None,
-        "device": ", ".join(filter(None, (state.device, state.resumed))),
+        "device": join_sentences(state.device, state.resumed),
         "reason": state.reason,
         "good": state.good,
         "wanted": state.wanted,

@@ -59,7 +59,7 @@ def add_pages(application: web.Application, pages: dict[str, str]) -> None:
     async def static(request: web.Request) -> web.Response:
         name = request.match_info["name"]
         if name not in files:
-            raise web.HTTPNotFound(text="there is no such file")
+            raise web.HTTPNotFound(text="this file does not exist")
         return respond(name)
 
     application.router.add_get("/static/{name}", static, name=f"{access_control.PUBLIC_ROUTE_PREFIX}static")
@@ -138,7 +138,7 @@ class WebServerThread:
     ) -> None:
         """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
-            raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
+            raise ValueError("no address to listen at. Use 127.0.0.1 for this computer only, 0.0.0.0 for the network.")
         tokens = access_control.check_tokens(token, watch_token)
         self.token, self.watch_token = tokens
         self._listen = listen.lower()
@@ -157,7 +157,7 @@ class WebServerThread:
             self._loop.result()
         except (OSError, ValueError) as error:
             text = f"cannot listen on {self._listen} port {self._port} ({getattr(error, 'strerror', None) or error})"
-            raise DeviceError(text, "choose another port or address") from error
+            raise DeviceError(text, "Choose another port or address") from error
         return self
 
     def __exit__(self, *error: object) -> None:

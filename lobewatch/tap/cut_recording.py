@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import Block, Channel, DataError, Description, Device, DeviceError
 from acquisition.arrays import Codes
-from acquisition.errors import format_error
+from acquisition.errors import format_error, join_sentences
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
 from lobewatch.arrays import Floats
@@ -34,13 +34,13 @@ class CutStep(enum.StrEnum):
 
     SENSOR = "SENSOR TO HOUSING"
     """The accelerometer is moved, the device opened."""
-    LISTENING = "LISTENING"
-    """The spindle turns in air, the cut is awaited."""
+    LISTENING = "START CUT"
+    """The spindle runs in air, the cut is awaited."""
     CUTTING = "CUTTING"
     """A cut has begun."""
     AGAIN = "CUT AGAIN"
     """The cut was unusable, the next one is awaited."""
-    JUDGING = "JUDGING"
+    JUDGING = "EVALUATING"
     """The cut is over."""
     STABLE = "STABLE"
     """Result, as the four words of the cut evaluation."""
@@ -110,9 +110,11 @@ AIR_BEFORE_CUT = 1.0
 SENSOR_CHECK_DELAY = 1.0
 """Time after which the sensor signal is checked (s)."""
 
-SENSOR_ON_HOUSING_TEXT = "The sensor on the housing, the spindle turning in air: now begin the cut."
-CUT_TOO_SHORT_TEXT = "too short for a word, or no air before it; cut again, a second or longer"
-CUT_RUNNING_TEXT = "A second or longer, then out of the cut: it is judged by itself."
+SENSOR_ON_HOUSING_TEXT = "The sensor must be on the housing and the spindle running in air. Start the cut."
+CUT_TOO_SHORT_TEXT = (
+    "The cut was too short, or there was no running in air before it. Cut again for a second or longer."
+)
+CUT_RUNNING_TEXT = "Cut for a second or longer, then leave the cut. The verdict appears by itself."
 
 
 @dataclass
@@ -171,17 +173,17 @@ def record_cut(
     """
     row = next((i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"), None)
     if row is None:
-        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
+        raise DataError("the device has no acceleration channel. Plug the accelerometer in, or add it to [daq].")
     buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
     waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
-    show("hearing the spindle turn in air; begin the cut")
+    show("Recording. Start the cut.")
     for signal in _iterate_signals(device, buffer, time_limit, publish):
         parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
         has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT
         if has_ended and parts.reason:
             buffer.forget()
             show(CUT_TOO_SHORT_TEXT)
-            waiting = {"word": CutStep.AGAIN, "reason": f"{CUT_TOO_SHORT_TEXT.capitalize()}."}
+            waiting = {"word": CutStep.AGAIN, "reason": CUT_TOO_SHORT_TEXT}
             publish(**waiting, cut_seconds=None)
         elif not parts.reason and (has_ended or parts.end - parts.begin > MAX_CUT_SECONDS):
             return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
@@ -189,8 +191,8 @@ def record_cut(
             publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
         elif buffer.received >= SENSOR_CHECK_DELAY * buffer.rate:
             publish(**waiting, cut_seconds=None)
-    cure = "begin to listen with the spindle turning in air, then cut, or give more record_cut.time_limit"
-    raise DataError(f"no cut was heard in {time_limit:g} s; {cure}")
+    cure = "Start with the spindle running in air, then cut, or increase record_cut.time_limit"
+    raise DataError(join_sentences(f"no cut was detected in {time_limit:g} s", cure))
 
 
 def _iterate_signals(device: Device, buffer: _SignalBuffer, time_limit: float, publish: Publish) -> Iterator[CutSignal]:
@@ -216,10 +218,10 @@ def _check_sensor_signal(buffer: _SignalBuffer) -> None:
     codes = np.concatenate(buffer.codes)
     low, high = buffer.channel.rails
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
-        raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
+        raise DeviceError("the accelerometer signal is at the end of its range", "Check the cable and the power supply")
     if np.ptp(codes) == 0:
-        cure = "is it plugged in, on the housing, and the spindle turning?"
-        raise DeviceError("the accelerometer hears nothing at all", cure)
+        cure = "Plug the accelerometer in, fix it to the housing, and run the spindle"
+        raise DeviceError("the accelerometer signal is constant", cure)
 
 
 def acquire_cut(
@@ -242,12 +244,12 @@ def acquire_cut(
         return read_cut_recording(file, description)
     port = port or folder.machine.daq.port
     if not port:
-        raise ValueError(f"no port: give acquire_cut.port, acquire_cut.file, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port. Give acquire_cut.port or acquire_cut.file, or set port in [daq] of {folder.toml}.")
     if port.startswith(REPLAY_PREFIX):
-        text = "a recording of hits; give the recording of a cut with acquire_cut.file"
-        raise ValueError(f"acquire_cut.port {port}: {text}")
-    show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
-    show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
+        cure = "Give the recording of a cut with acquire_cut.file"
+        raise ValueError(join_sentences(f"acquire_cut.port {port}: this is a recording of hits", cure))
+    show("Move the accelerometer from the tool to the spindle housing. Run the spindle in air.")
+    show(f"Cut: {setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep")
     with open_device(folder.machine.daq, port) as device:
         with folder.locked():
             check_device_rate(folder, device)
@@ -263,11 +265,11 @@ def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path |
     """
     if file is None and (tacho or pulses is not None):
         given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
-        raise ValueError(f"{given} is for a acquire_cut.file; of a device only the accelerometer is heard")
+        raise ValueError(f"{given} works only with a recording. Give one with acquire_cut.file.")
     if sensor not in get_args(CutSensor):
-        raise ValueError(f"Description.sensor {sensor}: none of {', '.join(get_args(CutSensor))}")
+        raise ValueError(f"Description.sensor {sensor} is unknown. Use {' or '.join(get_args(CutSensor))}.")
     if sensor == "microphone" and file is None:
-        raise ValueError("Description.sensor microphone is for a acquire_cut.file; a device hears by its accelerometer")
+        raise ValueError("Description.sensor microphone works only with a recording. Give one with acquire_cut.file.")
     return {"sensor": sensor, "tacho": tacho, "pulses": pulses}
 
 
@@ -275,8 +277,8 @@ def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path |
 def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StatePublisher[CutState]]:
     """Publish states from the move of the sensor on. An error raised within becomes the last state."""
     cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
-    title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
-    publisher = StatePublisher(CutState(0, CutStep.SENSOR, title, reason=reason))
+    reason = "Move the sensor from the tool to the spindle housing. Run the spindle in air."
+    publisher = StatePublisher(CutState(0, CutStep.SENSOR, f"{logbook.machine.machine.name}: {cut}", reason=reason))
     try:
         yield publisher
     except (KeyboardInterrupt, OSError, RuntimeError, ValueError) as error:
@@ -289,7 +291,7 @@ def evaluate_live_cut(
     logbook: Logbook, setting: CutSetting, signal: CutSignal, publisher: StatePublisher[CutState]
 ) -> list[CutComparison]:
     """Evaluate a recording and show the result of its last cut."""
-    publisher.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
+    publisher.show(word=CutStep.JUDGING, reason="The cut is complete.", level=None, left=None, cut_seconds=None)
     comparisons = compare_cuts(logbook, setting, signal)
     last = comparisons[-1]
     word = CutStep[last.detected.verdict.upper().replace(" ", "_")]

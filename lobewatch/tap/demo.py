@@ -1,4 +1,4 @@
-"""Tap tests of an aging emulated spindle, compared with the truth."""
+"""Tap tests of an aging emulated spindle, compared with its true values."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from acquisition import UNKNOWN_CONDITIONS, Circumstances, Conditions, DataError, Structure, TapDirection
+from acquisition.errors import join_sentences
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.machine_forecast import forecast_machine
 from lobewatch.machine import MachineFolder
@@ -63,20 +64,20 @@ class PlannedTap(NamedTuple):
     structure: Structure
     """Structure that is hit."""
     truth: SpindleState
-    """Truth: the spindle as emulated."""
+    """True values of the emulated spindle."""
     conditions: Conditions = UNKNOWN_CONDITIONS
     """Conditions of the test."""
 
 
 TakenTap = tuple[PlannedTap, str]
-"""Test as planned, with its truth, and the id of the stored tap test."""
+"""Planned test, and the id of the stored tap test."""
 
 
 class DemoTap(NamedTuple):
     """Tap test of the demo with its result."""
 
     plan: PlannedTap
-    """Test as planned, with its truth."""
+    """Planned test with the true values."""
     result: SpindleState
     """Spindle as measured."""
 
@@ -126,7 +127,7 @@ def age_spindle(
 
 
 def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
-    """Compare the results of these tests with the truth. DataError if one does not show the followed mode.
+    """Compare the results of these tests with the true values. DataError if one does not show the followed mode.
 
     The history is computed once, after the last test, and not after every one with a verdict on every program.
     """
@@ -153,8 +154,8 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
 def _get_measured_state(measurement: Measurement) -> SpindleState:
     mode, calibration = measurement.followed, measurement.calibration
     if mode is None or calibration is None:
-        why = "; ".join(map(str, measurement.remarks))
-        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller MountingVariation.scatter")
+        texts = *map(str, measurement.remarks), "Use a smaller MountingVariation.scatter"
+        raise DataError(f"tap {measurement.tap_id}: {join_sentences(*texts)}")
     return SpindleState(mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)
 
 
@@ -181,7 +182,7 @@ def forecast_levels(logbook: Logbook, wear: SpindleWear) -> list[LevelForecast]:
     if x is None or x.trend is None:
         return []
     percent = x.trend.points[-1].percent if x.trend.forecast is None else float(x.trend.forecast.fitted[-1])
-    title = f"f_1 in x {100 * FORECAST_DROP:g} % lower than now"
+    title = f"f1 in x {100 * FORECAST_DROP:g} % lower than now"
     forecasts = [_forecast_level(title, x.trend, percent + 100 * math.log1p(-FORECAST_DROP), wear, last)]
     for name, critical in prospect.critical_drops.items():
         reached = prospect.programs[name].not_stable

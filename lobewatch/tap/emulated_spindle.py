@@ -14,6 +14,7 @@ import numpy as np
 import acquisition
 from acquisition import CROSS_TAP, Driver, HammeredStructure, SensorInput, Structure, TapDirection, TapsEmulator
 from acquisition.emulation import SignalFunction
+from acquisition.errors import join_sentences
 from dsm import Spindle, calibrate, modes_at, natural_frequencies, static_stiffness
 from lobewatch.arrays import Floats
 from lobewatch.machine.folder import MachineFolder
@@ -63,12 +64,12 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
     for an invalid angle, or one that gives no cross FRF.
     """
     if not 0 <= degrees <= 90:
-        raise ValueError(f"rotate_structure.degrees {degrees:g}: is not an angle of 0 to 90 degrees")
+        raise ValueError(f"rotate_structure.degrees {degrees:g} is not between 0 and 90 degrees")
     c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
-        text = "modes along x and y show nothing across; give another angle"
-        raise ValueError(f"rotate_structure.degrees {degrees:g} rotate_structure.direction xy: {text}")
+        text = f"rotate_structure.degrees {degrees:g} gives no cross FRF for rotate_structure.direction xy"
+        raise ValueError(f"{text}. Use an angle between 0 and 90 degrees.")
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
     frequency = np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible])
@@ -157,18 +158,18 @@ def emulate_device(
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
-        raise acquisition.DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
+        raise acquisition.DataError(f"{driver.title} cannot be emulated. Connect one, or emulate another driver.")
     inputs = get_emulated_inputs(folder, driver)
     signal_at, clock = partial(signal_of, inputs), folder.machine.daq.digital_clock
     setup = acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, digital_clock=clock, **serving)
     return driver.emulate(setup)
 
 
-def get_spindle_table(folder: MachineFolder, purpose: str = "emulate") -> SpindleTable:
+def get_spindle_table(folder: MachineFolder) -> SpindleTable:
     """Return [spindle] of machine.toml. DataError if there is none."""
     if folder.machine.spindle is None:
-        cure = "add a [spindle] table (or use folder_files.make_machine_folder.template)"
-        raise acquisition.DataError(f"{folder.toml}: no model to {purpose}: {cure}")
+        cure = "Add a [spindle] table, or use folder_files.make_machine_folder.template"
+        raise acquisition.DataError(join_sentences(f"{folder.toml}: there is no spindle model to emulate", cure))
     return folder.machine.spindle
 
 
@@ -211,8 +212,8 @@ def get_emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorIn
         return tuple(SensorInput(number, channel) for number, channel in enumerate(channels))
     inputs = folder.machine.daq.settings.inputs
     if not inputs:
-        cure = f'give driver = "{driver.name}" in [daq] and two [[daq.channel]] (docs/devices.md shows them)'
-        raise acquisition.DataError(f"{folder.toml}: no sensors to emulate: {cure}")
+        cure = f'Set driver = "{driver.name}" in [daq] and add two [[daq.channel]] tables (docs/devices.md)'
+        raise acquisition.DataError(join_sentences(f"{folder.toml}: there are no sensors to emulate", cure))
     return inputs
 
 
@@ -227,7 +228,7 @@ REPLACEMENT_SHARE = 0.6
 MAX_SCENARIO_DROP = 0.3
 """Largest relative drop that is computed."""
 MAX_FORECAST_MONTHS = 60
-"""Months beyond the end of a scenario in which the truth is searched."""
+"""Months beyond the end of a scenario in which the true date is searched."""
 MONTH_BISECTIONS = 20
 """Number of bisections of a month in the search for the date of a drop."""
 
@@ -263,7 +264,7 @@ class SpindleWear:
     @classmethod
     def of(cls, folder: MachineFolder, months: int, story: WearScenario) -> Self:
         """Return the wear of the spindle of a machine. DataError if machine.toml has none."""
-        table = get_spindle_table(folder, "age")
+        table = get_spindle_table(folder)
         return cls(table.build(), table.bearing_stiffness_n_per_um * 1e6, months, story)
 
     @property

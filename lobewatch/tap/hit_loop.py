@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import replace
 
 from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Remark, Trigger
+from acquisition.errors import join_sentences
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, describe_device, estimate_resting_rms
@@ -19,7 +20,7 @@ from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s). The trigger may be armed before."""
-EARLY_HIT_TEXT = "That hit came while the tool still moved and does not count: wait for TAP."
+EARLY_HIT_TEXT = "That hit came while the tool still vibrated and does not count. Wait for TAP."
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -99,7 +100,7 @@ class TapPhases:
     def _reconnect(self, error: DeviceError) -> DeviceConnection:
         """Wait for the device as long as needed."""
         while True:
-            reason = f"{error.text}; plug it in: the test goes on at this hit"
+            reason = join_sentences(error.text, "Plug the device in to continue with this hit")
             self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
             self._sleep(RECONNECT_INTERVAL)
             self._handle_requests()
@@ -114,7 +115,7 @@ class TapPhases:
     def _check_rate(self, device: Device) -> None:
         """Measure the sample rate of a device that this machine does not know yet."""
         if has_clock(device) and find_stored_rate(self._folder, device) is None:
-            self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
+            self._publisher.show(reason="New device. Its sample rate is being measured for 5 s.")
         remarks = list[Remark]()
         check_device_rate(self._folder, device, remarks=remarks)
         if remarks:
@@ -134,8 +135,8 @@ class TapPhases:
         checks.append(check_calibration(connection.inputs.channels, machine.daq.calibration_interval_months))
         if not baseline.has_force:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
-        failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
-        self._publisher.show(checks=tuple(checks), reason=" ".join(failed))
+        failed = [f"{check.name}: {check.text}" for check in checks if not check.passed]
+        self._publisher.show(checks=tuple(checks), reason=join_sentences(*failed))
 
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
@@ -147,10 +148,10 @@ class TapPhases:
         asked = False
         while not trial.is_done:
             if not asked:
-                self._publisher.show(reason=f"{self._publisher.state.reason} {trial.text}".strip())
+                self._publisher.show(reason=join_sentences(self._publisher.state.reason, trial.text))
             asked = self._take_trial_hit(connection, trial)
         tap.trigger = trial.trigger
-        check = Check("trial hits", not trial.remarks, trial.text.removesuffix("."))
+        check = Check("trial hits", not trial.remarks, trial.text)
         self._publisher.show(checks=(*self._publisher.state.checks, check))
 
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
@@ -183,7 +184,7 @@ class TapPhases:
         for block in connection.blocks():
             self._scan_count += block.codes.shape[1]
             for _ in range(connection.count_presses()):
-                self._undo(" by the button")
+                self._undo(" with the button")
             self._handle_requests()
             if fault_text := connection.poll_fault_text():
                 self._publisher.show(reason=fault_text)
@@ -191,12 +192,12 @@ class TapPhases:
             if self._publisher.age >= LEVEL_WINDOW:
                 self._publisher.show(levels=connection.levels)
         if self._tap.missing:
-            raise DataError(f"the samples have ended with {self._tap.progress}; record more of them")
+            raise DataError(f"the samples ended after {self._tap.progress}. Record more hits.")
 
     def _handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
         if self.stopping.is_set():
-            raise TapStopped(f"stopped with {self._tap.good} good hits; the same command goes on with them")
+            raise TapStopped(f"stopped with {self._tap.good} good hits. Repeat the command to continue with them.")
         while self.undos.acquire(blocking=False):
             self._undo()
 
@@ -249,11 +250,11 @@ class TapPhases:
         self._show_curves(hit)
         if not verdict.flags and (outlier := self._tap.recheck_first_hits()) is not None:
             number, now = outlier
-            self._show_taken_out(now.flags, f"Hit {number + 1} does not fit the others and counts no more. {now.text}")
+            self._show_taken_out(now.flags, f"Hit {number + 1} differs from the others and is excluded. {now.text}")
 
     def _undo(self, means: str = "") -> None:
         if (number := self._tap.undo()) is not None:
-            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
+            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was undone{means}.")
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
         """Show that a good hit no longer counts. The word GOOD must disappear."""
@@ -269,5 +270,5 @@ def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> 
     try:
         return run_self_check(baseline, level, free_bytes)
     except Exception as error:  # noqa: BLE001 - a check warns and ends no test
-        text = f"it failed ({type(error).__name__}: {error}); the test goes on without it"
+        text = f"failed ({type(error).__name__}: {error}). The test continues without it."
         return (Check("self-check", False, text),)

@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition import Channel, DataError, Hit, Remark, calibration_remark, channel_remarks
 from acquisition.arrays import Codes
+from acquisition.errors import join_sentences
 from dsm import format_rounded, natural_frequencies
 from lobewatch.arrays import Flags, Floats
 from lobewatch.machine import Machine
@@ -79,7 +80,7 @@ def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple
 def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
     """Check sensitivities and calibration dates."""
     remarks = sensor_remarks(channels, interval_months)
-    return Check("calibration", not remarks, "; ".join(map(str, remarks)) or "dates known and not too old")
+    return Check("calibration", not remarks, join_sentences(*map(str, remarks)) or "known and up to date")
 
 
 def sensor_remarks(channels: Sequence[Channel], interval_months: float) -> list[Remark]:
@@ -92,8 +93,10 @@ def sensor_remarks(channels: Sequence[Channel], interval_months: float) -> list[
 
 def _check_samples(baseline: Hit) -> Check:
     lost = baseline.lost_scans
-    text = f"{lost} scans lost in a second: lower the sample rate or use another cable or port" if lost else ""
-    return Check("samples", not lost, text or f"come at {baseline.sample_rate:g} Hz, none lost")
+    if not lost:
+        return Check("samples", True, f"{baseline.sample_rate:g} Hz, none lost")
+    cure = "Lower the sample rate or use another cable or port"
+    return Check("samples", False, join_sentences(f"{lost} scans lost in one second", cure))
 
 
 def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
@@ -107,10 +110,10 @@ def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
 def _check_sensor(codes: Codes, channel: Channel) -> Check:
     name, low, high = f"{channel.name} sensor", *channel.effective_rails(codes)
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
-        return Check(name, False, "stands at the end of its range: cable open or sensor not powered")
+        return Check(name, False, "signal at the end of its range. Check the cable and the power supply.")
     if np.ptp(codes) == 0:
-        return Check(name, False, f"stands still at {codes[0] * channel.scale:.3g}: cable shorted or not plugged in")
-    return Check(name, True, "alive")
+        return Check(name, False, f"constant signal of {codes[0] * channel.scale:.3g}. Check the cable and its plugs.")
+    return Check(name, True, "OK")
 
 
 def _check_force_noise(rms: float, level: float | None) -> Check:
@@ -118,9 +121,9 @@ def _check_force_noise(rms: float, level: float | None) -> Check:
         against = "" if level is None else f", trigger at {level:g} N"
         return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
     amplitude = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
-    cure = f"set trigger_n above {amplitude}, or find the source of the noise"
-    text = f"{format_rounded(rms, digits=2)} N rms is too near the trigger at {level:g} N"
-    return Check("force noise", False, f"{text}: {cure}")
+    cure = f"Set trigger_n above {amplitude}, or find the source of the noise"
+    text = f"{format_rounded(rms, digits=2)} N rms is too close to the trigger at {level:g} N"
+    return Check("force noise", False, join_sentences(text, cure))
 
 
 def _check_response_noise(rms: float, channel: Channel) -> Check:
@@ -128,8 +131,8 @@ def _check_response_noise(rms: float, channel: Channel) -> Check:
     text = f"{format_rounded(rms, digits=2)} m/s^2 rms"
     if rms < MAX_RESPONSE_NOISE_SHARE * scale:
         return Check("response noise", True, text)
-    cure = "is the machine at rest, the sensor fixed?"
-    return Check("response noise", False, f"{text}, {100 * rms / scale:.2g} % of the range: {cure}")
+    cure = "Stop the machine and check that the sensor is fixed"
+    return Check("response noise", False, join_sentences(f"{text}, {100 * rms / scale:.2g} % of the range", cure))
 
 
 def _power_spectrum(signal: Floats, rate: float) -> tuple[Floats, Floats]:
@@ -156,9 +159,9 @@ def _check_hum(baseline: Hit) -> Check:
         sums = [float(np.sum(power[_select_lines(frequency, *lines)])) for lines in map(_list_harmonics, MAINS)]
         hum, worst = max(sums), MAINS[int(np.argmax(sums))]
         if hum > MIN_HUM_POWER_SHARE * np.sum(power) and np.sqrt(hum) > MIN_LINE_CODES * abs(channel.scale):
-            texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and its multiples in the {channel.quantity}")
+            texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and harmonics in the {channel.quantity}")
     if texts:
-        return Check("hum", False, f"{', '.join(texts)}: check cable shields and the ground")
+        return Check("hum", False, join_sentences(", ".join(texts), "Check cable shields and grounding"))
     return Check("hum", True, "no mains hum")
 
 
@@ -172,7 +175,7 @@ def _check_spindle(baseline: Hit) -> Check:
     rms = float(np.sqrt(np.sum(off_mains[_select_lines(frequency, line)])))
     if rms**2 > MIN_SPINDLE_POWER_SHARE * np.sum(power) and rms > MIN_LINE_CODES * abs(channel.scale):
         vibration = f"{format_rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
-        return Check("spindle", False, f"a steady vibration of {vibration}: stop the spindle and what runs beside it")
+        return Check("spindle", False, f"steady vibration of {vibration}. Stop the spindle and nearby machines.")
     return Check("spindle", True, "no steady vibration")
 
 
@@ -183,7 +186,7 @@ def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:
 
 def _check_disk(free: int) -> Check:
     enough = free >= MIN_DISK_RESERVES * RESERVE_BYTES
-    return Check("disk", enough, f"{free / 1e9:.1f} GB free{'' if enough else ': make room soon'}")
+    return Check("disk", enough, join_sentences(f"{free / 1e9:.1f} GB free", "" if enough else "Make room soon"))
 
 
 def _slice_record(record: Hit, start: int, end: int) -> Hit:
@@ -205,25 +208,26 @@ ASSUMED_DAMPING_RATIO = 0.03
 
 
 def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
-    """Compare band and noise of the sensor with the followed mode, if the model or [mode] band_hz tells it.
+    """Compare band and noise of the sensor with the followed mode, if the model or [mode] band_hz gives it.
 
     baseline: a record at rest.
     """
     rate, band = baseline.sample_rate, machine.tap.sensor_band_hz or math.inf
     highest, noise = min(MAX_DECAY_FREQUENCY_RATIO * rate, band), float(np.std(baseline.acceleration))
-    detectable = f"modes up to {highest:.0f} Hz are heard, noise {format_rounded(noise, digits=2)} m/s^2 rms"
+    detectable = f"modes up to {highest:.0f} Hz are detectable"
+    with_noise = f"{detectable}, noise {format_rounded(noise, digits=2)} m/s^2 rms"
     frequency, where = _find_expected_frequency(machine, tool)
     damping_ratio = float(machine.spindle.damping_ratio) if machine.spindle else ASSUMED_DAMPING_RATIO
     if frequency is None:
-        text = f"{detectable}; whether the mode of this machine lies there nobody says"
+        text = join_sentences(with_noise, "The mode frequency of this machine is unknown")
         return Check("band", True, text, is_notable=True)
     if frequency > highest:
-        cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
-        return Check("band", False, f"{detectable}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
+        cure = "Use a faster sensor or a higher sample rate"
+        return Check("band", False, join_sentences(f"{detectable}, not {frequency:.0f} Hz ({where})", cure))
     amplitude = min_decay_amplitude(frequency, damping_ratio, noise / math.sqrt(min(rate / 2, band)))
-    needed = f"{REFERENCE_HITS} hits that ring at {format_rounded(amplitude, digits=2)} m/s^2"
-    error = f"{needed} tell it to {100 * TARGET_FREQUENCY_ERROR:g} %"
-    return Check("band", True, f"{detectable}; {frequency:.0f} Hz, {where}: {error}", is_notable=True)
+    hits = f"{REFERENCE_HITS} hits with a response of {format_rounded(amplitude, digits=2)} m/s^2"
+    error = f"{hits} give {frequency:.0f} Hz ({where}) to {100 * TARGET_FREQUENCY_ERROR:g} %"
+    return Check("band", True, join_sentences(with_noise, error), is_notable=True)
 
 
 def min_decay_amplitude(frequency: float, damping_ratio: float, density: float) -> float:
@@ -245,5 +249,5 @@ def _find_expected_frequency(machine: Machine, tool: str) -> tuple[float | None,
         spindle = machine.model(tool)
     except (DataError, ValueError):
         band = machine.mode.band_hz
-        return (None, "") if band is None else (band[1], "the end of [mode] band_hz")
-    return float(natural_frequencies(spindle, machine.mode.model_mode)[-1]), "by the model"
+        return (None, "") if band is None else (band[1], "upper end of [mode] band_hz")
+    return float(natural_frequencies(spindle, machine.mode.model_mode)[-1]), "spindle model"

@@ -7,7 +7,7 @@ from functools import partial
 
 import acquisition
 from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, TapTest
-from acquisition.errors import PERMISSION_ERRNOS, format_os_error
+from acquisition.errors import PERMISSION_ERRNOS, format_os_error, join_sentences
 from dsm import format_with_error
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
@@ -89,7 +89,7 @@ class TapSession:
     def measurement(self) -> Measurement:
         """Measurement of the finished test. ValueError before the end."""
         if self._measurement is None:
-            raise ValueError("the tap test is not finished; there is no measurement before run() has returned")
+            raise ValueError("the tap test is not finished. The measurement is available after run() has returned.")
         return self._measurement
 
     def undo(self) -> None:
@@ -115,7 +115,7 @@ class TapSession:
         ValueError
             Always.
         """
-        raise ValueError(f"{f'{key} {tool}'.strip()!r} cannot be chosen: this is one test alone")
+        raise ValueError(f"{f'{key} {tool}'.strip()!r} is not available. This session has a single test.")
 
     def run(self) -> TapTest:
         """Take hits until enough are good, commit the test and return it.
@@ -153,17 +153,17 @@ class TapSession:
         tap, texts = begin_tap(self._folder, self._about, self._resume), []
         if tap.hits:
             begun = f"{tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            texts.append(f"going on with the test begun {begun}: {tap.progress} are there")
+            texts.append(f"Continuing the test of {begun} with {tap.progress}")
         if tap.damaged:
-            texts.append(f"damaged and set aside: {', '.join(str(path) for path in tap.damaged)}")
+            texts.append(f"Damaged files set aside: {', '.join(str(path) for path in tap.damaged)}")
         texts += tap.not_resumed
         if texts:
-            self._publisher.show(**tap.shown, resumed="; ".join(texts))
+            self._publisher.show(**tap.shown, resumed=join_sentences(*texts))
         return tap
 
     def _finish(self, in_progress: TapInProgress) -> TapTest:
         """Average, commit and evaluate the test."""
-        self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
+        self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None)
         tap = in_progress.finish()
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
@@ -175,10 +175,10 @@ class TapSession:
             self._measurement = logbook.measurement(tap.id)
             outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            why = "; ".join(str(remark) for remark in logbook.remarks if tap.id in remark.about) or str(error)
+            texts = [str(remark) for remark in logbook.remarks if tap.id in remark.about] or [str(error)]
             if isinstance(error, OSError) and error.errno:
-                why = format_os_error(error)
-            raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
+                texts = [format_os_error(error)]
+            raise DataError(f"{tap.id} is saved but cannot be evaluated: {join_sentences(*texts)}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
 
@@ -187,11 +187,11 @@ def _to_operator_error(error: Exception) -> Exception:
     """Return an error that the operator can act on, also for a failure of the system or the program."""
     if isinstance(error, DeviceError | ValueError):
         return error
-    kept = "the hits so far are kept: the same command goes on with them"
+    kept = "Repeat the command to continue with the hits so far"
     if isinstance(error, OSError):
-        cure = "you may not write there" if error.errno in PERMISSION_ERRNOS else kept
-        return DataError(f"{format_os_error(error)}; {cure}")
-    return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")
+        cure = "Get write permission for this folder" if error.errno in PERMISSION_ERRNOS else kept
+        return DataError(join_sentences(format_os_error(error), cure))
+    return RuntimeError(join_sentences(f"lobewatch has failed ({type(error).__name__}: {error})", kept))
 
 
 def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapResult | None = None) -> Outcome:
@@ -206,7 +206,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     remarks += acquisition.merge_remarks(standing.remarks)
     remarks += [remark for remark in logbook.remarks if remark.code not in STATUS_BY_CODE]
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
-    texts += [f"{remark.finding}." for remark in remarks]
+    texts += [f"{remark.finding.removesuffix('.')}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
         ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)
@@ -224,14 +224,14 @@ def _format_values(measurement: Measurement, series: SeriesStatus | None) -> lis
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "first test of this tool and direction"
     if find_open_questions(measurement.remarks):
-        against = "in question"
+        against = "with an open question"
     elif series is not None and not series.is_baseline:
         sign = "+" if series.drop.value < 0 else ""
-        against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % against the first test"
+        against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % compared with the first test"
     damping = format_with_error(mode.damping_ratio, zeta_std, 0.01)
     stiffness = f"Stiffness {format_with_error(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:
-        stiffness = f"Damping {damping} %; stiffness is not known, for no force was measured."
+        stiffness = f"Damping {damping} %. Stiffness is unknown because no force was measured."
     return [f"Frequency {format_with_error(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
@@ -280,10 +280,10 @@ def plan_session(
     machine = folder.machine
     port = port or machine.daq.port
     if not port:
-        raise ValueError(f"no port: give plan_session.port, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port. Give plan_session.port, or set port in [daq] of {folder.toml}.")
     tool, wanted = tool or machine.tap.tool, acquisition.parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
-        raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
+        raise ValueError("direction xy needs a force sensor. Tap only x and y.")
     conditions = conditions.with_defaults(machine.tap.conditions(tool))
     what = machine.machine.name, datetime.now(UTC), tool, wanted, operator
     about = Circumstances(*what, folder.toml_text, conditions=conditions)

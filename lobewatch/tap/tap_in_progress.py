@@ -12,7 +12,7 @@ import numpy as np
 
 import acquisition
 from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, TapTest, evaluate_hit, write_hit
-from acquisition.errors import format_os_error
+from acquisition.errors import format_os_error, join_sentences
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
@@ -105,8 +105,8 @@ class TapInProgress:
 
     def make_setup_error(self) -> ValueError:
         """Return the error that rejects mixing hits of two set-ups."""
-        text = f"the interrupted test {self.id} was recorded with another length, sample rate or sensor"
-        return ValueError(f"{text}; begin anew with plan_session.resume=False")
+        text = f"the interrupted test {self.id} has another record length, sample rate or sensor"
+        return ValueError(join_sentences(text, "Start a new test with plan_session.resume=False"))
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Store a hit. It is on the disk when this returns."""
@@ -249,9 +249,9 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
-            when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            text = f"an interrupted test of {when} is still in {path}"
-            new.not_resumed.append(f"{text}; delete that folder if it is not needed")
+            test = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
+            text = f"An interrupted test ({test}) is still in {path}"
+            new.not_resumed.append(join_sentences(text, "Delete that folder if you do not need it"))
     return newest
 
 
@@ -286,13 +286,13 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
         if good < MIN_CROSS_TAP_HITS:
-            raise ValueError(f"of use are {used}; check the sensor along y")
+            raise ValueError(f"only {used} are usable. Check the sensor along y.")
         test = average_hits(acquisition.new_tap_id(about), about, hits, verdicts)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
         why = format_os_error(error) if isinstance(error, OSError) else str(error)
-        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why}.")
-    return CrossTapResult(test.id, f"{CROSS_TAP} is saved too, from {used}.")
+        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why.rstrip('.')}.")
+    return CrossTapResult(test.id, f"{CROSS_TAP} is also saved, from {used}.")
 
 
 def _evaluate_cross_hit(hit: Hit) -> HitVerdict:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition import Channel, Hit, HitFlags, Remark, Trigger, check_hit, estimate_decay_time
+from acquisition.errors import join_sentences
 from lobewatch.machine.settings.setup_tables import TapTable
 
 MIN_RECORD_TIME = 0.25
@@ -72,11 +73,11 @@ class TrialHits:
     def text(self) -> str:
         """Sentence on what to do. When done, on what was chosen and which range to choose."""
         if not self.is_done:
-            return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
+            return f"Trial hit {len(self._hits) + 1} sets the trigger level and the record length. It does not count."
         slowest = max(estimate_decay_time(hit) for hit in self._hits)
         level = f"{self.trigger.level:.3g} {CHANNEL_UNITS[self._setup.quantity]}"
-        chosen = f"Trigger at {level}, record {self._record:g} s, {_format_time_constants(self._record, slowest)}."
-        return " ".join([chosen, *(f"{remark}." for remark in self.remarks)])
+        record = f"record length {self._record:g} s, {_format_time_constants(self._record, slowest)}"
+        return join_sentences(f"Trigger level {level}, {record}", *map(str, self.remarks))
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -112,9 +113,9 @@ class TrialHits:
 
 def _format_time_constants(record: float, time_constant: float) -> str:
     if not math.isfinite(time_constant):
-        return "the response does not fall in it: is the spindle still?"
+        return "the response does not decay (spindle running?)"
     count = record / max(time_constant, 1e-6)
-    short = "" if count >= RECORD_TIME_CONSTANTS else f", fewer than {RECORD_TIME_CONSTANTS}"
+    short = "" if count >= RECORD_TIME_CONSTANTS else f", fewer than the {RECORD_TIME_CONSTANTS} needed"
     return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
 
 
@@ -131,7 +132,7 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
         return None
     too_large, percent = share < MIN_RANGE_SHARE, float(f"{100 * share:.2g}")
     wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
-    text = f"the hits reach {percent:g} % of the range of {full:.3g} {unit}"
-    cure = f"choose a range or a sensor of about {wanted:.2g} {unit}"
+    text = f"hits reach {percent:g} % of the range of {full:.3g} {unit}"
+    cure = f"Choose a range or a sensor of about {wanted:.2g} {unit}"
     alternative = "" if too_large else ", or hit softer"
     return Remark("range-too-large" if too_large else "range-too-small", name, text, cure + alternative)

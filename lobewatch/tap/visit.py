@@ -10,7 +10,7 @@ from lobewatch.tap.session import TapSession
 from lobewatch.tap.spool import count_interrupted_hits
 from lobewatch.tap.state import Choice, TapState, TapStep
 
-CROSS_TAP_CHOICE = Choice("xy", "tap xy: hit in x, sensor in y")
+CROSS_TAP_CHOICE = Choice("xy", "tap xy (hit in x, sensor in y)")
 NEXT_TOOL_CHOICE, DONE_CHOICE = Choice("tool", "next tool"), Choice("done", "done")
 DIRECTION_CHOICES: dict[TapDirection, Choice] = {"x": Choice("x", "tap x"), "y": Choice("y", "tap y")}
 
@@ -69,9 +69,9 @@ class TapVisit:
     def choose(self, key: str, tool: str = "") -> None:
         """Choose what comes next by the key of a choice. tool: name of the next one. ValueError if not possible."""
         if not self.is_waiting or key not in [choice.key for choice in self.state.choices]:
-            raise ValueError(f"{key!r} cannot be chosen now; the page shows what can")
+            raise ValueError(f"{key!r} is not available now. Use a choice that the page shows.")
         if key == NEXT_TOOL_CHOICE.key and not tool.strip():
-            raise ValueError("the next tool has no name; give the one that stands in machine.toml, or a new one")
+            raise ValueError("the next tool has no name. Enter a name of machine.toml or a new one.")
         self._answers.put((key, tool.strip()))
 
     def run(self) -> None:
@@ -100,9 +100,9 @@ class TapVisit:
         missing = next((direction for direction in DIRECTION_CHOICES if direction not in tapped), None)
         if missing is not None:
             tap = DIRECTION_CHOICES[missing]
-            turn = "Turn hammer and accelerometer to"
-            instruction = f"{cross_tap.text} The sensor stays: hit in" if cross_tap else turn
-            reason = f"{self._direction} is saved. {instruction} {missing}, then: {tap.text}."
+            turn = "Turn hammer and sensor to"
+            turn = f"{cross_tap.text} Leave the sensor. Turn the hammer to" if cross_tap else turn
+            reason = f'Direction {self._direction} is saved. {turn} {missing}, then choose "{tap.text}".'
             choices: Sequence[Choice] = (tap, DONE_CHOICE)
             state = replace(state, word=TapStep.MOVE, direction=missing, reason=reason, outcome=None)
             state = replace(state, sensor_stays=cross_tap is not None)

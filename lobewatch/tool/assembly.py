@@ -10,6 +10,7 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from acquisition import CROSS_TAP, DataError, Remark
+from acquisition.errors import join_sentences
 from dsm import Calibration, calibrate, modes_at
 from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
@@ -43,8 +44,8 @@ def _check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipMode
     problem = next(_find_cross_tap_problems(x, y, cross), None)
     if problem is None:
         return cross, ()
-    cure = "tap x, y and xy of the tool as it is clamped now"
-    return None, (Remark("cross-other-clamping", "", f"cross tap not used: {problem}", cure),)
+    cure = "Tap x, y and xy again without reclamping the tool"
+    return None, (Remark("cross-other-clamping", "", f"cross tap not used, {problem}", cure),)
 
 
 def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode]) -> Iterator[str]:
@@ -52,15 +53,15 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
     loud = [mode for mode in cross if 1 / (abs(mode.stiffness) * mode.damping_ratio) >= MIN_CROSS_PEAK_RATIO * loudest]
     for name, side in (("x", x), ("y", y)):
         if loud and all(any(_is_same_mode(mode, other) for other in side) for mode in loud):
-            yield f"it is the tap in {name} once more: hammer and sensor were in the same direction"
+            yield f"it repeats the tap in {name} (hammer and sensor in the same direction)"
     possible = math.sqrt(math.prod(sum(1 / mode.stiffness for mode in side) for side in (x, y)))
     for mode in loud:
         at, share = mode.frequency, 1 / abs(mode.stiffness) / possible
         apart = min(abs(other.frequency / at - 1) for other in (*x, *y))
         if apart > MAX_CROSS_FREQUENCY_DISTANCE:
-            yield f"it shows {at:.0f} Hz, {100 * apart:.1f} % from the nearest mode of x and y: another clamping"
+            yield f"its {at:.0f} Hz is {100 * apart:.1f} % from the nearest mode of x and y (another clamping?)"
         if share > MAX_CROSS_RESIDUE_RATIO:
-            yield f"at {at:.0f} Hz it shows {share:.1f} times what x and y allow: other sensors or another clamping"
+            yield f"its {at:.0f} Hz is {share:.1f} times larger than possible (other sensors or another clamping?)"
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
@@ -71,12 +72,12 @@ def _is_same_mode(mode: Mode, other: Mode) -> bool:
 DIRECTION_CODES = ("one-direction", "older-direction")
 """Codes of the remarks on missing or older directions."""
 UNUSABLE_TAP_REASONS = {
-    NO_FORCE_CODE: ("no force was measured, K is not known", "tap {} with a hammer that measures its force"),
-    "no-lobes-driving-point": ("not a driving point", "hit and measure at one point in {} and tap again"),
-    "no-lobes-beside-tip": ("not at the tool tip", "tap {} at the tip, or add a [spindle]"),
+    NO_FORCE_CODE: ("no force was measured, K is unknown", "Tap {} with a force hammer"),
+    "no-lobes-driving-point": ("not a driving point", "Hit and measure at one point in {}, and tap again"),
+    "no-lobes-beside-tip": ("not at the tool tip", "Tap {} at the tip, or add a [spindle] table"),
 }
 """Reason and remedy of a tap test without modes at the tip, by the code of its remark."""
-NO_MODE_REASON = ("no mode in the band", "tap {} again")
+NO_MODE_REASON = ("no mode in the band", "Tap {} again")
 """Reason and remedy without such a remark."""
 MAX_DIRECTION_AGE = timedelta(hours=24)
 """Age difference of x and y above which the older one is shifted; chosen."""
@@ -127,9 +128,9 @@ class Assembly:
         """Text on the missing direction, and its remedy."""
         missing = "y" if "x" in self.directions else "x"
         if missing not in self.unusable:
-            return f"direction {missing} was not tapped", f"tap direction {missing} of tool {self.tool!r} too"
+            return f"direction {missing} was not tapped", f"Tap direction {missing} of tool {self.tool!r} too"
         why, cure = self.unusable[missing]
-        return f"direction {missing} is tapped, not usable: {why}", cure
+        return f"direction {missing} is tapped but not usable ({why})", cure
 
     @property
     def label(self) -> str:
@@ -144,7 +145,7 @@ class Assembly:
     def check(self) -> Assembly:
         """Return itself; DataError without modes at the tip."""
         if not self.directions:
-            raise DataError(f"{self.tap_id}: {'; '.join(map(str, self.remarks))}")
+            raise DataError(f"{self.tap_id}: {join_sentences(*map(str, self.remarks))}")
         return self
 
     def scatter(self, direction: str) -> Scatter | None:
@@ -212,10 +213,10 @@ def _unusable_reason(tap: Measurement) -> tuple[str, str]:
 def _untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
     """Return the remark on a missing direction; unusable: reason and remedy of its tap test."""
     missing = "y" if tapped == "x" else "x"
-    text = f"modes in the {tapped} direction alone, {missing} taken like {tapped}"
+    text = f"modes only in direction {tapped}, {missing} assumed equal"
     if unusable is None:
-        return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
-    return Remark("one-direction", tool, f"{text}; {missing} is tapped, not usable: {unusable[0]}", unusable[1])
+        return Remark("one-direction", tool, text, f"Tap direction {missing} of the same tool too")
+    return Remark("one-direction", tool, f"{text} ({missing} is tapped but not usable: {unusable[0]})", unusable[1])
 
 
 def _direction_remarks(
@@ -227,10 +228,10 @@ def _direction_remarks(
     if across is None or newest.time - across.time <= MAX_DIRECTION_AGE:
         return ()
     days = round((newest.time - across.time) / timedelta(days=1))
-    text = f"direction {across.direction} is that of {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
+    text = f"direction {across.direction} is from {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
     if moved is not None:
-        text += f", its frequency moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
-    return (Remark("older-direction", newest.tool, text, f"tap direction {across.direction} again"),)
+        text += f", frequency shifted by {100 * (moved - 1):+.1f} % like that of {newest.direction}"
+    return (Remark("older-direction", newest.tool, text, f"Tap direction {across.direction} again"),)
 
 
 PREDICTED_MODE_COUNT = 8
@@ -248,11 +249,11 @@ def predict_assembly(machine: Machine, newest: Sequence[Measurement], tool: str)
     """
     if not newest:
         build_model_state(machine, None, tool)
-        raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
+        raise DataError(f"tool {tool!r} was never tapped, and no tap test has calibrated the model. Tap the tool.")
     predictions = {tap.direction: _predict_direction(machine, tap, tool) for tap in newest}
     modes: dict[str, TipModes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
     ids = " and ".join(tap.tap_id for tap in newest)
-    remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
+    remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "Tap the tool")
     name, calibration = f"prediction from {newest[0].tap_id}", predictions[newest[0].direction][1]
     assembly = _make_assembly(tool, newest[0].time, name, modes, calibration)
     tapped = assembly.directions
@@ -263,7 +264,7 @@ def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[l
     """Return the modes of the model in the measured band, shifted with the softest one."""
     state, followed = build_model_state(machine, tap, tool), tap.followed
     if followed is None:
-        raise DataError(f"{tap.tap_id}: no mode is followed")
+        raise DataError(f"{tap.tap_id}: there is no followed mode")
     frequency, stiffness = modes_at(state.spindle, PREDICTED_MODE_COUNT)
     softest = int(np.argmin(stiffness))
     shown = stiffness < MAX_PREDICTED_STIFFNESS_RATIO * stiffness[softest]

@@ -96,8 +96,8 @@ def compute_lobe_chart(
     if method is LobeMethod.ZERO_ORDER:
         return lower_envelope(means)
     if isinstance(x, Frf) or isinstance(y, Frf):
-        text = "semi-discretisation works from the modes; leave LobeChart.source frf out"
-        raise ValueError(f"compute_lobe_chart.method {text}")
+        text = "semi-discretisation needs modes, not an FRF. Remove LobeChart.source frf."
+        raise ValueError(f"compute_lobe_chart.method: {text}")
     speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MAX_CHART_SPEEDS, speed_rpm.size))
     lowest = [mean.minimum.depth for mean in means]
     depths = [MAX_CHART_DEPTH_RATIO * depth if np.isfinite(depth) else 0.1 for depth in lowest]

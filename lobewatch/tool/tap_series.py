@@ -64,14 +64,13 @@ class MountingTracker:
         if force is not None:
             self._drawbar[tap.tool] = force
             if last_force not in (None, force):
-                text = f"drawbar force {force:g} kN, {last_force:g} kN before: the frequency may have changed with it"
-                yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
+                text = f"drawbar force {force:g} kN after {last_force:g} kN, the frequency may have changed with it"
+                yield Remark("drawbar-changed", tap.tool, text, "Inspect the drawbar if this was not intended")
         if hours is not None:
             self._hours = hours
             if last_hours is not None and hours < last_hours:
-                series = "forecasts of a series that it is in count in days"
-                cure = "exclude it and replay its file with the right Conditions.hours"
-                text = f"running hours {hours:g} h, {last_hours:g} h before: {series}"
+                cure = "Exclude it and replay its file with the correct Conditions.hours"
+                text = f"running hours {hours:g} h after {last_hours:g} h, so forecasts of this series use days"
                 yield Remark("hours-went-back", tap.tool, text, cure)
 
 
@@ -88,9 +87,9 @@ def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: Tool
         for name, (label, value) in changed.items()
     )
     if earlier is None:
-        return Remark("new-series", before.first.tool, f"{change}: a new series, compared with no test before it")
-    begun = f"compared with the series begun {earlier.first.created:%Y-%m-%d}"
-    return Remark("earlier-series", before.first.tool, f"{change}: {begun}")
+        return Remark("new-series", before.first.tool, f"{change} begins a new series, not compared with earlier tests")
+    begun = f"compared with the series of {earlier.first.created:%Y-%m-%d}"
+    return Remark("earlier-series", before.first.tool, f"{change}, {begun}")
 
 
 class TapPlace(msgspec.Struct, frozen=True, gc=False):

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from acquisition import DataError
+from acquisition.errors import join_sentences
 from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats, Indices
@@ -92,7 +93,7 @@ def propose_pitch(
     equal = equal_pitch(table.teeth)
     verdict = evaluate_program(msgspec.structs.replace(table, pitch_deg=equal.pitch_deg), assembly, machine, at_speed)
     if verdict.stability is Stability.UNKNOWN or verdict.samples is None:
-        raise DataError("; ".join(str(remark) for remark in verdict.remarks))
+        raise DataError(join_sentences(*map(str, verdict.remarks)))
     case = ProgramCase(at_speed.apply_coefficients(table), assembly, machine, at_speed)
     limits = _pitch_limits(verdict.samples, case.depth)
     half_wave = half_wave_deg(table.speed_rpm, verdict.chatter_frequency)

@@ -17,7 +17,7 @@ from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
     MissingToolData.TOOL_MATERIAL: "tool_material in its [[tool]]",
-    MissingToolData.MATERIAL: "material in the program (Kt and Kr alone are of no group of ISO 513)",
+    MissingToolData.MATERIAL: "material in the program (Kt and Kr give no ISO 513 group)",
 }
 """Missing tool data to ask for besides the cutting speed."""
 TOOL_MAKER_KEYS = (MissingToolData.CUTTING_SPEED, MissingToolData.FEED_PER_TOOTH)
@@ -29,16 +29,15 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
     limits = find_tool_limits(machine, table)
     if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
         reach = CutRange(machine, table, limits)
-        cure = "choose another tool" if limits.is_empty else f"turn at {reach.low_rpm:g} to {reach.high_rpm:g} rpm"
+        cure = "Choose another tool" if limits.is_empty else f"Use {reach.low_rpm:g} to {reach.high_rpm:g} rpm"
         is_over = table.speed_rpm > limits.tool.max_speed_rpm
-        own = "correct max_speed_rpm" if is_over else "enter what its maker says as cutting_speed_m_min"
+        own = "correct max_speed_rpm" if is_over else "set the cutting_speed_m_min of its maker"
         yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
-        allowed = f"{_range_text(borne.low, borne.high)} mm, {_tool_text(table, limits)}"
-        text = f"feed_per_tooth_mm = {feed:g} is outside {allowed}"
-        cure = "feed within that, or enter what its maker says as feed_per_tooth_mm"
-        yield _tool_limit_remark(table, f"{text} ({borne.source})", cure)
+        allowed = f"{_range_text(borne.low, borne.high)} mm"
+        text = f"feed_per_tooth_mm = {feed:g} is outside {allowed} {_tool_text(table, limits)} ({borne.source})"
+        yield _tool_limit_remark(table, text, f"Use {allowed}, or set the feed_per_tooth_mm of its maker")
 
 
 def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
@@ -47,9 +46,9 @@ def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Re
         whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
         asked = " and ".join(text for unknown, text in MISSING_TOOL_FACTS.items() if unknown in limits.missing)
         own = [key for key in TOOL_MAKER_KEYS if key is MissingToolData.CUTTING_SPEED or key in limits.missing]
-        cure = "; or ".join(filter(None, [asked, f"{' and '.join(own)} in its [[tool]]"]))
-        text = f"what the tool bears is not known: speeds {whose} are advised"
-        yield Remark("tool-not-described", table.tool, text, f"write {cure}")
+        cure = ", or ".join(filter(None, [asked, f"{' and '.join(own)} in its [[tool]]"]))
+        text = f"the cutting-speed limit is unknown, speeds {whose} are recommended"
+        yield Remark("tool-not-described", table.tool, text, f"Set {cure}")
 
 
 def _tool_limit_remark(table: ProgramTable, text: str, cure: str) -> Remark:
@@ -58,20 +57,20 @@ def _tool_limit_remark(table: ProgramTable, text: str, cure: str) -> Remark:
 
 def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
     if table.speed_rpm > limits.tool.max_speed_rpm:
-        return f"{table.speed_rpm:g} rpm are more than max_speed_rpm = {limits.tool.max_speed_rpm:g} of its tool"
+        return f"{table.speed_rpm:g} rpm is above max_speed_rpm = {limits.tool.max_speed_rpm:g} of its tool"
     speed, borne = math.pi * table.tool_diameter_mm / 1e3 * table.speed_rpm, limits.cutting_speed_m_min
     if borne is None:
-        return f"{table.speed_rpm:g} rpm are outside the speeds of the spindle"
-    allowed = f"{_range_text(borne.low, borne.high)} m/min, {_tool_text(table, limits)}"
-    return f"{table.speed_rpm:g} rpm are {_number_text(speed)} m/min at the edge, outside {allowed} ({borne.source})"
+        return f"{table.speed_rpm:g} rpm is outside the speed range of the spindle"
+    allowed = f"{_range_text(borne.low, borne.high)} m/min {_tool_text(table, limits)}"
+    return f"{table.speed_rpm:g} rpm gives {_number_text(speed)} m/min, outside {allowed} ({borne.source})"
 
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
     """Return the source of the tool limits for a remark."""
     tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
-    where = "in a slot" if limits.cut == "slot" else "at the side"
-    material = f" of {table.material}" if table.material else ""
-    return f"which {tool} of {table.tool_diameter_mm:g} mm bears {where}{material}"
+    cut = "slotting" if limits.cut == "slot" else "side milling"
+    material = f" {table.material}" if table.material else ""
+    return f"allowed for {tool} of {table.tool_diameter_mm:g} mm {cut}{material}"
 
 
 def _range_text(low: float, high: float) -> str:
@@ -101,13 +100,13 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
     if table.immersion < NARROW_CUT_IMMERSION and is_plain:
         yield _corner_remark(case, result)
     if case.machine.helix_deg(table) is None and min(table.immersions) < MAX_HELIX_IMMERSION:
-        risk = f"at a/D {min(table.immersions):.2g} edges with a helix may have 0.7 to 1.7 times the limit"
-        text = f"helix_deg is not written, and taken as 0: {risk}"
-        yield Remark("helix-not-written", table.name, text, "write helix_deg, 0 for straight edges")
+        risk = f"at ae/D {min(table.immersions):.2g} a helix may change the limit by a factor of 0.7 to 1.7"
+        text = f"helix_deg is missing, 0 is assumed ({risk})"
+        yield Remark("helix-not-written", table.name, text, "Set helix_deg, 0 for straight edges")
     if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
-        effect = f"which direct taps leave open, move its limit by up to {100 * (result.axes_ratio - 1):.0f} %"
-        text = f"x and y show the same modes, taken as askew at their worst: the axes, {effect}"
-        yield Remark(CROSS_NOT_TAPPED_CODE, table.name, text, "tap Circumstances.direction xy: hit in x, sensor in y")
+        effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %, worst case used"
+        text = f"modes may have rotated principal directions ({effect})"
+        yield Remark(CROSS_NOT_TAPPED_CODE, table.name, text, "Tap Circumstances.direction xy (hit in x, sensor in y)")
 
 
 def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
@@ -119,12 +118,13 @@ def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
     fed = [replace(cut, feed_angle=i * FEED_ANGLE_STEP) for i in range(round(math.pi / FEED_ANGLE_STEP))]
     speed = np.array([table.speed_rpm])
     limit = min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
-    share = f", {100 * limit / result.median.limit:.0f} % of it" if limit < result.median.limit < math.inf else ""
-    corner = f"a corner of {radius:g} mm radius takes as much as {inside * table.tool_diameter_mm:.2g} mm"
-    limited = f"the limit is about {1e3 * limit:.2g} mm there{share}"
-    text = f"judged at {radial:g} mm radial depth all the way: {corner}, and {limited}"
-    straight = f"[{radial:g}, {radial:g}] where the path is straight"
-    cure = f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; {straight}"
+    ratio = limit / result.median.limit
+    share = f", {100 * ratio:.0f} % of the straight path" if 0 < ratio < 1 else ""
+    corner = f"a corner of {radius:g} mm radius has ae {inside * table.tool_diameter_mm:.2g} mm"
+    limited = f"limit there about {1e3 * limit:.2g} mm{share}"
+    text = f"evaluated at ae {radial:g} mm, but {corner} ({limited})"
+    straight = f"[{radial:g}, {radial:g}] if the path is straight"
+    cure = f"Set corner_radius_mm, or radial_depth_mm = [smallest, largest] ({straight})"
     return Remark("one-engagement", table.name, text, cure)
 
 
@@ -156,7 +156,7 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     """Name the decisive cause of uncertainty, and what would reduce it."""
     table, assembly, record = case.table, case.assembly, UNCERTAINTY_CAUSES[cause]
     missing, missing_remedy = assembly.missing_direction
-    measure = "measure them" if table.material else "measure them, or name the material"
+    measure = "Measure Kt and Kr" if table.material else "Measure Kt and Kr, or set material"
     asked = ", ".join(dict.fromkeys(question.code for question in assembly.questions))
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from acquisition import DataError, Remark
+from acquisition.errors import join_sentences
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
@@ -103,15 +104,15 @@ def find_stable_pockets(
 
 MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present speed"
 """Labels of alternative settings by their advantage."""
-NEW_TOOL_REMEDIES = "a shorter stick-out: tap it again with it", "another tool: a thicker one, or with fewer teeth"
-CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "a smaller radial depth")
+NEW_TOOL_REMEDIES = "Use a shorter stick-out and tap again", "Use a thicker tool or one with fewer flutes"
+CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "Reduce the radial depth")
 """Measures that make an unsafe cut safe, for verdicts."""
-TOOL_DATA_REMEDY = "tool_material and cutting_speed_m_min in its [[tool]], where it bears more"
-TOOL_SPEED_REMEDIES = ("a smaller diameter", TOOL_DATA_REMEDY)
+TOOL_DATA_REMEDY = "Set tool_material and cutting_speed_m_min in its [[tool]] if the tool allows more"
+TOOL_SPEED_REMEDIES = ("Use a smaller diameter", TOOL_DATA_REMEDY)
 """Measures if the spindle is too fast for the tool."""
-MAX_SPEED_REMEDIES = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
+MAX_SPEED_REMEDIES = ("Use a tool or holder with a higher speed limit", "Correct max_speed_rpm in its [[tool]]")
 """Measures if max_speed_rpm limits the speed."""
-FIXED_SPEED_REMEDIES = ("a speed within that", TOOL_DATA_REMEDY)
+FIXED_SPEED_REMEDIES = ("Choose a speed in that range", TOOL_DATA_REMEDY)
 """Measures if a program runs at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Immersion up to which a smaller radial depth is not recommended (-)."""
@@ -159,7 +160,7 @@ def recommend(
     present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
     """
     if isinstance(tool, DataError):
-        tap = f"tap it: TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
+        tap = f"Run TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
     if gap := _find_gap(table, tool, machine) or _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
@@ -181,7 +182,7 @@ def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[st
     asked = find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0)
     asked = [doubted for doubted in asked if doubted.key not in REQUESTED_KEYS]
     if asked:
-        return ("; ".join(f"{doubted.statement} {doubted.reason}" for doubted in asked), asked[0].remark.cure)
+        return (join_sentences(*(f"{doubted.statement} {doubted.reason}" for doubted in asked)), asked[0].remark.cure)
     return find_open_question(table, tool) or ()
 
 
@@ -191,11 +192,11 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     if not reach.is_empty:
         return ()
     edge = limits.cutting_speed_m_min
-    edge_text = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
+    edge_text = "" if edge is None else f" ({edge.high:.0f} m/min)"
     is_capped = limits.high_rpm == limits.tool.max_speed_rpm
-    why, cures = (" (its max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
-    slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
-    return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
+    why, cures = (" (max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
+    text = f"the tool allows {reach.high_rpm:g} rpm{why}, below the lowest spindle speed of {speed.low_rpm:g} rpm"
+    return (text, *cures)
 
 
 def _recommend_setting(search: SettingSearch, table: ProgramTable, setting: Setting) -> Recommendation:
@@ -206,7 +207,7 @@ def _recommend_setting(search: SettingSearch, table: ProgramTable, setting: Sett
     program = msgspec.structs.replace(table, speed_rpm=speed, depth_mm=depth, direction=milled)
     verdict = evaluate_program(program, case.assembly, case.machine, case.at_speed, result)
     if verdict.stability is not Stability.STABLE or verdict.is_beyond_drive:
-        reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.stability.value
+        reason = join_sentences(*map(str, verdict.remarks)) or verdict.stability.value
         return Recommendation(table, case.any_direction, reason=reason)
     remarks = (*verdict.remarks, *missing_tool_remarks(table, search.cut_range.limits))
     feed = _feed_range(search, table)
@@ -236,7 +237,7 @@ def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float |
     if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
         return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    reason = f"no safe {named} in {reach.text}" if set_rpm is None else f"no safe depth at {set_rpm:g} rpm"
+    reason = f"no stable {named} in {reach.text}" if set_rpm is None else f"no stable depth at {set_rpm:g} rpm"
     likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])
     probe = search.case.with_changes(speed_rpm=speed, depth_mm=depth_mm or DEPTH_STEP_MM)

@@ -36,15 +36,15 @@ StiffnessAt = Callable[[float], float]
 def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     """Return relative stiffness as a function of the frequency drop, and the remark that states the assumption.
 
-    All modes fall alike. K follows the model (bearings softer until its frequency has fallen as far); without a
+    All modes drop alike. K follows the model (bearings softer until its frequency has dropped as far); without a
     model it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
-    clause = "stiffness does not (no model)"
+    clause = "constant stiffness (no model)"
     if ratios.size > 1:
         drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {drop:.0f} %)"
-    text = f"fall left: all modes fall alike, damping does not change, {clause}"
+        clause = f"stiffness from the model ({change:+.1f} % at {drop:.0f} % frequency drop)"
+    text = f"f1 margin: all modes drop alike, constant damping, {clause}"
 
     def stiffness_at(drop: float) -> float:
         return float(np.interp(drop, CALIBRATED_DROPS[: ratios.size], ratios))

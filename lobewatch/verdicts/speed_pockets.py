@@ -87,5 +87,7 @@ def speed_pocket_remarks(table: CutTable, name: str, assembly: Assembly, machine
         return ()
     windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
     speeds = ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
-    text = f"pockets by frequency and damping: {speeds}; how deep, test cuts tell"
-    return (Remark(SPEEDS_ONLY_CODE, name, text, "pocket_depth.find_pocket_depths leads to a depth in five test cuts"),)
+    text = f"stable pockets of unknown depth: {speeds}"
+    return (
+        Remark(SPEEDS_ONLY_CODE, name, text, "Find the depth in five test cuts with pocket_depth.find_pocket_depths"),
+    )

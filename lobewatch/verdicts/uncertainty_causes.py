@@ -18,34 +18,34 @@ class Cause(NamedTuple):
     """Label of the half-widths of modes that it causes; empty for a cause that has none."""
 
 
-TAP_TEST = Cause("tap", "the error of the tap test decides", "tap again with more hits", label="by the tap test")
+TAP_TEST = Cause("tap", "result depends on the tap test error", "Tap again with more hits", label="from the tap test")
 CLAMPING = Cause(
     "clamping",
-    "the scatter from tap test to tap test decides",
-    f"tap again: from {MIN_TAPS_FOR_SCATTER} tests on the scatter of this very tool counts",
-    label="from tap to tap",
+    "result depends on the scatter between tap tests",
+    f"Tap again until {MIN_TAPS_FOR_SCATTER} tests give the scatter of this tool",
+    label="between tap tests",
 )
-PREDICTION = Cause("prediction", "the prediction decides", "tap tool {tool}", label="by the prediction")
+PREDICTION = Cause("prediction", "result depends on the prediction", "Tap tool {tool}", label="from the prediction")
 UNTAPPED = Cause("untapped", "{missing}", "{missing_remedy}", label="in {direction}, not {lacking}")
 TEST_CUTS = Cause(
     "cuts",
-    "the spindle at speed decides, as {n_cuts} test cuts have left it open",
-    "make the next test cut: program_learning.find_next_cut names it for {program}",
-    label="left open by test cuts",
+    "result depends on the spindle at speed (test cuts so far: {n_cuts})",
+    "Make the next test cut for {program} with program_learning.find_next_cut",
+    label="after the test cuts",
 )
-CROSS = Cause(
-    "cross", "the axes of the modes decide, which taps in x and in y leave open", "tap Circumstances.direction xy"
-)
-SPEED = Cause("speed", "the spindle speed decides", "run it in the middle of a window of speeds")
+CROSS = Cause("cross", "result depends on the principal directions of the modes", "Tap Circumstances.direction xy")
+SPEED = Cause("speed", "result depends on the exact spindle speed", "Choose a speed in the middle of a stable pocket")
 COEFFICIENTS = Cause(
-    "coefficients", "the cutting coefficients decide: chatters above Kt {kt} N/mm2", "{coefficients_remedy}"
+    "coefficients",
+    "result depends on the cutting-force coefficients (chatter above Kt {kt} N/mm2)",
+    "{coefficients_remedy}",
 )
-WEAR = Cause("wear", "wear decides: chatters above Kt {kt} N/mm2", 'run it with new edges and write wear = "new"')
-QUESTION = Cause("question", "it rests on a tap test in question ({questions})", "answer the question, or tap again")
+WEAR = Cause("wear", "result depends on tool wear (chatter above Kt {kt} N/mm2)", 'Use new edges and set wear = "new"')
+QUESTION = Cause("question", "a tap test has an open question ({questions})", "Answer the question, or tap again")
 WORKPIECE = Cause(
     "workpiece",
-    "the wall that is cut is thin: it gives way, and its modes are not known",
-    "support it and take thin = true out, or find the depth by test cuts",
+    "the thin wall deflects and its modes are unknown",
+    "Support the wall and remove thin = true, or find the depth with test cuts",
 )
 
 UNCERTAINTY_CAUSES = {cause.name: cause for cause in tuple(globals().values()) if isinstance(cause, Cause)}

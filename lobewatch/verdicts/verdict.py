@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition import DataError, Remark
+from acquisition.errors import join_sentences
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
@@ -200,7 +201,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         kind=median.kind,
         feed_angle=median.cut.feed_angle,
         method=median.method,
-        detail=f"{median.detail}, {N_PROGRAM_SAMPLES} draws from the doubt",
+        detail=f"{median.detail}, {N_PROGRAM_SAMPLES} Monte Carlo samples",
         drive_limit=float(drive_limit[0]),
         samples=result.samples,
         remarks=tuple(remarks),
@@ -211,7 +212,7 @@ def _unknown_verdict(
     table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None, further: tuple[Remark, ...] = ()
 ) -> Verdict:
     """Build the verdict on a program that cannot be evaluated."""
-    text = "; ".join(map(str, reasons)) or "no modes at the tool tip"
+    text = join_sentences(*map(str, reasons)) or "no modes at the tool tip"
     remark = Remark(NOT_CHECKED_CODE, table.name, f"not checked: {text}")
     return Verdict(table, Stability.UNKNOWN, assembly, remarks=(remark, *further))
 
@@ -234,11 +235,11 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
     if len(assembly.directions) < 2:
         return assembly.missing_direction
     if isinstance(table, ProgramTable) and table.thin:
-        return "the wall that is cut is thin", "support the wall, which is thin"
+        return "the wall is thin", "Support the thin wall"
     if assembly.questions:
         codes = dict.fromkeys(question.code for question in assembly.questions)
-        cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
-        return f"it rests on a tap test in question ({', '.join(codes)})", cure
+        cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
+        return f"a tap test has an open question ({', '.join(codes)})", cure
     return None
 
 
@@ -249,4 +250,4 @@ def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     yield from case.assembly.questions
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
-        yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")
+        yield Remark("drive-ignored", table.name, "[drive] is ignored because feed_per_tooth_mm is missing")

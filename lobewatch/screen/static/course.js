@@ -21,5 +21,5 @@ export function drawCourse(svg, { points, limits, fall }) {
   const line = at.length > 1 ? at.join("L") : `${WIDTH / 2 - EDGE} ${y(points[0][1])}h${2 * EDGE}`;
   part("path", { d: `M${line}` });
   svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `frequency ${points.at(-1)[1].toFixed(2)} % since the start, limit ${limit} %`);
+  svg.setAttribute("aria-label", `frequency change ${points.at(-1)[1].toFixed(2)} % since the first tests, limit ${limit} %`);
 }

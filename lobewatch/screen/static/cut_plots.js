@@ -1,4 +1,4 @@
-// The level while a cut is waited for, and the spectrum of what was heard with its lines.
+// The level while a cut is awaited, and the spectrum of the recorded cut with its lines.
 import { chart, INK, line } from "./chart.js";
 
 const SECONDS = 30;

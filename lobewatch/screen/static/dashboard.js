@@ -4,13 +4,13 @@ import { unbroken } from "./unbroken.js";
 
 const REFRESH_MS = 5000;
 const WORDS = { alarm: "✗ ALARM", unknown: "? UNKNOWN", warn: "! WARNING", good: "✓ GOOD" };
-const FILTERS = { all: "All", ...WORDS, due: "To be tapped" };
+const FILTERS = { all: "All", ...WORDS, due: "Test due" };
 const at = (id) => document.getElementById(id);
 const isDue = ({ days_left: left }) => left === null || left < 0;
 const made = (tag, settings) => Object.assign(document.createElement(tag), settings);
 
-const shown = new Map(); // by machine: what stands on the page, its element
-const failed = new Map(); // by machine: what went wrong with its buttons
+const shown = new Map(); // by machine: its row and its element
+const failed = new Map(); // by machine: error of its buttons
 let list = { version: "", machines: [], may_alter: false };
 let filter = sessionStorage.getItem("filter") in FILTERS ? sessionStorage.getItem("filter") : "all";
 
@@ -21,19 +21,19 @@ function fail(text) {
 
 function fallText({ fall, fall_std: std, series }) {
   if (fall === null) return series;
-  if (std === 0) return `${series}: first test, nothing to compare it with yet`;
+  if (std === 0) return `${series}: first test, no comparison yet`;
   const digits = std === null ? 2 : Math.min(Math.max(1 - Math.floor(Math.log10(std)), 1), 4);
   const error = std === null ? "" : ` ± ${std.toFixed(digits)}`;
-  return `${series}: frequency ${fall >= 0 ? "fallen" : "risen"} by ${Math.abs(fall).toFixed(digits)}${error} % since the first tests`;
+  return `${series}: frequency ${fall >= 0 ? "drop" : "rise"} ${Math.abs(fall).toFixed(digits)}${error} % since the first tests`;
 }
 
-// How far it has fallen, with a bar whose line is the last limit: 0.15 % looks unlike 10 %.
+// The frequency change with a bar whose end is the last limit, so that 0.15 % looks different from 10 %.
 function showSize(place, { fall, fall_std: std, limits }) {
   if (fall === null || std === 0) return;
   const change = -Math.round(100 * fall) / 100 + 0; // + 0: no -0
   place.textContent = `${change > 0 ? "+" : ""}${change.toFixed(2)} %`;
   place.style.setProperty("--share", Math.min(Math.max(fall / limits.at(-1), 0), 1.25));
-  place.title = `frequency since the first tests; alarm at -${limits.at(-1)} %`;
+  place.title = `frequency change since the first tests (alarm at -${limits.at(-1)} %)`;
 }
 
 function dueText({ last_tap: last, days_left: left }) {
@@ -44,7 +44,7 @@ function dueText({ last_tap: last, days_left: left }) {
   return days ? `due in ${many}` : "due today";
 }
 
-// The address that an action leads to is opened; what went wrong stands where the finger was.
+// Opens the address that the server returns. An error is shown next to the button.
 async function go(button, key, path, body) {
   const say = (text) => {
     failed.set(key, text);
@@ -62,17 +62,17 @@ function addStarts(item, machine, path) {
   const { key, running, interrupted } = machine;
   for (const button of item.querySelectorAll(".start")) {
     const { direction } = button.dataset;
-    if (running) button.textContent = "Watch the test";
+    if (running) button.textContent = "Watch test";
     const offered = running ? direction === "x" : list.may_alter && machine.has_port;
     button.hidden = !offered || (direction === "xy" && !("xy" in interrupted));
     if (running) button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(key)}/`));
     else button.addEventListener("click", () => go(button, key, `${path}/start`, { direction }));
   }
   for (const [direction, count] of Object.entries(running || !list.may_alter || !machine.has_port ? {} : interrupted)) {
-    const anew = made("button", { type: "button", className: "anew", textContent: `Begin ${direction} anew` });
-    anew.addEventListener("click", () => go(anew, key, `${path}/start`, { direction, resume: false }));
-    item.querySelector(`.start[data-direction=${direction}]`).after(anew);
-    item.querySelector(".next").append(` An interrupted test in ${direction} has ${count} hit${count === 1 ? "" : "s"}: START ${direction} goes on with it.`);
+    const restart = made("button", { type: "button", className: "restart", textContent: `Restart ${direction}` });
+    restart.addEventListener("click", () => go(restart, key, `${path}/start`, { direction, resume: false }));
+    item.querySelector(`.start[data-direction=${direction}]`).after(restart);
+    item.querySelector(".port").append(` START ${direction} continues the interrupted test with ${count} hit${count === 1 ? "" : "s"}.`);
   }
 }
 
@@ -91,7 +91,7 @@ function row(machine) {
   part("fall").textContent = unbroken(fallText(machine));
   part("note").textContent = unbroken(machine.note);
   part("next").textContent = unbroken(machine.next_step);
-  part("port").textContent = machine.has_port || machine.light === "unknown" ? "" : "START needs the port of the DAQ: port in [daq] of machine.toml.";
+  part("port").textContent = machine.has_port || machine.light === "unknown" ? "" : "START needs the DAQ port. Set port in [daq] of machine.toml.";
   part("limit").textContent = machine.limit;
   part("due").textContent = dueText(machine);
   part("due").classList.toggle("overdue", isDue(machine));
@@ -117,7 +117,7 @@ function take({ version, may_alter, machines, changed, gone }) {
   list = { version, may_alter, machines };
 }
 
-// Only what has changed is made anew: a line that is open, or has the focus, stays.
+// Only changed rows are rebuilt, so that an open or focused row stays.
 function show() {
   for (const machine of list.machines) {
     const old = shown.get(machine.key);

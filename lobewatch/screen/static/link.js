@@ -1,4 +1,4 @@
-// The token and the two ways to the server: a feed that comes back by itself, and requests that may alter something.
+// The token and the two ways to the server: a feed that reconnects by itself, and requests that may alter something.
 const RETRY_MS = 1000;
 const SILENCE_MS = 3000;
 const GOING_AWAY = 1001;
@@ -16,10 +16,10 @@ export async function ask(path, method = "GET", body = undefined) {
   try {
     response = await fetch(path, { method, headers, body: body && JSON.stringify(body) });
   } catch {
-    throw new Error("No connection to lobewatch.");
+    throw new Error("No connection to lobewatch");
   }
   const answer = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(answer.error ?? `lobewatch answered ${response.status}.`);
+  if (!response.ok) throw new Error(answer.error ?? `lobewatch reported error ${response.status}`);
   return answer;
 }
 
@@ -38,7 +38,7 @@ export function follow(onState, onPlots, onLost) {
     clearTimeout(watchdog);
     socket.onmessage = socket.onclose = null;
     socket.close();
-    onLost("Is lobewatch still running? This page connects again by itself.", ended);
+    onLost("Check that lobewatch is running. This page reconnects by itself.", ended);
     setTimeout(() => follow(onState, onPlots, onLost), RETRY_MS);
     await ask("access").catch((error) => onLost(error.message, ended));
   };
@@ -51,7 +51,7 @@ export function follow(onState, onPlots, onLost) {
   alive();
 }
 
-// The layout is that of lobewatch/screen/messages.py.
+// The layout is that of encode_curves in lobewatch/screen/live_feed.py.
 function unpack(buffer) {
   const size = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));

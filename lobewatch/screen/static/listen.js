@@ -5,10 +5,10 @@ import { at, element, flash, put, showWord } from "./word.js";
 
 const FINISHED = ["stable", "chatter", "flip", "cannot-tell", "failed"];
 const STEPS = [
-  "1. The sensor from the tool to the spindle housing.",
-  "2. The spindle turning in air.",
+  "1. Move the sensor from the tool to the spindle housing.",
+  "2. Run the spindle in air.",
   "3. Cut for a second or longer.",
-  "4. Out of the cut: the word comes by itself.",
+  "4. Leave the cut. The verdict appears by itself.",
 ];
 const SOUNDS = { stable: "good", chatter: "refused", flip: "refused", again: "lost", "cannot-tell": "lost", failed: "lost" };
 
@@ -19,19 +19,19 @@ let over = false;
 // A word of two lines has its last word in the second.
 const inLines = (word) => word.replace(/ (?=\S+$)/, "\n");
 
-// What stands beside the word: a number, and what it is.
+// The number next to the word, and its unit.
 function figures({ heard, kind, left, cut_seconds: cut }) {
   if (heard) {
     const speed = heard.speed_rpm === null ? "" : `${heard.speed_rpm.toFixed(0)} rpm`;
     const chatter = heard.chatter_frequency_hz;
     if (kind === "cannot-tell") return ["", ""];
-    return chatter === null ? [speed, "found"] : [`${chatter.toFixed(0)} Hz`, kind === "flip" ? `period two\n${speed}` : speed];
+    return chatter === null ? [speed, "speed"] : [`${chatter.toFixed(0)} Hz`, kind === "flip" ? `period 2\n${speed}` : speed];
   }
-  if (cut !== null) return [`${cut.toFixed(1)} s`, "of cut"];
+  if (cut !== null) return [`${cut.toFixed(1)} s`, "recorded"];
   return left === null ? ["", ""] : [`${Math.ceil(left)} s`, "left"];
 }
 
-const named = ({ saved }, text) => (saved ? `saved as ${saved}; ${text}` : text);
+const named = ({ saved }, text) => (saved ? `Saved as ${saved}. ${text}` : text);
 
 function showState(next) {
   const before = state;
@@ -44,7 +44,7 @@ function showState(next) {
   put("figure", figure);
   put("unit", unit);
   put("reason", state.reason);
-  put("next", state.heard ? `Next: ${state.heard.next_step}.` : "");
+  put("next", state.heard ? `Next: ${state.heard.next_step}` : "");
   showWord(state.kind, inLines(state.word));
   at("level").hidden = Boolean(state.heard);
   showLevel(state.level);
@@ -62,12 +62,12 @@ function showTexts(wanted) {
   at("texts").replaceChildren(...texts.map((text) => element("li", text)));
 }
 
-// Where lobewatch has ended as it should, its last picture stays.
+// After a normal end of lobewatch the last state stays.
 function showLost(why, ended) {
   over ||= ended;
-  if (over && FINISHED.includes(state?.kind)) return put("device", named(state, "lobewatch has ended; this is its last picture"));
+  if (over && FINISHED.includes(state?.kind)) return put("device", named(state, "lobewatch has ended. This is the last state."));
   showWord("no-connection", over ? "ENDED" : "NO\nCONNECTION");
-  put("reason", over ? "lobewatch has ended; the same command listens again." : why);
+  put("reason", over ? "lobewatch has ended. Repeat the command to record another cut." : why);
   put("figure", "");
   put("unit", "");
   document.title = at("text").textContent;

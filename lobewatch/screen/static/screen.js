@@ -39,7 +39,7 @@ function showState(next) {
   if (before) announce(before);
 }
 
-// A verdict comes as a word and as a new hit, maybe in two pictures; the pictures in between may have been left out.
+// A verdict arrives as a word and as a new hit, maybe in two states. States in between may be missing.
 function announce(before) {
   const changed = state.kind !== before.kind;
   const another = (state.hits.at(-1)?.number ?? 0) > (before.hits.at(-1)?.number ?? 0);
@@ -56,22 +56,22 @@ function announce(before) {
   if (changed && ["no-device", "failed"].includes(state.kind)) play("lost");
 }
 
-// Until there is a curve: where hammer and sensor go. Across, the sensor alone is turned.
+// Positions of hammer and sensor, until there is a curve. For a cross tap only the sensor is turned.
 function showGuide() {
   const direction = state.direction || "x";
   const across = direction === "xy";
   at("plots").hidden = !(at("guide").hidden = state.has_plots && state.kind !== "move");
   at("guide").dataset.direction = direction;
   put("sensor-along", across ? "y" : direction);
-  put("hammer-along", across ? "along x, across the sensor" : `opposite, along ${direction}, in the line of the sensor`);
+  put("hammer-along", across ? "along x, at a right angle to the sensor" : `opposite the sensor, along ${direction}`);
 }
 
 function showMean() {
   const { mean_change: change, good, settled } = state;
   const percent = change === null ? "" : `${(100 * change).toPrecision(2)} %`;
-  if (settled) put("change", `✓ The mean has settled (${percent || "steady"}).`);
-  else if (percent) put("change", `The mean still moves by ${percent}.`);
-  else put("change", good ? "One good hit: no change known yet." : "No good hit yet.");
+  if (settled) put("change", percent ? `✓ Settled (change ${percent})` : "✓ Settled");
+  else if (percent) put("change", `Last change ${percent}`);
+  else put("change", good ? "One good hit, no change yet" : "No good hit yet");
 }
 
 // Bars over six decades, 0.001 to 1000 of the unit; without a force sensor that of the response alone.
@@ -123,7 +123,7 @@ function showOutcome() {
   put("next", outcome.next_step && `Next: ${outcome.next_step}`);
 }
 
-// Between two tests the buttons say what can come next; the others stand for a test that runs.
+// Between two tests the choices replace the buttons of a running test.
 function showChoices() {
   const { choices } = state;
   at("choices").replaceChildren(
@@ -154,7 +154,7 @@ async function choose(key, tool = "") {
   await ask("choose", "POST", { key, tool }).catch((error) => toast(error.message));
 }
 
-// While the sensor is moved, the foot switch goes on with the other direction.
+// While the sensor is moved, the foot switch chooses the other direction.
 function chooseByKey(key) {
   if (at("choices").hidden) return false;
   const pressed = state.kind === "move" && UNDO_KEYS.includes(key) ? state.choices[0].key : key.toLowerCase();
@@ -163,16 +163,16 @@ function chooseByKey(key) {
   return true;
 }
 
-// Where lobewatch has ended as it should, its last picture stays, or the word says so.
+// After a normal end of lobewatch the last state stays, or the word tells it.
 function showLost(why, ended) {
   over ||= ended;
   const finished = ["done", "failed"].includes(state?.kind);
   if (over && finished) {
     at("choices").hidden = at("tool-form").hidden = true;
-    return put("device", "lobewatch has ended; this is its last picture");
+    return put("device", "lobewatch has ended. This is the last state.");
   }
   showWord("no-connection", over ? "ENDED" : "NO CONNECTION");
-  put("reason", over ? "lobewatch has ended. The hits are kept: the same command goes on with them." : why);
+  put("reason", over ? "lobewatch has ended. Repeat the command to continue with the saved hits." : why);
   document.title = at("text").textContent;
   at("choices").hidden = at("tool-form").hidden = true;
   at("undo").disabled = at("stop").disabled = true;
@@ -192,7 +192,7 @@ async function undo() {
   undoing = false;
 }
 
-// Twice within three seconds: a hammer handle on the keyboard must not end a test, and no dialog stands in the way.
+// Twice within three seconds, without a dialog: a hammer handle on the keyboard must not end a test.
 async function stop() {
   if (at("stop").disabled || at("stop").hidden) return;
   const again = stopTimer !== null;
@@ -204,10 +204,10 @@ async function stop() {
 
 function showStop() {
   at("stop").classList.toggle("armed", stopTimer !== null);
-  put("stop-text", stopTimer === null ? "Stop" : "Again to stop");
+  put("stop-text", stopTimer === null ? "Stop" : "Press again to stop");
 }
 
-// Who came by the address that is only to watch has no buttons that alter anything; the server refuses them too.
+// The read-only address shows no buttons that alter anything. The server rejects such requests, too.
 async function learnWhatIsAllowed() {
   ({ may_alter: mayAlter } = await ask("access"));
   showButtons();

@@ -66,7 +66,7 @@ def test_a_folder_whose_name_is_no_text_is_rejected_and_costs_the_others_nothing
     shop.tap_both()
     for name in ("good", "b\udcff"):
         shutil.copytree(shop.path, tmp_path / "mills" / name)
-    with pytest.raises(DataError, match=r"b\\udcff: the name of the folder is no UTF-8; rename it"):
+    with pytest.raises(DataError, match=r"b\\udcff: .*UTF-8"):
         Logbook.open(tmp_path / "mills" / "b\udcff")
     with DashboardServer(tmp_path / "mills") as server:
         for path in ("machines", "metrics"):
@@ -82,10 +82,10 @@ def test_a_folder_whose_name_is_no_text_is_rejected_and_costs_the_others_nothing
 def test_a_fleet_without_machines_is_rejected_and_one_in_itself_stands_once(shop: Shop, tmp_path: Path) -> None:
     mills = tmp_path / "mills"
     mills.mkdir()
-    with pytest.raises(DataError, match="neither a machine folder nor a folder of them; make one with"):
+    with pytest.raises(DataError, match=rf"{mills}.*make_machine_folder"):
         find_machines(mills)
     (mills / "again").symlink_to(mills)
-    with pytest.raises(DataError, match="neither a machine folder"):
+    with pytest.raises(DataError, match="make_machine_folder"):
         find_machines(mills)
     shutil.copytree(shop.path, mills / "m")
     assert [*find_machines(mills)] == ["m"]

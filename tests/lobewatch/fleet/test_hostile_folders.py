@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import sys
@@ -127,7 +128,7 @@ def said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
         with in_time(), pytest.raises(SystemExit) as end:
             main()
         out, err = capsys.readouterr()
-        assert "should not be" not in out + err
+        assert not re.search(r"\b[A-Z]\w+(?:Error|Exception)\b", out + err)  # an unexpected one has its type
         return int(end.value.code or 0), out, err
 
     return command
@@ -174,7 +175,7 @@ def test_hostile_folders_cost_a_good_one_nothing(
     assert "dotted keys" in (tmp_path / "fleet.html").read_text()
     code, _, err = said("rebuild", plant)
     assert code == 2
-    assert "machines cannot be rebuilt" in err
+    assert "brackets" in err
     assert line_of_good(said("status", plant, "--json")[1]) == line_of_good(alone)
 
 

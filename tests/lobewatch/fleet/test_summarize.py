@@ -119,9 +119,9 @@ def test_folders_that_the_workers_do_not_see_are_inspected_here(
 
 
 def test_jobs_and_scheduler_at_once_and_a_scheduler_that_is_none_are_rejected(mills: Path) -> None:
-    with pytest.raises(ValueError, match="give one of them"):
+    with pytest.raises(ValueError, match=r"Workers\.jobs 2.*Workers\.scheduler"):
         status(mills, "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1")
-    with pytest.raises(DataError, match="no Dask scheduler answers there"):
+    with pytest.raises(DataError, match=r"127\.0\.0\.1:1\b.*Dask"):
         status(mills, "--scheduler", "tcp://127.0.0.1:1")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from datetime import timedelta
 
 import numpy as np
@@ -110,22 +109,22 @@ def test_a_cross_tap_of_a_round_spindle_shows_nothing_and_loses_no_mode(shop: Sh
 
 
 @pytest.mark.parametrize(
-    ("cross", "problem"),
+    ("cross", "facts"),
     [
-        ([Mode(1660.0, 0.03, 6e7)], "1660 Hz.* 3.6 %.* x and y"),
-        ([Mode(1600.0, 0.03, 5e6)], "times.* x and y"),
+        ([Mode(1660.0, 0.03, 6e7)], ("1660 Hz", "3.6 %")),
+        ([Mode(1600.0, 0.03, 5e6)], ("1600 Hz", "times")),
         (
             project_modes(PAIR, turned_by(35)).x,
-            "hammer and sensor",
+            ("tap in x",),
         ),
     ],
 )
-def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mode], problem: str) -> None:
+def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mode], facts: tuple[str, ...]) -> None:
     tap(askew, 0.02, "xy", cross)
     tool = askew.logbook.assembly("reference")
     assert tool.cross is None
     (remark,) = [remark for remark in tool.remarks if remark.code == "cross-other-clamping"]
-    assert re.search(problem, remark.text)
+    assert all(fact in remark.text for fact in facts)
     assert "cross-not-tapped" in remark_codes(askew.logbook)
 
 

@@ -46,12 +46,12 @@ BAD = {
     never_acknowledge: f"has not acknowledged{LATE}",
     acknowledge_the_first: f"has not acknowledged{LATE}",
     babble: f"has not acknowledged{LATE}",
-    refuse: r"refuses \(Not authorized\); see user and password",
+    refuse: r".*\(Not authorized\)",
     hang_up: r"(cannot be reached|does not answer) \(.*\)",
     hang_up_later: r"has not acknowledged \(.*\)",
     talk_rubbish: r"does not answer \(.*\)",
 }
-"""Sentence on each way to be bad."""
+"""Finding for each way to be bad."""
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_a_command_ends_though_the_broker_never_acknowledges(tmp_path: Path) -> 
         said = started("event", mill, "oiled")
         assert said.returncode == 0
         assert said.stdout.startswith("saved ")
-        assert f"{broker.address}: has not acknowledged within 4 s; it goes with the next command" in said.stderr
+        assert f"{broker.address}: has not acknowledged within 4 s" in said.stderr
         assert json.loads((mill / "unsent.json").read_text())["topic"] == "lobewatch/a/standing"
 
 
@@ -94,10 +94,10 @@ def test_a_fleet_of_bad_brokers_is_notified_in_parallel_and_the_good_one_too(
             "status", plant, "--notify", before=f"from lobewatch.notify import mqtt; mqtt.MQTT_TIMEOUT = {PATIENCE}"
         )
     assert said.returncode == 2  # everything else is done
-    notes = [line for line in said.stderr.splitlines() if "MQTT" in line]
+    notes = [line for line in said.stderr.splitlines() if line.startswith("note: ")]
     assert len(notes) == len(sentences)
     for address, text in sentences.items():
-        assert re.search(f"by MQTT: {address}: {text}; it goes with the next command$", said.stderr, re.MULTILINE)
+        assert re.search(f"^note: .*{address}: {text}", said.stderr, re.MULTILINE)
     assert all((mill / "unsent.json").exists() for mill in mills)
     assert json.loads(received(mosquitto, "lobewatch/good/standing").payload)["machine"] == "good"
 
@@ -115,7 +115,7 @@ def test_no_broker_waits_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyP
         for number, broker in enumerate(brokers):
             machine(tmp_path / "plant" / f"m{number}", broker.address)
         said = run("status", tmp_path / "plant", "--notify")
-        assert "nobody was told" not in said.stderr
+        assert "note: " not in said.stderr
         assert [sum(kind == PUBLISH for kind, _ in broker.received) for broker in brokers] == 5 * [2]
 
 
@@ -152,7 +152,7 @@ def test_a_message_left_over_does_not_go_with_a_newer_one_of_its_machine(tmp_pat
         later = machine(tmp_path / "b", f"{broker.address}/two")
         old = {"topic": "two/b/standing", "message": {}, "broker": parse_broker(broker.address)[:3]}
         (later / "unsent.json").write_text(json.dumps(old))
-        assert "nobody was told" not in run("status", tmp_path, "--notify").stderr
+        assert "note: " not in run("status", tmp_path, "--notify").stderr
         assert sum(b"two/b/standing" in content for kind, content in broker.received if kind == PUBLISH) == 1
     assert not (later / "unsent.json").exists()
 
@@ -165,7 +165,7 @@ def test_a_message_that_the_broker_does_not_take_is_kept_and_the_others_arrive(
     mosquitto.start(more=[f"acl_file {rights}"])
     mills = [machine(tmp_path / "plant" / name, mosquitto.address) for name in "ab"]
     said = run("status", tmp_path / "plant", "--notify")
-    assert "refuses a message (Not authorized); see what the user may write" in said.stderr
+    assert "(Not authorized)" in said.stderr
     assert all((mill / "unsent.json").exists() for mill in mills)
     assert json.loads(received(mosquitto, "lobewatch/b/standing").payload)["machine"] == "b"
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}

@@ -56,7 +56,7 @@ def test_what_a_killed_broker_was_not_sent_goes_with_the_next_command(mill: Path
     begun = time.monotonic()
     told = run("exclude", mill, MachineFolder(mill).taps()[-1].id, "--reason", "another tool")
     assert told.exit_code == 0
-    assert "nobody was told by MQTT" in told.stderr
+    assert f"{mosquitto.address}: " in told.stderr
     assert time.monotonic() - begun < 90
     assert json.loads((mill / "unsent.json").read_text())["topic"] == "hall/1/m/standing"
     mosquitto.start()
@@ -75,7 +75,7 @@ def test_a_wrong_password_is_reported_and_fails_nothing(
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", "127.0.0.1")
     monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "wrong-one")
     told = run("event", mill, "oiled")
-    assert (told.exit_code, "refuses (Not authorized)" in told.stderr) == (0, True)
+    assert (told.exit_code, "(Not authorized)" in told.stderr) == (0, True)
     assert "wrong-one" not in told.stderr + (mill / "unsent.json").read_text()
     monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "right-one")
     assert run("status", mill, "--notify").exit_code == 1  # it is on alarm
@@ -103,7 +103,7 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
 )
 @pytest.mark.quick
 def test_what_is_no_address_is_rejected_without_telling_the_password(address: str) -> None:
-    with pytest.raises(DataError, match="is no address of a broker; give mqtt://HOST") as refused:
+    with pytest.raises(DataError, match="mqtt://HOST") as refused:
         parse_machine_file(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
     assert "secret" not in str(refused.value)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,8 +10,6 @@ import pytest
 from lobewatch.machine.settings.notify_table import parse_broker
 from tests.lobewatch.notify.conftest import machine, run
 from tests.lobewatch.notify.fake_broker import CONNECT, FakeBroker, obey, refuse
-
-NOT_USED = "LOBEWATCH_MQTT_PASSWORD is not used: LOBEWATCH_MQTT_HOST is {}; set it to {} if this broker may have it"
 
 
 @pytest.fixture(autouse=True)
@@ -55,7 +54,8 @@ def test_no_other_host_gets_it_and_what_to_set_is_reported(
 ) -> None:
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
     assert parse_broker(address).password == ""
-    assert parse_broker(address).password_warning == NOT_USED.format(named or "not set", place)
+    warning = parse_broker(address).password_warning
+    assert all(fact in warning for fact in ("LOBEWATCH_MQTT_PASSWORD", "LOBEWATCH_MQTT_HOST", named, place))
 
 
 def test_nothing_is_withheld_where_no_password_is_wanted_or_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,13 +73,13 @@ def test_a_copied_machine_does_not_take_the_password_elsewhere(
     monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
     with FakeBroker(obey) as stranger:
         said = run("event", machine(tmp_path / "a", stranger.address.replace("//", "//me@")), "oiled")
-        assert f"note: {stranger.address}: {NOT_USED.format(named or 'not set', stranger.place)}" in said.stderr
+        assert re.search(rf"{stranger.address}: .*LOBEWATCH_MQTT_PASSWORD.*{named}.*{stranger.place}", said.stderr)
     assert [password.encode() in content for kind, content in stranger.received if kind == CONNECT] == [False]
     with FakeBroker(refuse) as stranger:
         said = run("event", machine(tmp_path / "b", stranger.address.replace("//", "//me@")), "oiled")
-        refusal = f"refuses (Not authorized); {NOT_USED.format(named or 'not set', stranger.place)}"
-        assert f"{stranger.address}: {refusal}; it goes" in said.stderr
-        assert said.stderr.count("is not used") == 1
+        refusal = rf"{stranger.address}: .*Not authorized.*LOBEWATCH_MQTT_PASSWORD.*{named}.*{stranger.place}"
+        assert re.search(refusal, said.stderr)
+        assert said.stderr.count("LOBEWATCH_MQTT_PASSWORD") == 1
 
 
 def test_the_named_broker_is_notified_with_the_password(

@@ -69,7 +69,7 @@ def test_a_machine_that_cannot_be_evaluated_is_reported_as_unknown(
 
 
 def test_a_machine_that_is_gone_is_reported_as_unknown_until_it_is_forgotten(plant: Path, mosquitto: Mosquitto) -> None:
-    with pytest.raises(ValueError, match="--forget a: is there"):
+    with pytest.raises(ValueError, match=f"--forget a: .*{plant}"):
         run("status", plant, "--notify", "--forget", "a")
     shutil.rmtree(plant / "a")
     assert run("status", plant, "--notify").exit_code == 0
@@ -79,7 +79,7 @@ def test_a_machine_that_is_gone_is_reported_as_unknown_until_it_is_forgotten(pla
     left = received(mosquitto, ["lobewatch/+/standing", "lobewatch/sender"], msg_count=2)
     assert {message.topic for message in left} == {"lobewatch/b/standing", "lobewatch/sender"}
     assert standing(mosquitto, "b")["light"] == "good"
-    with pytest.raises(ValueError, match="--forget a: nobody was told of it; gone and not forgotten: none"):
+    with pytest.raises(ValueError, match=r"--forget a: .*none"):
         run("status", plant, "--notify", "--forget", "a")
 
 
@@ -88,7 +88,7 @@ def test_a_dead_broker_ends_with_2_after_all_else_is_done(plant: Path, mosquitto
     (plant / "a" / "told.json").unlink()
     (plant / ".lobewatch-told.json").unlink()
     said = run("status", plant, "--notify", "--prometheus", tmp_path / "all.prom")
-    assert (said.exit_code, "nobody was told by MQTT" in said.stderr) == (2, True)
+    assert (said.exit_code, mosquitto.address in said.stderr) == (2, True)
     assert 'folder="b"' in (tmp_path / "all.prom").read_text()
     assert "2 machines: 2 good" in said.stdout
 
@@ -96,5 +96,5 @@ def test_a_dead_broker_ends_with_2_after_all_else_is_done(plant: Path, mosquitto
 def test_no_password_is_kept(plant: Path) -> None:
     for path in (plant / ".lobewatch-told.json", plant / "a" / "told.json"):
         assert "password" not in path.read_text()
-    with pytest.raises(ValueError, match="give --notify too"):
+    with pytest.raises(ValueError, match="--notify"):
         run("status", plant, "--forget", "a")

@@ -100,7 +100,7 @@ def test_a_machine_that_goes_or_comes_is_announced_to_the_page_and_to_prometheus
         assert [row["key"] for _, row in answer["changed"]] == ["new"]
         assert page.machines == whole(server)
         assert ask(server, "POST", "/machines/m03/start", {"direction": "x"})[0] == 404
-        assert "no port" in ask(server, "POST", "/machines/new/start", {"direction": "x"})[1]["error"]
+        assert "[daq]" in ask(server, "POST", "/machines/new/start", {"direction": "x"})[1]["error"]
         make(mills / "m03")
         answer = page.refresh()
         assert ([row["key"] for _, row in answer["changed"]], answer["gone"]) == (["m03"], [])

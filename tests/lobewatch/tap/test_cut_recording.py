@@ -72,7 +72,7 @@ def test_one_cut_is_taken_with_the_air_around_it() -> None:
         )
     )
     assert abs(at - 900) < 0.05 * RATE
-    assert told == ["hearing the spindle turn in air; begin the cut"]
+    assert len(told) == 1
 
 
 def test_a_cut_that_is_too_short_is_skipped() -> None:
@@ -92,16 +92,16 @@ def test_scans_lost_in_the_part_that_is_kept_are_counted() -> None:
 
 
 def test_no_cut_in_time_is_reported() -> None:
-    with pytest.raises(DataError, match="no cut was heard in 3 s"):
+    with pytest.raises(DataError, match=r"3 s.*record_cut\.time_limit"):
         record(Stream(sound((5.0, False))), 3.0)
 
 
 def test_a_dead_sensor_and_a_missing_one_are_reported() -> None:
-    with pytest.raises(DeviceError, match="hears nothing"):
+    with pytest.raises(DeviceError, match="constant"):
         record(Stream(np.zeros(round(3 * RATE))))
-    with pytest.raises(DeviceError, match="end of its range"):
+    with pytest.raises(DeviceError, match="range"):
         record(Stream(np.full(round(3 * RATE), 1e6)))
-    with pytest.raises(DataError, match="no acceleration channel"):
+    with pytest.raises(DataError, match=r"acceleration channel.*\[daq\]"):
         record(Stream(sound((1.0, False)), channels=CHANNELS[:1]))
 
 

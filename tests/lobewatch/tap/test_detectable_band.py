@@ -34,14 +34,13 @@ def at_rest(rate: float, noise: float = 0.1) -> Hit:
 def test_a_slow_sensor_does_not_hear_the_mode_of_the_model(rate: float, folder: MachineFolder) -> None:
     check = check_detectable_band(at_rest(rate), machine_of(folder), "reference")
     assert not check.passed
-    assert f"modes up to {0.4 * rate:.0f} Hz" in check.text
-    assert "1713 Hz, by the model, lies beyond" in check.text
+    assert all(fact in check.text for fact in (f"{0.4 * rate:.0f} Hz", "1713 Hz", "model"))
 
 
 def test_the_band_of_a_data_sheet_counts_before_that_of_the_sample_rate(folder: MachineFolder) -> None:
     check = check_detectable_band(at_rest(25600.0), machine_of(folder, "sensor_band_hz = 1600"), "reference")
     assert not check.passed
-    assert "modes up to 1600 Hz" in check.text
+    assert "1600 Hz" in check.text
     assert check_detectable_band(at_rest(25600.0), machine_of(folder, "sensor_band_hz = 2000"), "reference").passed
 
 
@@ -51,10 +50,10 @@ def test_without_a_model_the_band_that_is_followed_counts_and_without_both_that_
     machine = machine_of(folder)
     band = check_detectable_band(at_rest(3200.0), machine, "no such tool")
     assert not band.passed
-    assert "2200 Hz, the end of [mode] band_hz" in band.text
+    assert all(fact in band.text for fact in ("2200 Hz", "[mode] band_hz"))
     nobody = check_detectable_band(at_rest(3200.0), replace(machine, mode=ModeTable()), "no such tool")
     assert nobody.passed
-    assert "nobody says" in nobody.text
+    assert re.findall(r"(\d+) Hz", nobody.text) == ["1280"]  # that of the sensor only
 
 
 @pytest.mark.parametrize(
@@ -68,9 +67,7 @@ def test_sensors_of_data_sheets_need_what_the_page_says(density: float, least: t
 
 def test_noise_that_a_filter_keeps_to_a_narrower_band_is_denser_there(folder: MachineFolder) -> None:
     needed = [
-        float(
-            re.findall(r"ring at ([\d.]+) m/s", check_detectable_band(at_rest(25600.0), machine, "reference").text)[0]
-        )
+        float(re.findall(r"([\d.]+) m/s", check_detectable_band(at_rest(25600.0), machine, "reference").text)[-1])
         for machine in (machine_of(folder), machine_of(folder, "sensor_band_hz = 3200"))
     ]
     assert needed[1] / needed[0] == pytest.approx(2.0, rel=0.05)

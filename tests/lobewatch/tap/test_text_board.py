@@ -71,7 +71,7 @@ def test_a_whole_tap_test(
     assert followed["frequency_hz"] == pytest.approx(1722.0, abs=max(0.5, 4 * followed["frequency_hz_std"]))
     assert (followed["stiffness_n_per_m"] is not None) == force
     (entry,) = folder.taps()
-    assert "loss detection: broken lines" in folder.read(entry).circumstances.device
+    assert "loss detection" in folder.read(entry).circumstances.device
 
 
 def test_a_digital_sensor_of_five_dollars(
@@ -99,7 +99,7 @@ def test_a_digital_sensor_of_five_dollars(
             main()
     printed = capsys.readouterr()
     assert (end.value.code or 0) == 0, printed.err
-    heard = re.search(r"modes up to 1280 Hz are heard, noise (\S+) m/s\^2 rms", printed.err)
+    heard = re.search(r"1280 Hz\D* (\S+) m/s\^2 rms", printed.err)
     assert heard is not None, printed.err
     assert float(heard[1]) == pytest.approx(0.17, rel=0.2)  # which second is at rest, the clock decides
     followed = json.loads(printed.out)["followed"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +53,7 @@ def test_the_slowest_decay_is_found(channels: Pair, tau: float, bound: float) ->
 def test_what_does_not_ring_or_has_no_pulse(channels: Pair) -> None:
     assert estimate_decay_time(hit(channels, response=0.0)) == 0.0
     silent = np.zeros(1000)
-    with pytest.raises(ValueError, match="no force pulse"):
+    with pytest.raises(ValueError, match="pulse"):
         estimate_decay_time(Hit(silent, silent, RATE))
 
 
@@ -74,7 +75,7 @@ def test_two_hits_choose_the_level_and_a_record_that_is_long_enough_stays(channe
     assert trial.is_done
     assert trial.trigger.n_samples == round(0.25 * RATE)
     assert trial.trigger.level == pytest.approx(20.0, rel=0.06)
-    assert trial.text.startswith("Trigger at 20 N, record 0.25 s, 8 time constants of the slowest mode.")
+    assert re.findall(r"\d[\d.]*", trial.text)[:3] == ["20", "0.25", "8"]
 
 
 def test_a_slow_mode_makes_the_record_longer_and_asks_for_a_third_hit(channels: Pair) -> None:
@@ -115,14 +116,12 @@ def test_ranges_that_do_not_fit_are_reported_with_the_one_that_would(channels: P
     for _ in range(2):
         soft.add(hit(channels, 0.03, peak=20.0))
     assert [(remark.code, remark.about) for remark in soft.remarks] == [("range-too-large", "force")]
-    assert (
-        "force: the hits reach 0.9 % of the range of 2.22e+03 N; choose a range or a sensor of about 40 N." in soft.text
-    )
+    assert all(fact in soft.text for fact in ("force", "0.9 %", "2.22e+03 N", "40 N"))
     hard = TrialHits(TapTable(), baseline(channels))
     for _ in range(2):
         hard.add(hit(channels, 0.03, peak=2100.0))
     assert [(remark.code, remark.about) for remark in hard.remarks] == [("range-too-small", "force")]
-    assert "or hit softer" in hard.text
+    assert hard.remarks[0].cure in hard.text
     coarse = (channels[0], replace(channels[1], full_scale=500.0))
     weak = TrialHits(TapTable(), baseline(coarse))
     for _ in range(2):

@@ -135,7 +135,7 @@ def clipped(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize(
     ("fault", "reason"),
-    [(still, "of use are 0 of the same 5 hits (not judged in y)"), (clipped, "overload (response) in y")],
+    [(still, "not judged"), (clipped, "overload (response)")],
 )
 def test_a_second_sensor_that_tells_nothing_costs_the_driving_point_nothing(
     fault: Callable[[NDArray[np.float64]], NDArray[np.float64]], reason: str, short: Shop
@@ -143,7 +143,7 @@ def test_a_second_sensor_that_tells_nothing_costs_the_driving_point_nothing(
     session = tap(short, lambda: Bench(changed(felt(X), 1, fault)))
     assert session.across is not None
     assert session.across.tap_id is None
-    assert session.across.text.startswith("xy is not saved: of use are 0 of the same 5 hits")
+    assert all(fact in session.across.text for fact in ("xy", "0 of", "5 hits"))
     assert reason in session.across.text
     (entry,) = short.logbook.taps
     assert entry.direction == "x"
@@ -163,8 +163,8 @@ def test_hits_that_only_the_second_sensor_cannot_follow_are_rejected_in_it_alone
     assert len(driving.accepted) == 5
     assert 3 <= len(across.accepted) < 5
     assert session.across is not None
-    words = f"xy is saved too, from {len(across.accepted)} of the same 5 hits (overload (response) in y)."
-    assert session.across.text == words
+    facts = "xy", f"{len(across.accepted)} of", "5 hits", "overload (response)"
+    assert all(fact in session.across.text for fact in facts)
 
 
 def test_a_disk_that_is_full_for_the_tap_across_leaves_the_other(short: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,7 +178,8 @@ def test_a_disk_that_is_full_for_the_tap_across_leaves_the_other(short: Shop, mo
     monkeypatch.setattr(Logbook, "commit", full)
     session = tap(short, lambda: Bench(felt(X)))
     assert session.across is not None
-    assert session.across.text.startswith("xy is not saved: the disk: No space left on device")
+    assert session.across.tap_id is None
+    assert all(fact in session.across.text for fact in ("xy", "No space left on device"))
     assert [entry.direction for entry in short.logbook.taps] == ["x"]
 
 

@@ -83,9 +83,9 @@ def test_x_then_y_then_the_next_tool(visit: Callable[..., Visit], folder: Machin
     person = visit()
     moved = person.wait(lambda state: state.choices)
     assert (moved.word, keys(moved)) == (TapStep.MOVE, ["y", "done"])
-    assert moved.reason == "x is saved. Turn hammer and accelerometer to y, then: tap y."
+    assert all(fact in moved.reason for fact in ("x is saved", "tap y"))
     assert moved.outcome is None
-    with pytest.raises(ValueError, match="'x' cannot be chosen now"):
+    with pytest.raises(ValueError, match="'x'"):
         person.visit.choose("x")
     person.visit.undo()  # that test is saved
     person.visit.choose("y")
@@ -94,7 +94,7 @@ def test_x_then_y_then_the_next_tool(visit: Callable[..., Visit], folder: Machin
     assert end.outcome is not None
     assert next(word.program for word in end.outcome.programs) == "A: slot at 12 600 rpm (12600 rpm, 2.5 mm)"
     assert {word.word for word in end.outcome.programs} <= {"stable", "doubtful", "not stable"}
-    with pytest.raises(ValueError, match="the next tool has no name"):
+    with pytest.raises(ValueError, match=r"machine\.toml"):
         person.visit.choose("tool", " ")
     person.visit.choose("tool", "drill 8")
     assert keys(person.wait(lambda state: state.word is TapStep.MOVE)) == ["y", "done"]
@@ -118,8 +118,7 @@ def test_a_sensor_that_feels_both_axes_is_not_moved(
     person = Visit(MachineFolder(folder.path), simulated, felt, tuple(sensors))
     moved = person.wait(lambda state: state.choices)
     assert (moved.word, moved.shown_word) == (TapStep.MOVE, "MOVE HAMMER")
-    across = "xy is saved too, from the same 3 hits."
-    assert moved.reason == f"x is saved. {across} The sensor stays: hit in y, then: tap y."
+    assert all(fact in moved.reason for fact in ("xy", "3 hits", "tap y"))
     person.visit.choose("y")
     end = person.wait(lambda state: state.choices and state.word is TapStep.DONE)
     assert end.shown_word == "DONE"

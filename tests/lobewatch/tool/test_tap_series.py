@@ -53,18 +53,18 @@ def codes(row: HistoryRow) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("changed", "text"),
+    ("changed", "said"),
     [
-        (Conditions(stick_out_mm=95.0, state="warm"), "stick-out 95 mm after 80 mm: a new series"),
-        (Conditions(stick_out_mm=80.0, state="cold"), "state 'cold' after 'warm': a new series"),
+        (Conditions(stick_out_mm=95.0, state="warm"), ("stick-out", "95 mm", "80 mm")),
+        (Conditions(stick_out_mm=80.0, state="cold"), ("state", "'cold'", "'warm'")),
     ],
 )
-def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Conditions, text: str) -> None:
+def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Conditions, said: tuple[str, ...]) -> None:
     first, _, last = rows = rows_of(shop, WARM, WARM, changed)
     assert series_of(rows) == [0, 0, 2]
     assert codes(first) == set()
     (remark,) = [remark for remark in last.remarks if remark.code == "new-series"]
-    assert remark.text.startswith(text)
+    assert all(fact in remark.text for fact in said)
     assert not last.questions
     standing = shop.logbook.status(shop.start + timedelta(days=61))
     assert [series.is_baseline for series in standing.series] == [True]
@@ -118,7 +118,7 @@ def test_another_drawbar_force_is_remarked_only(shop: Shop) -> None:
     assert series_of(rows) == [0] * 5
     assert [codes(row) for row in rows] == [set(), set(), set(), {"drawbar-changed"}, set()]
     (remark,) = [remark for remark in rows[3].remarks if remark.code == "drawbar-changed"]
-    assert remark.text.startswith("drawbar force 15 kN, 18 kN before")
+    assert all(fact in remark.text for fact in ("15 kN", "18 kN"))
 
 
 def test_conditions_of_command_and_machine_file_reach_file_journal_and_history(shop: Shop, beam: Path) -> None:
@@ -137,7 +137,7 @@ def test_conditions_of_command_and_machine_file_reach_file_journal_and_history(s
     (line,) = csv.DictReader(io.StringIO(run("history", shop.path, "--csv").stdout))
     assert (line["temperature_c"], line["state"], line["note"]) == ("24.5", "warm", "after a crash")
     text = run("history", shop.path).stdout
-    assert "24.5 °C; stick-out 80 mm; drawbar 18 kN; state warm; clamped anew; note: after a crash" in text
+    assert all(fact in text for fact in ("24.5 °C", "80 mm", "18 kN", "warm", "after a crash"))
 
 
 def test_the_stick_out_is_that_of_one_tool_and_a_tap_file_says_its_own(shop: Shop, beam: Path, tmp_path: Path) -> None:
@@ -165,12 +165,12 @@ def test_of_a_file_of_version_1_nothing_is_known() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("stick_out_mm = -3", "machine.toml: tap: stick_out_mm=-3 is outside 0.1 to 5000"),
-        ("drawbar_kn = 0", "machine.toml: tap: drawbar_kn=0 is outside 0.1 to 1000"),
-        ("stick_out_mm = nan", "machine.toml: tap: stick_out_mm=nan is outside"),
-        ("state = 3", "machine.toml: tap state: Expected `str`, got `int`"),
-        ('stick_out_mm = "80"', "machine.toml: tap stick_out_mm: Expected `float . null`, got `str`"),
-        ('state = "a\\u001b"', "machine.toml: tap: state='a.*' holds the control character"),
+        ("stick_out_mm = -3", r"machine.toml: tap: stick_out_mm=-3 .*0\.1 to 5000"),
+        ("drawbar_kn = 0", r"machine.toml: tap: drawbar_kn=0 .*0\.1 to 1000"),
+        ("stick_out_mm = nan", "machine.toml: tap: stick_out_mm=nan "),
+        ("state = 3", "machine.toml: tap state: .*int"),
+        ('stick_out_mm = "80"', "machine.toml: tap stick_out_mm: .*str"),
+        ('state = "a\\u001b"', "machine.toml: tap: state='a.*control"),
     ],
 )
 def test_a_machine_file_with_other_values_is_rejected_in_a_sentence(shop: Shop, line: str, message: str) -> None:
@@ -182,9 +182,9 @@ def test_a_machine_file_with_other_values_is_rejected_in_a_sentence(shop: Shop, 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--temperature", "500"), "temperature_c=500 is outside -40 to 150; correct it, or leave it out"),
-        (("--temperature", "nan"), "temperature_c=nan is outside"),
-        (("--note", "a\x1b"), "note='a.*' holds the control character"),
+        (("--temperature", "500"), "temperature_c=500 .*-40 to 150"),
+        (("--temperature", "nan"), "temperature_c=nan "),
+        (("--note", "a\x1b"), "note='a.*control"),
     ],
 )
 @pytest.mark.parametrize("command", ["tap", "replay"])

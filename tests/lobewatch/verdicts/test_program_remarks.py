@@ -89,29 +89,29 @@ def test_what_cuts_have_taught_of_the_force_leaves_the_limits_as_they_are(tapped
 
 
 @pytest.mark.parametrize(
-    ("program", "words"),
+    ("program", "facts"),
     [
-        (steel(6000, radial=3.6), "6000 rpm are 339 m/min at the edge, outside 74 to 161 m/min"),
-        (steel(1100, radial=3.6), "1100 rpm are 62.2 m/min at the edge, outside 74 to 161 m/min"),
-        (steel(6000, radial=3.6, tool=""), "which the fastest tool of 18 mm bears at the side of 42CrMo4"),
-        (steel(2000), "which carbide of 18 mm bears in a slot of 42CrMo4"),
-        (steel(2000, radial=3.6, tool=CARBIDE + "max_speed_rpm = 1900"), "more than max_speed_rpm = 1900"),
+        (steel(6000, radial=3.6), ("6000 rpm", "339 m/min", "74 to 161 m/min")),
+        (steel(1100, radial=3.6), ("1100 rpm", "62.2 m/min", "74 to 161 m/min")),
+        (steel(6000, radial=3.6, tool=""), ("fastest tool of 18 mm", "side", "42CrMo4")),
+        (steel(2000), ("carbide of 18 mm", "slot", "42CrMo4")),
+        (steel(2000, radial=3.6, tool=CARBIDE + "max_speed_rpm = 1900"), ("2000 rpm", "max_speed_rpm = 1900")),
         (
             steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.5"),
-            "feed_per_tooth_mm = 0.5 is outside 0.036 to 0.18 mm",
+            ("feed_per_tooth_mm = 0.5", "0.036 to 0.18 mm"),
         ),
         (
             steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.01"),
-            "feed_per_tooth_mm = 0.01 is outside 0.036 to 0.18 mm",
+            ("feed_per_tooth_mm = 0.01", "0.036 to 0.18 mm"),
         ),
     ],
 )
-def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program: str, words: str) -> None:
+def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program: str, facts: tuple[str, ...]) -> None:
     mill.put(program)
     machine = mill.folder.machine
     (remark,) = tool_limit_remarks(machine.program[0], machine)
     assert (remark.code, remark.about) == ("outside-tool-limits", "steel")
-    assert words in remark.text
+    assert all(fact in remark.text for fact in facts)
     assert "[[tool]] 'reference'" in remark.cure
     keys = ("feed_per_tooth_mm", "max_speed_rpm")
     (key,) = [key for key in keys if key in remark.text] or ["cutting_speed_m_min"]
@@ -139,15 +139,15 @@ def test_a_tool_that_allows_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop
     assert find_stable_pockets(verdict.program, verdict.assembly, logbook.machine) == []
     following = find_next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5)
     assert following.suggestion is None
-    assert "of which the tool bears none" in following.cut_range.text
+    assert following.cut_range.is_empty
 
 
 @pytest.mark.parametrize(
     ("program", "words"),
     [
-        (steel(2000, tool=""), "up to those of the fastest tool"),
-        (steel(2000).replace('material = "42CrMo4"', KT_AND_KR), "speeds of the spindle are advised"),
-        (steel(2000, tool=CARBIDE.replace("carbide", "PCD")), "up to those of the fastest tool"),
+        (steel(2000, tool=""), "fastest tool"),
+        (steel(2000).replace('material = "42CrMo4"', KT_AND_KR), "speeds of the spindle"),
+        (steel(2000, tool=CARBIDE.replace("carbide", "PCD")), "fastest tool"),
         (steel(2000), ""),
         (steel(2000, tool=CARBIDE.replace("carbide", "PCD") + "cutting_speed_m_min = 300"), ""),
     ],

@@ -59,6 +59,12 @@ def render_svg(figure: Figure) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
+def lay_out(figure: Figure) -> None:
+    """Give the axes the size that they will have in the file."""
+    _disable_math_text(figure)
+    figure.draw_without_rendering()
+
+
 def _disable_math_text(figure: Figure) -> None:
     """Show texts as they are, without mathematical notation and control characters.
 
@@ -114,7 +120,7 @@ class LabelPlacer:
         right, up = LABEL_SIDES[best]
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": LABEL_FONT_SIZE, "bbox": LABEL_BACKGROUND}
         style |= {"ha": {1: "left", -1: "right"}.get(right, "center"), "va": {1: "bottom", -1: "top"}.get(up, "center")}
-        self._axes.annotate(text, place, (LABEL_DISTANCE * right, LABEL_DISTANCE / 2 * up), color=color, **style)
+        self._axes.annotate(text, place, (LABEL_DISTANCE * right, LABEL_DISTANCE * 2 / 3 * up), color=color, **style)
 
     def reserve_area(self, low: Point, high: Point) -> None:
         """Keep labels out of the rectangle between two corners where they have a choice."""
@@ -129,7 +135,7 @@ class LabelPlacer:
         lines, (right, up) = text.split("\n"), LABEL_SIDES[side]
         wide, high = LETTER_WIDTH * LABEL_FONT_SIZE * max(map(len, lines)), LINE_HEIGHT * LABEL_FONT_SIZE * len(lines)
         x, y = self._points(place)
-        x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (LABEL_DISTANCE + high) / 2
+        x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (LABEL_DISTANCE * 2 / 3 + high / 2)
         return Bbox.from_extents(x - wide / 2, y - high / 2, x + wide / 2, y + high / 2)
 
     def _covered(self, box: Bbox) -> float:

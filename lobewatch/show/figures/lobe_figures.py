@@ -24,7 +24,7 @@ from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
-from lobewatch.show.figures.drawing import LabelPlacer, Paint, new_axes, save_figure
+from lobewatch.show.figures.drawing import LabelPlacer, Paint, lay_out, new_axes, save_figure
 from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
 from lobewatch.verdicts import Setting, Stability, Verdict
@@ -108,7 +108,7 @@ def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False)
     axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
     _draw_marks(axes, diagram)
     figure.legend(loc="outside lower center", ncols=1 if is_small else 2, frameon=False, fontsize=9)
-    figure.draw_without_rendering()  # lays out the axes for the labels
+    lay_out(figure)
     _label_marks(axes, diagram, is_small=is_small)
     return figure
 

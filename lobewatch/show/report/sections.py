@@ -161,7 +161,7 @@ def _tabulate_trend(trend: ValueTrend) -> NumberTable:
     unit, scale, curve = trend.value.label, trend.value.scale, trend.curve
     tests = [(time, estimate.value / scale, estimate.std / scale) for time, estimate in trend.estimates]
     lines: list[list[Any]] = [["test", f"{time:%Y-%m-%d}", value, std, "", ""] for time, value, std in tests]
-    lines += [["does not count", f"{time:%Y-%m-%d}", value, "", "", ""] for time, value in trend.excluded]
+    lines += [["excluded", f"{time:%Y-%m-%d}", value, "", "", ""] for time, value in trend.excluded]
     if curve is not None:
         days = [f"{date_of_days(day):%Y-%m-%d}" for day in curve.days.tolist()]
         past = curve.days.size - curve.days_ahead.size

@@ -48,8 +48,8 @@
     const choices = slider ? heads.length - Number(slider.max) : heads.length;
     let chosen = heads.length, shown = -1;
     const named = (head, value) => {
-      const [, name, unit] = head.match(/^(.*?)(?:: .*)?(?: \((\S*)\))?$/);
-      return typeof value === "string" ? value : `${name} ${value}${unit ? ` ${unit}` : ""}`;
+      const [name] = head.split(/: | \(/), [, unit] = head.match(/\(([^()]*)\)+$/) ?? [];
+      return typeof value === "string" ? value : [name, value, unit].filter((part) => part !== undefined).join(" ");
     };
     const isSeen = (value, i) => value !== null && value !== "" && (i < choices || i === chosen);
     function show(index) {

@@ -115,7 +115,7 @@ class Drawing(NamedTuple):
         (first, last), (low, peak) = axes[0].get_xlim(), axes[0].get_ylim()
         data = f"{first:.9g} {-peak:.9g} {last - first:.9g} {peak - low:.9g}"
         area = f'<svg class="area" {box} height="{(top - bottom) * high:.2f}" viewBox="{data}"'
-        return cls(svg.replace("</svg>", f'{area} preserveAspectRatio="none"></svg></svg>'), numbers, n_choices)
+        return cls(svg.replace("</svg>", f'{area} preserveAspectRatio="none"/></svg>'), numbers, n_choices)
 
 
 SectionPart = Paragraph | BulletList | DataTable | Drawing

@@ -71,7 +71,7 @@ def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
         "first test" if series.is_baseline else trends.change_text(series),
         (trend and trends.trend_text(trend)) or f"since {series.first_time:%Y-%m-%d}",
         (trend and trends.rate_text(trend)) or f"from {MIN_FORECAST_POINTS} tests",
-        f"{max(alarm - drop.value, 0):.1f} %" if drop.is_known else "-",
+        f"{max(alarm - drop.value, 0):.2f} %" if drop.is_known else "-",
         f"{trend.spread:.2f} %" if trend is not None and is_fitted else "-",
         f"{score:.1f}" if math.isfinite(score) else f"from {MIN_MONITORED_POINTS} tests",
         "0" if trend is None else str(len(trend.points)),
@@ -185,7 +185,7 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
     if np.isinf(diagram.now.minimum.depth):
         text = f"{diagram.cut} has no limit in this speed range ({method})."
     if history:
-        text += " Orange: the chosen test or forecast. The forecast assumes that all modes drop like f1."
+        text += " Orange: chosen test or forecast (all modes drop like f1)."
     numbers = NumberTable.from_lobes(diagram.now.speed_rpm, [*diagram.depths.items(), *diagram.edges.items(), *history])
     drawing = Drawing.of(plot_lobes(diagram, is_small=True), numbers, len(history))
     return [Section("Stability lobes", [Paragraph(text, is_small=True), drawing], "half")]

@@ -186,9 +186,9 @@ def _draw_marks(axes: Axes, diagram: LobeDiagram) -> None:
         (low, high), depth = pocket.window_rpm, pocket.depth_mm
         axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else "safe speeds and depths", **style))
     for program in diagram.verdicts:
-        colour, mark = VERDICT_MARKS[program.stability]
+        paint, symbol = VERDICT_MARKS[program.stability]
         place = program.program.speed_rpm, program.program.depth_mm
-        axes.plot(*place, mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
+        axes.plot(*place, symbol, color=paint, ms=PROGRAM_MARK_SIZE, mec="white")
 
 
 def _label_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:

@@ -26,7 +26,16 @@ from lobewatch.show.history import condition_texts, cut_result_text
 from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, format_rpm, frequency_margin_text
 from lobewatch.show.report.report_data import SHOWN_VALUES, ReportData, compute_lobe_history, make_value_trend
-from lobewatch.show.report.section import BulletList, DataTable, Drawing, NumberTable, Paragraph, Section, TableCell
+from lobewatch.show.report.section import (
+    BulletList,
+    DataTable,
+    Drawing,
+    NumberTable,
+    Paragraph,
+    Section,
+    SectionPart,
+    TableCell,
+)
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
@@ -49,12 +58,12 @@ def make_series(data: ReportData) -> list[Section]:
     shown, more = rows[:MAX_SHOWN_SERIES], rows[MAX_SHOWN_SERIES:]
     now, limits = data.outlook.status.time, data.outlook.limits
     dates = ", ".join(f"-{percent:g} % {trends.reach_text(reach, now)}" for percent, reach in limits)
-    parts = [
+    table, note = (
         DataTable(SERIES_HEADS, shown, "words"),
         Paragraph(data.no_dates or f"f1 limits reached: {dates}.", is_small=True),
-    ]
+    )
     folded = Section(f"{len(more)} more series", [DataTable(SERIES_HEADS, more, "words")], "folded")
-    return [Section("Series", parts), *([folded] if more else [])]
+    return [Section("Series", [table, note]), *([folded] if more else [])]
 
 
 def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
@@ -97,7 +106,8 @@ def make_programs(data: ReportData) -> list[Section]:
     notes = verdicts.verdict_notes(checked, data.machine)
     notes += [trends.FORECAST_ASSUMPTIONS] if dates else []
     notes += [f"Verdicts from the newest tap tests of each tool, by {checked[0].method}."] if checked else []
-    below = BulletList([*lines, *map(str, speeds)]), *(Paragraph(note, is_small=True) for note in notes)
+    below: list[SectionPart] = [BulletList([*lines, *map(str, speeds)])]
+    below += [Paragraph(note, is_small=True) for note in notes]
     return [Section("Programs", [table]), Section("Reasons, alternatives and uncertainty", below, "folded")]
 
 

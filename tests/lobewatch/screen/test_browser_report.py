@@ -123,7 +123,7 @@ def point_at(browser: Browser, part: WebElement) -> None:
     """Move the pointer to the middle of a part, which may be part of a picture."""
     middle = "const box = arguments[0].getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]"
     browser.driver.execute_script("arguments[0].scrollIntoView({ block: 'center', behavior: 'instant' })", part)
-    actions = ActionChains(browser.driver)
+    actions: Any = ActionChains(browser.driver)
     actions.w3c_actions.pointer_action.move_to_location(*map(round, browser.driver.execute_script(middle, part)))
     actions.perform()
 

@@ -111,6 +111,15 @@ def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
     assert [reason for reason in reasons if f"<li>{reason}</li>" in below] == []
 
 
+def test_series_beyond_the_third_are_folded(shop: Shop) -> None:
+    for i, tool in enumerate(("reference", "long", "short", "other")):
+        shop.tap(i, 1713.0, tool=tool)
+    html = render_report(shop.logbook, "reference", "x")
+    names = re.findall(r'<th scope="row">(\w+, x)</th>', html)
+    assert sorted(names) == ["long, x", "other, x", "reference, x", "short, x"]
+    assert f'<th scope="row">{names[3]}</th>' in html[html.index('<details id="1-more-series">') :]
+
+
 def test_an_acknowledged_alarm_says_so_on_the_first_screen(worn: Shop) -> None:
     assert run("ack", worn.path, "--operator", "Eva", "--note", "seen", "decay:reference:y").exit_code == 0
     now = worn.logbook.history.rows[-1].time + timedelta(days=1)

@@ -23,7 +23,7 @@ from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.access_control import HAS_FULL_ACCESS, PUBLIC_ROUTE_PREFIX, WATCH_ROUTE_PREFIX
 from lobewatch.screen.dashboard_table import DashboardTable
 from lobewatch.screen.web_server import ServerOptions, WebServerThread, add_pages, add_session, read_body
-from lobewatch.show.report.page import script_sources
+from lobewatch.show.report.page import script_source
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession, plan_session
@@ -31,7 +31,7 @@ from lobewatch.tap.state import TapState, TapStep
 from lobewatch.tap.visit import TapVisit
 
 REPORT_POLICY = (
-    f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
+    f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_source()}; img-src data:; "
     "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
 )
 """Content security policy of reports: inline styles, and no scripts but those of reports."""

@@ -59,6 +59,12 @@ def render_svg(figure: Figure) -> str:
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
+def lay_out(figure: Figure) -> None:
+    """Give the axes the size that they will have in the file."""
+    _disable_math_text(figure)
+    figure.draw_without_rendering()
+
+
 def _disable_math_text(figure: Figure) -> None:
     """Show texts as they are, without mathematical notation and control characters.
 
@@ -85,8 +91,6 @@ LabelSide = Literal["right", "left", "above", "below"]
 LABEL_SIDES: dict[LabelSide, tuple[int, int]] = {"right": (1, 0), "left": (-1, 0), "above": (0, 1), "below": (0, -1)}
 LABEL_FONT_SIZE = 8.5
 """Font size of labels (points)."""
-PHONE_FONT_SIZE = 11.5
-"""Font size to reserve in a small figure, which a phone shows with larger letters (report.css; points)."""
 MAX_HIDDEN_SHARE = 0.15
 """Largest share of its area that a label may cover or leave the axes by."""
 LETTER_WIDTH, LINE_HEIGHT = 0.62, 1.35
@@ -100,11 +104,9 @@ LABEL_BACKGROUND = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
 class LabelPlacer:
     """Labels of one figure that avoid each other; the limits of the axes are set before."""
 
-    def __init__(self, axes: Axes, room: float = LABEL_FONT_SIZE, *, may_lack: bool = False) -> None:
-        """Set the font size to reserve (points); may_lack: leave out labels that find no room."""
+    def __init__(self, axes: Axes, *, may_lack: bool = False) -> None:
+        """Take the axes; may_lack: leave out labels without room."""
         self._axes = axes
-        self._room = room
-        self._above = LABEL_DISTANCE / 2 * room / LABEL_FONT_SIZE
         self._may_lack = may_lack
         self._taken: list[Bbox] = []
 
@@ -118,7 +120,7 @@ class LabelPlacer:
         right, up = LABEL_SIDES[best]
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": LABEL_FONT_SIZE, "bbox": LABEL_BACKGROUND}
         style |= {"ha": {1: "left", -1: "right"}.get(right, "center"), "va": {1: "bottom", -1: "top"}.get(up, "center")}
-        self._axes.annotate(text, place, (LABEL_DISTANCE * right, self._above * up), color=color, **style)
+        self._axes.annotate(text, place, (LABEL_DISTANCE * right, LABEL_DISTANCE * 2 / 3 * up), color=color, **style)
 
     def reserve_area(self, low: Point, high: Point) -> None:
         """Keep labels out of the rectangle between two corners where they have a choice."""
@@ -131,9 +133,9 @@ class LabelPlacer:
 
     def _box(self, text: str, place: Point, side: LabelSide) -> Bbox:
         lines, (right, up) = text.split("\n"), LABEL_SIDES[side]
-        wide, high = LETTER_WIDTH * self._room * max(map(len, lines)), LINE_HEIGHT * self._room * len(lines)
+        wide, high = LETTER_WIDTH * LABEL_FONT_SIZE * max(map(len, lines)), LINE_HEIGHT * LABEL_FONT_SIZE * len(lines)
         x, y = self._points(place)
-        x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (self._above + high / 2)
+        x, y = x + right * (LABEL_DISTANCE + wide / 2), y + up * (LABEL_DISTANCE * 2 / 3 + high / 2)
         return Bbox.from_extents(x - wide / 2, y - high / 2, x + wide / 2, y + high / 2)
 
     def _covered(self, box: Bbox) -> float:

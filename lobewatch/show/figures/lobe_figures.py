@@ -24,7 +24,7 @@ from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
-from lobewatch.show.figures.drawing import PHONE_FONT_SIZE, LabelPlacer, Paint, new_axes, save_figure
+from lobewatch.show.figures.drawing import LabelPlacer, Paint, lay_out, new_axes, save_figure
 from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
 from lobewatch.verdicts import Setting, Stability, Verdict
@@ -42,8 +42,8 @@ VERDICT_MARKS = {
 """Paint and mark of a program for each verdict."""
 POCKET_GREEN = "#00664A"
 LEARNED_PURPLE = "#8A3D78"
-LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (5.6, 2.3)
-"""Size of a separate diagram, and of one that accompanies text (inches)."""
+LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (6.4, 4.4)
+"""Size of a separate diagram, and of the one in the report (inches)."""
 MAP_LEVELS = 12
 """Number of levels of a map."""
 DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"
@@ -53,8 +53,6 @@ TEST_CUT_MARKS = {False: ("heard stable", Paint.GOOD, "o"), True: ("heard to cha
 """Label, paint and mark of stable cuts and of cuts with chatter, wide and hollow."""
 TEST_CUT_MARK_SIZE, PROGRAM_MARK_SIZE = 11.0, 9.0
 """Size of the marks of test cuts and of programs (points)."""
-MAX_SPEED_TICKS = 6
-"""Largest number of speed labels of a small figure."""
 
 
 class LobeDiagram(NamedTuple):
@@ -88,7 +86,7 @@ class LobeDiagram(NamedTuple):
 
 
 def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False) -> Figure:
-    """Plot a stability lobe diagram; is_small: smaller, to accompany text, with only the names of programs."""
+    """Plot a stability lobe diagram; is_small: for the report, with only the names of programs."""
     figure, (axes,) = new_axes(1, SMALL_FIGURE_SIZE if is_small else LARGE_FIGURE_SIZE)
     speed_rpm, band = diagram.now.speed_rpm, diagram.band
     *earlier, (label, now) = diagram.depths.items()
@@ -107,13 +105,11 @@ def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False)
     if diagram.learned is not None:
         _draw_learned(axes, diagram.learned, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    axes.set(xlabel="spindle speed (rpm)", ylabel="" if is_small else "limiting depth (mm)")
-    if is_small:
-        axes.xaxis.set_major_locator(MaxNLocator(MAX_SPEED_TICKS))
-        figure.draw_without_rendering()  # its room is known from now on
-    _draw_marks(axes, diagram, is_small=is_small)
-    if not is_small:
-        figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
+    _draw_marks(axes, diagram)
+    figure.legend(loc="outside lower center", ncols=1 if is_small else 2, frameon=False, fontsize=9)
+    lay_out(figure)
+    _label_marks(axes, diagram, is_small=is_small)
     return figure
 
 
@@ -178,19 +174,35 @@ def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
 
 
-def _draw_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:
-    """Draw test cuts, pockets and programs with their labels."""
-    labels = LabelPlacer(axes, PHONE_FONT_SIZE, may_lack=True) if is_small else LabelPlacer(axes)
-    draw_test_cuts(axes, diagram.heard, labels)
+def _draw_marks(axes: Axes, diagram: LobeDiagram) -> None:
+    """Draw test cuts, pockets and programs."""
+    for chatters, (name, colour, mark) in TEST_CUT_MARKS.items():
+        marked = [cut for cut in diagram.heard if cut.has_chatter == chatters]
+        if marked:
+            places = [cut.speed_rpm for cut in marked], [1e3 * cut.depth for cut in marked]
+            axes.plot(*places, mark, color=colour, mfc="none", ms=TEST_CUT_MARK_SIZE, mew=2.2, zorder=4, label=name)
     style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
     for i, pocket in enumerate(diagram.pockets):
         (low, high), depth = pocket.window_rpm, pocket.depth_mm
         axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else "safe speeds and depths", **style))
-        labels.reserve_area((low, 0.0), (high, depth))
+    for program in diagram.verdicts:
+        paint, symbol = VERDICT_MARKS[program.stability]
+        place = program.program.speed_rpm, program.program.depth_mm
+        axes.plot(*place, symbol, color=paint, ms=PROGRAM_MARK_SIZE, mec="white")
+
+
+def _label_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:
+    """Label test cuts with their chatter frequency, pockets and programs; is_small: only names of programs."""
+    labels = LabelPlacer(axes, may_lack=is_small)
+    for cut in diagram.heard:
+        labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
+    for cut in diagram.heard:
+        if cut.chatter_frequency_hz is not None:
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
+    for pocket in diagram.pockets:
+        labels.reserve_area((pocket.window_rpm[0], 0.0), (pocket.window_rpm[1], pocket.depth_mm))
     places = [(program.program.speed_rpm, program.program.depth_mm) for program in diagram.verdicts]
-    for program, place in zip(diagram.verdicts, places, strict=True):
-        colour, mark = VERDICT_MARKS[program.stability]
-        axes.plot(*place, mark, color=colour, ms=PROGRAM_MARK_SIZE, mec="white")
+    for place in places:
         labels.reserve_mark(place, PROGRAM_MARK_SIZE)
     for pocket in () if is_small else diagram.pockets:
         text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
@@ -206,20 +218,6 @@ def select_test_cuts(cuts: Sequence[CutEntry], name: str, tool: str, cut: Cut) -
     alike = [heard for heard in usable if geometry_key(heard.cut) == geometry_key(cut)]
     force = cut.tangential, cut.radial
     return [heard for heard in alike if heard.program == name or (heard.cut.tangential, heard.cut.radial) == force]
-
-
-def draw_test_cuts(axes: Axes, cuts: Sequence[CutEntry], labels: LabelPlacer) -> None:
-    """Draw a mark for each test cut, labelled with its chatter frequency."""
-    for chatters, (name, colour, mark) in TEST_CUT_MARKS.items():
-        marked = [cut for cut in cuts if cut.has_chatter == chatters]
-        if marked:
-            places = [cut.speed_rpm for cut in marked], [1e3 * cut.depth for cut in marked]
-            axes.plot(*places, mark, color=colour, mfc="none", ms=TEST_CUT_MARK_SIZE, mew=2.2, zorder=4, label=name)
-    for cut in cuts:
-        labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
-    for cut in cuts:
-        if cut.chatter_frequency_hz is not None:
-            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
 
 
 MAX_WATERFALL_ROWS = 200

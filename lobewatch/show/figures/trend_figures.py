@@ -17,8 +17,8 @@ from lobewatch.measurement import Estimate
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import Paint, new_axes
 
-TREND_FIGURE_SIZE = (8.0, 2.8)
-"""Size of a figure of one value (inches)."""
+FIGURE_WIDTH, TREND_HEIGHT, RESPONSE_HEIGHT = 6.4, 3.4, 1.7
+"""Width of figures, heights of a trend and of each part of a frequency response (inches)."""
 EXCLUDED_VALUE_RANGE = 0.15
 """Largest relative distance from the values that count at which an excluded value is drawn."""
 FORECAST_SHARE = 0.5
@@ -96,13 +96,10 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
     return TrendCurve(np.append(past, forecast.dates[near]), line, forecast.dates[near], low, high)
 
 
-def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None) -> Figure:
-    """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test.
-
-    size: of a smaller figure (inches) that shows the receptance only.
-    """
-    rows = 2 if now.coherence is None or size is not None else 3
-    figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
+def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
+    """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test."""
+    rows = 2 if now.coherence is None else 3
+    figure, axes = new_axes(rows, (FIGURE_WIDTH, RESPONSE_HEIGHT * rows))
     tests = [(now, "now", Paint.NEWEST, "-"), *([] if first is None else [(first, "first", Paint.FIRST, "--")])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
@@ -121,12 +118,12 @@ def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple
     return figure
 
 
-def plot_trend(trend: ValueTrend, size: tuple[float, float] = TREND_FIGURE_SIZE) -> Figure:
+def plot_trend(trend: ValueTrend) -> Figure:
     """Plot a value over time with its 95 % interval, and the limits of its drop where given.
 
-    The limits are in % of the first value of the curve, or else of the first value; size: of the figure (inches).
+    The limits are in % of the first value of the curve, or else of the first value.
     """
-    figure, (axes,) = new_axes(1, size)
+    figure, (axes,) = new_axes(1, (FIGURE_WIDTH, TREND_HEIGHT))
     curve, days = trend.curve, date2num([time for time, _ in trend.estimates])
     values, stds = np.array([estimate for _, estimate in trend.estimates]).T / trend.value.scale
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=Paint.NEWEST, capsize=2)

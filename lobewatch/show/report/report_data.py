@@ -1,16 +1,14 @@
-"""Collect the data that the sections of the report share: rows, programs, values over time, stability lobes."""
+"""Collect the data shared by the sections of the report: status, rows, programs, values over time, lobes."""
 
 import math
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import Frf, TapTest
+from acquisition import Frf, Remark, TapTest, merge_remarks
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.program_learning import compute_lobes_at_speed
 from lobewatch.history import HistoryRow
@@ -19,70 +17,31 @@ from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import Machine
-from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
 from lobewatch.show.figures.lobe_figures import LobeDiagram, pick_evenly, select_test_cuts
 from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, make_trend_curve
 from lobewatch.show.programs.advice import ProgramAdvice, advise_program
-from lobewatch.show.report.section import NumberTable
-from lobewatch.tool import Assembly, compute_lobes, speed_grid
+from lobewatch.show.trend import no_dates_text
+from lobewatch.tool import Assembly, compute_lobes
 from lobewatch.tool.assembly import compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import compute_limit_band
 from lobewatch.verdicts.setting_robustness import model_softening
 from modal import Mode
 
 MAX_LOBE_DIAGRAMS = 24
-"""Largest number of tap tests shown."""
-MAX_LOBE_SPEEDS = 600
-"""Largest number of speeds of each diagram."""
+"""Largest number of tap tests with a lobe diagram."""
 MAX_FORECAST_DROP = 0.5
-"""Frequency drop from which on no diagram is forecast: no such spindle still cuts; chosen."""
-
-
-class LobeHistory(NamedTuple):
-    """Lobe diagrams of one cut over time, oldest first; at least two."""
-
-    cut: str
-    """Name of the cut."""
-    speed_rpm: Floats
-    """Speeds common to all diagrams (rpm), shape (n,)."""
-    times: Sequence[datetime]
-    """Times of the tap tests, m of them."""
-    depth: Floats
-    """Limiting depths after each tap test (m), shape (m, n)."""
-    ahead: Mapping[str, Floats]
-    """Forecast limiting depths (m), shape (n,), by the label of each diagram."""
-    heard: Sequence[CutEntry]
-    """Test cuts of the same cut."""
-
-    @property
-    def labels(self) -> list[str]:
-        """Labels of the diagrams."""
-        return [*(f"{time:%Y-%m-%d}" for time in self.times), *self.ahead]
-
-    @property
-    def numbers(self) -> NumberTable:
-        """Depth (mm) over speed of each diagram."""
-        step = max(math.ceil(self.speed_rpm.size / MAX_LOBE_SPEEDS), 1)
-        named = zip(self.labels, [*self.depth, *self.ahead.values()], strict=True)
-        return NumberTable.from_lobes(self.speed_rpm[::step], {name: depth[::step] for name, depth in named})
-
-    @property
-    def marks(self) -> NumberTable | None:
-        """Test cuts, each with the number of the diagram (from 1) that it first belongs to; None without any.
-
-        A cut after the newest tap test belongs to the newest diagram.
-        """
-        diagrams = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
-        lines = [
-            [at, cut.word, f"{cut.at:%Y-%m-%d}", cut.speed_rpm, 1e3 * cut.depth, cut.chatter_frequency_hz]
-            for at, cut in zip(diagrams, self.heard, strict=True)
-        ]
-        heads = ["from diagram", "heard", "date", "speed (rpm)", "depth (mm)", "chatter (Hz)"]
-        return NumberTable(heads, lines) if lines else None
-
-
+"""Largest relative frequency drop with a forecast diagram (chosen): such a spindle no longer cuts."""
+MAX_REASONS = 3
+"""Largest number of reasons next to the status."""
+TABLE_REASON_CODES = (
+    *("frequency-alarm", "frequency-warn", "decay"),
+    *("program-not-stable", "program-doubtful", "program-unknown"),
+    "overdue",
+)
+"""Codes of reasons that the first tables show. Only the most severe is stated again."""
 BAND_LOW_FACTOR, BAND_HIGH_FACTOR = 0.6, 1.4
 """Ends of the frequency range shown, over those of the usable band; chosen."""
 MODE_LOW_FACTOR = 0.3
@@ -98,7 +57,7 @@ class ReportData:
     rows: Sequence[HistoryRow]
     """Rows of the series that count, oldest first; at least one."""
     first: TapTest | None
-    """Oldest tap test of the series; None where the newest is the only one."""
+    """Oldest tap test of the series; None if the newest is the only one."""
     newest: TapTest
     """Newest tap test of the series."""
     outlook: MachineForecast
@@ -122,6 +81,28 @@ class ReportData:
         return self.outlook.series(self.last.tool, self.last.direction)
 
     @cached_property
+    def reasons(self) -> tuple[list[str], list[str]]:
+        """Reasons next to the status, the most severe first, and those for the notes."""
+        first, others = self._pick_reasons()
+        notable = [remark for remark in others if STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD]
+        shown = [*first, *notable[: MAX_REASONS - 1]]
+        return [it.finding for it in shown], [it.finding for it in others if it not in shown]
+
+    def _pick_reasons(self) -> tuple[list[Remark], list[Remark]]:
+        """Return the most severe reason, of the series with the largest drop, and those that no table shows."""
+        status = self.outlook.status
+        plain, order = set(status.reasons), {series.name: place for place, series in enumerate(status.series)}
+        alike = [remark for remark in status.remarks if remark.code == status.remarks[0].code]
+        first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
+        other = [remark for remark in status.remarks if remark.code not in TABLE_REASON_CODES or remark not in plain]
+        return first, [remark for remark in merge_remarks(other) if remark not in first]
+
+    @cached_property
+    def no_dates(self) -> str:
+        """Reason why there are no forecast dates; empty if there are."""
+        return no_dates_text(self.outlook)
+
+    @cached_property
     def assembly(self) -> Assembly:
         """Tool of the series as tapped."""
         return self.analysis.assembly(self.last.tool)
@@ -133,7 +114,7 @@ class ReportData:
 
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:
-        """Lobes of the first cut of the tool, with its programs; None where it has none."""
+        """Lobes of the first cut of the tool, with its programs; None if it has none."""
         return make_lobe_diagram(self)
 
     def response_band(self, frf: Frf) -> tuple[float, float]:
@@ -143,15 +124,9 @@ class ReportData:
         lowest = min((frequency for frequency, *_ in self.last.modes), default=0.0)
         return max(BAND_LOW_FACTOR * low, MODE_LOW_FACTOR * lowest, ends[0]), min(BAND_HIGH_FACTOR * high, ends[1])
 
-    @cached_property
-    def lobe_history(self) -> LobeHistory | None:
-        """Lobes of the first cut of the tool over time; None below two tap tests."""
-        cut = next(iter(self.machine.cuts(self.assembly.tool)), None)
-        return None if cut is None else compute_lobe_history(self, cut)
-
 
 def collect_report_data(analysis: Analysis, tool: str, direction: str, now: datetime | None) -> ReportData:
-    """Collect the data of one series; raise ValueError where it has no tap test. now: None for the current time."""
+    """Collect the data of one series; ValueError if it has no tap test. now: None for the current time."""
     rows, entries = analysis.history.series(tool, direction), {entry.id: entry for entry in analysis.taps}
     if not rows:
         raise ValueError(f"{analysis.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
@@ -163,17 +138,16 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
 
 
 MIN_TAPS_FOR_VALUE = 2
-"""Smallest number of tap tests with a value that make a trend."""
-
-
-FREQUENCY_VALUE = SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Bars: 95 % interval of each tap alone.")
-BEARING_TEXT = "Equivalent stiffness of each bearing in the model."
-SHOWN_VALUES = (FREQUENCY_VALUE, SeriesValue("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, BEARING_TEXT))
+"""Smallest number of tap tests in a trend."""
+SHOWN_VALUES = (
+    SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Error bars: 95 % for one tap test."),
+    SeriesValue("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, "Equivalent stiffness of each bearing (model)."),
+)
 """Values shown over time, in order."""
 
 
 def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
-    """Return the trend of a value of the series; None where too few tap tests have the value."""
+    """Return the trend of a value of the series; None if too few tap tests have the value."""
     rows = data.rows
     estimates = [(row.time, getattr(row, value.field)) for row in rows if getattr(row, value.field).is_known]
     if len(estimates) < MIN_TAPS_FOR_VALUE:
@@ -181,14 +155,14 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
     events = [(event.time, event.text) for event in data.analysis.files.contents.events if event.time >= since]
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
-    is_followed, trend = value is FREQUENCY_VALUE, data.series.trend
+    is_followed, trend = value.field == "frequency", data.series.trend
     limits = data.machine.limits if is_followed else None
     course = make_trend_curve(trend) if trend is not None and is_followed else None
     return ValueTrend(value, estimates, aside, events, limits, course)
 
 
 def make_lobe_diagram(data: ReportData) -> LobeDiagram | None:
-    """Return the lobe diagram of a tool as tapped; None where it has no lobes."""
+    """Return the lobe diagram of a tool as tapped; None if it has no lobes."""
     analysis, assembly, machine = data.analysis, data.assembly, data.machine
     lobes = compute_lobes(assembly, machine)
     if not lobes:
@@ -206,42 +180,37 @@ def make_lobe_diagram(data: ReportData) -> LobeDiagram | None:
     return LobeDiagram(cut, now, depths, verdicts, list(dict.fromkeys(filter(None, settings))), band, heard, learned)
 
 
-def compute_lobe_history(data: ReportData, cut: str) -> LobeHistory | None:
-    """Return the lobe diagrams of the series that show the cut; None where fewer than two do.
+def compute_lobe_history(data: ReportData, cut: str) -> list[tuple[str, Floats]]:
+    """Return the limiting depths (m) of a cut after each tap test of the series and in the forecast, by label.
 
-    The forecast lets all modes drop by the same share, with K from the model.
+    The forecast lets all modes drop by the same share, with K from the model. Empty below two tap tests.
     """
     machine, assembly = data.machine, data.assembly
     shown = pick_evenly([row for row in data.rows if row.x or row.y], MAX_LOBE_DIAGRAMS)
     diagrams = [(row.time, compute_row_lobes(row, machine, [cut]).get(cut)) for row in shown]
-    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
-    if len(limits) < 2:
-        return None
+    depths = [(f"{time:%Y-%m-%d}", lobes.depth) for time, lobes in diagrams if lobes is not None]
     sides = (side for side in data.outlook.status.series if side.tool == assembly.tool)
     trends = {side.direction: side.trend for side in sides if side.trend is not None}
-    times, depths = zip(*limits, strict=True)
-    ahead = _forecast_depths(cut, assembly, trends, machine)
-    heard = select_test_cuts(data.analysis.cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
-    return LobeHistory(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
+    return [*depths, *_forecast_depths(cut, assembly, trends, machine)] if len(depths) > 1 else []
 
 
-def _forecast_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
-    depths: dict[str, Floats] = {}
+def _forecast_depths(
+    cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine
+) -> Iterator[tuple[str, Floats]]:
     for months in (6, 12):
         shares = {name: _forecast_drop(trend, months) for name, trend in trends.items()}
-        falls = {name: fall for name, fall in shares.items() if fall is not None}
-        if not falls:
-            break
-        x, y = (_degraded_modes(assembly, name, falls.get(name, max(falls.values()))) for name in ("x", "y"))
+        drops = {name: drop for name, drop in shares.items() if drop is not None}
+        if not drops:
+            return
+        x, y = (_degraded_modes(assembly, name, drops.get(name, max(drops.values()))) for name in ("x", "y"))
         lobes = compute_tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
         if lobes is not None:
             at = assembly.time + timedelta(days=months * DAYS_PER_MONTH)
-            depths[f"{at:%Y-%m} (forecast)"] = lobes.depth
-    return depths
+            yield f"{at:%Y-%m} (forecast)", lobes.depth
 
 
 def _forecast_drop(trend: Trend, months: int) -> float | None:
-    """Return the relative drop of the forecast line after some months; None where it is too long or too large."""
+    """Return the relative drop of the forecast line after some months; None if it is too far or too large."""
     forecast, last = trend.forecast, days_since_epoch(trend.points[-1].time)
     at = last + months * DAYS_PER_MONTH
     if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
@@ -251,7 +220,7 @@ def _forecast_drop(trend: Trend, months: int) -> float | None:
     return share if share < MAX_FORECAST_DROP else None
 
 
-def _degraded_modes(assembly: Assembly, direction: str, fall: float) -> list[Mode]:
-    stiffness = model_softening(assembly)[0](fall)
+def _degraded_modes(assembly: Assembly, direction: str, drop: float) -> list[Mode]:
+    stiffness = model_softening(assembly)[0](drop)
     modes = (assembly.x if direction == "x" else assembly.y) or ()
-    return [mode.scaled(1 - fall, stiffness, "foretold") for mode in modes]
+    return [mode.scaled(1 - drop, stiffness, "forecast") for mode in modes]

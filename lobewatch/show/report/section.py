@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -33,10 +33,11 @@ class NumberTable(NamedTuple):
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")
 
     @classmethod
-    def from_lobes(cls, speed_rpm: Floats, depths: Mapping[str, Floats]) -> Self:
-        """Tabulate limiting depths (m, by name) over speed."""
-        heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
-        columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])
+    def from_lobes(cls, speed_rpm: Floats, depths: Iterable[tuple[str, Floats]]) -> Self:
+        """Tabulate named limiting depths (m) over speed."""
+        names, values = zip(*depths, strict=True)
+        heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in names)]
+        columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in values)])
         return cls(heads, columns[:: math.ceil(speed_rpm.size / MAX_FIGURE_LINES)].tolist())
 
     @classmethod
@@ -67,11 +68,11 @@ class BulletList(NamedTuple):
     """Bullet list."""
 
     lines: Sequence[str]
-    """Text of each item."""
+    """Text of each item; without any, the list is not shown."""
 
 
 class TableCell(NamedTuple):
-    """Cell with the paint of a verdict or status."""
+    """Cell with the color of a verdict or status."""
 
     text: str
     """Text of the cell."""
@@ -85,51 +86,47 @@ class DataTable(NamedTuple):
     heads: Sequence[str]
     """Headings of the columns, with units."""
     rows: Sequence[Sequence[str | TableCell]]
-    """Cells of each row."""
+    """Cells of each row; the first names the row."""
     kind: str = ""
     """Classes of the style sheet: "words" aligns text to the left."""
     if_empty: str = ""
-    """Text instead of rows where there are none."""
+    """Text shown if there are no rows."""
     numbers: NumberTable | None = None
     """Table with all digits, to be saved as CSV."""
-    key: str = ""
-    """Name of the numbers in the page."""
 
 
 class Drawing(NamedTuple):
-    """Figure."""
+    """Figure that shows the numbers under the pointer."""
 
     svg: str
     """The <svg> element."""
     numbers: NumberTable | None = None
-    """Numbers of the figure, to be saved as CSV."""
+    """Numbers of the figure, shown under the pointer and saved as CSV. The first column or "date" is the abscissa."""
+    n_choices: int = 0
+    """Number of last columns that are drawn one at a time, chosen with a slider."""
+
+    @classmethod
+    def of(cls, figure: Figure, numbers: NumberTable | None = None, n_choices: int = 0) -> Self:
+        """Render a figure of one or more axes above each other, with an empty area over them in units of their data."""
+        svg, axes = render_svg(figure), figure.axes
+        (left, top), (right, bottom) = axes[0].get_position().corners()[1], axes[-1].get_position().corners()[2]
+        wide, high = 72 * figure.get_size_inches()
+        box = f'x="{left * wide:.2f}" y="{(1 - top) * high:.2f}" width="{(right - left) * wide:.2f}"'
+        (first, last), (low, peak) = axes[0].get_xlim(), axes[0].get_ylim()
+        data = f"{first:.9g} {-peak:.9g} {last - first:.9g} {peak - low:.9g}"
+        area = f'<svg class="area" {box} height="{(top - bottom) * high:.2f}" viewBox="{data}"'
+        return cls(svg.replace("</svg>", f'{area} preserveAspectRatio="none"/></svg>'), numbers, n_choices)
 
 
-class Fragment(NamedTuple):
-    """Part of the page with a template of its own."""
-
-    template: str
-    """Template file in this folder."""
-    content: Mapping[str, Any]
-    """Values that the template shows."""
-
-
-SectionPart = Paragraph | BulletList | DataTable | Drawing | Fragment
+SectionPart = Paragraph | BulletList | DataTable | Drawing
 
 
 class Section(NamedTuple):
     """Heading with the parts below it."""
 
     heading: str
-    """Heading; empty for none."""
+    """Heading."""
     parts: Sequence[SectionPart]
     """Parts below the heading, from the top."""
-    is_framed: bool = True
-    """True if blank lines surround it in the file, without any effect on the page."""
-    has_plot: bool = False
-    """True if the page needs the plot script."""
-
-    @classmethod
-    def with_figure(cls, heading: str, text: str, figure: Figure, numbers: NumberTable | None = None) -> Self:
-        """Make a section of a figure below a note on reading it; numbers: data of the figure."""
-        return cls(heading, [Paragraph(text, is_small=True), Drawing(render_svg(figure), numbers)])
+    style: str = ""
+    """Class of the style sheet: "folded" shows the heading until it is opened, "half" takes half of a wide page."""

@@ -255,11 +255,9 @@ def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) 
     assert run("report", "trial", "--out", "r.html").out == "report: r.html\n"
     html = Path("r.html").read_text(encoding="utf-8")
     gauge, *pictures = re.findall(r'<svg [^>]*aria-label="(.*?)"', html)
-    assert re.fullmatch(r"frequency [+-]\d\.\d\d %; warning at -5 %, alarm at -10 %", gauge)
-    first_screen = ["Natural frequency in x (Hz)", "Depth (mm), reference cut: chatter above the line"]
-    values = ["Natural frequency", "Bearing stiffness"]
-    assert pictures == [*first_screen, *values, "Stability lobes", "Pockets over time", "Frequency response"]
-    assert html.count("<svg") == 8
+    assert re.fullmatch(r"f1 [+-]\d\.\d\d %, .* -5 %, .* -10 %", gauge)
+    assert pictures == ["Natural frequency", "Stability lobes", "Bearing stiffness", "Frequency response"]
+    assert html.count("<figure") == 4
     assert "http" not in html.replace("http://www.w3.org", "").replace("https://matplotlib.org", "").replace(
         "http://purl.org", ""
     ).replace("http://creativecommons.org", "")
@@ -353,9 +351,9 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
     html = Path(said["report"]).read_text(encoding="utf-8")
     last = datetime.fromisoformat(taps[-1].time)
     assert datetime.now(UTC) - timedelta(days=32) < last < datetime.now(UTC)
-    assert f"As of {datetime.now().astimezone():%Y-%m-%d}." in html
-    assert f"{last + timedelta(days=30):%Y-%m-%d}.</strong>" in html
-    fallen = dict(re.findall(r'<th scope="row">reference, ([xy])</th><td [^>]*>-(\d+\.\d+)\s±', html))
+    assert f" {datetime.now().astimezone():%Y-%m-%d}." in html
+    assert f"{last + timedelta(days=30):%Y-%m-%d}</strong>" in html
+    fallen = dict(re.findall(r'<th scope="row">reference, ([xy])</th>.*?<td>-(\d+\.\d+)\s±', html))
     for direction, newest in zip("xy", said["taps"][-2:], strict=True):
         truths = np.log([tap["truth"]["frequency_hz"] for tap in said["taps"] if tap["direction"] == direction])
         start = np.exp(np.polyval(np.polyfit(np.arange(12), truths, 1), 0))
@@ -363,7 +361,7 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
         assert float(fallen[direction]) == pytest.approx(fell, abs=0.06)
     words = {
         row[1]: re.findall(r"(not stable|stable|doubtful|unknown|not checked)</td>", row[0])
-        for row in re.finditer(r"<tr><td>([ABC]):.*?</tr>", html[: html.index("<h2>Until when")], re.DOTALL)
+        for row in re.finditer(r'<tr><th scope="row">([ABC]):.*?</tr>', html, re.DOTALL)
     }
     assert {name: len(said) for name, said in words.items()} == {"A": 2, "B": 2, "C": 2}
     shown = run("demo", "--taps", 2, "--seed", 3)

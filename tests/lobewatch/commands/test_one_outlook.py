@@ -18,9 +18,11 @@ from typer.testing import CliRunner
 
 from lobewatch.cli import app
 from lobewatch.fleet.fleet import Fleet, find_machines
-from lobewatch.machine import MachineFolder
+from lobewatch.monitoring.threshold_dates import ALREADY_REACHED
 from lobewatch.notify.publish_status import make_message_content
 from lobewatch.screen.dashboard_server import DashboardServer
+from lobewatch.show.report.sections import DATE_HEADS
+from lobewatch.show.trend import reach_text
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -144,44 +146,36 @@ def report_page(machine: Path, *options: str) -> str:
     return (machine / "report.html").read_text("utf-8")
 
 
-def page_with_dates(machine: Path) -> str:
-    """Return the report of the newest series, or of one with dates if the newest has a single test."""
-    page = report_page(machine)
-    if "<h2>Until when</h2>" in page or "No dates" in page:
-        return page
-    assert "first test, nothing to compare it with yet" in page
-    series = sorted({(tap.tool, tap.direction) for tap in MachineFolder(machine).taps()})
-    pages = [report_page(machine, "--tool", tool, "--direction", direction) for tool, direction in series]
-    return next(page for page in pages if "<h2>Until when</h2>" in page)
+def dates_in_report(page: str) -> dict[str, list[str]]:
+    """Return the texts with the dates of each program and limit; empty without dates."""
+    series, programs = (page.partition(f'id="{name}"')[2].partition("</section>")[0] for name in ("series", "programs"))
+    limits = re.findall(r"-([\d.]+) % (.*?)(?=, -|\.</p>)", series.partition("</table>")[2].replace("\u00a0", " "))
+    texts = {f"{percent} %": [text] for percent, text in limits}
+    heads = re.findall("<th scope=.col.>(.*?)</th>", programs)
+    for line in re.findall("<tr><th scope=.row.>.*?</tr>", programs, re.DOTALL) if DATE_HEADS[0] in heads else ():
+        cells = [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<t[hd].*?</t[hd]>", line, re.DOTALL)]
+        texts[cells[0]] = [cells[heads.index(head)].replace("\u00a0", " ") for head in DATE_HEADS]
+    return texts
 
 
 def check_report(plant: Path, row: dict[str, Any]) -> None:
-    page = page_with_dates(plant / row["key"])
-    if "No dates" in page:  # said once in place of a table: nobody may tell a date elsewhere
-        assert {day for words in row["forecast"].values() for when in words.values() for day in when.values()} <= {
-            None,
-            "already",
-        }
-        assert all(alarm["id"] in page for alarm in row["alarms"])
+    page = report_page(plant / row["key"])
+    assert all(alarm["id"] in page for alarm in row["alarms"])
+    texts = dates_in_report(page)
+    if not texts:
+        dates = {day for words in row["forecast"].values() for when in words.values() for day in when.values()}
+        assert dates <= {None, "already"}
         return
-    table = page.partition("<h2>Until when</h2>")[2].partition("</table>")[0]
-    cells = [
-        [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<td.*?</td>", line, re.DOTALL)]
-        for line in table.split("<tr")
-    ]
-    texts = {line[0].removeprefix("-").split(" (")[0]: line[1:] for line in cells if len(line) == 3}
     assert texts.keys() == row["forecast"].keys()
     for name, words in row["forecast"].items():
-        for text, when in zip(texts[name][-len(words) :], words.values(), strict=True):
+        for text, when in zip(texts[name], words.values(), strict=True):
             if when["p50"] == "already":
-                assert text == "already"
+                assert text == reach_text(ALREADY_REACHED, datetime.now(UTC))
             elif when["p90"] is not None:
                 assert set(re.findall(ISO, text)) <= set(when.values())
-                assert when["p50"] in text or "probably now" in text
+                assert when["p50"] in text or "now" in text
             else:
-                assert re.search(r"not before|history too short", text)
-    for alarm in row["alarms"]:
-        assert alarm["id"] in page
+                assert set(re.findall(ISO, text)) <= {when["p10"]}
 
 
 @pytest.mark.timeout(900)

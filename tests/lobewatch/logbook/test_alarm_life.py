@@ -110,8 +110,8 @@ def test_acknowledged_is_reported_everywhere_and_the_status_stays(mill: Shop, ru
     assert run("report", mill.path, "--out", "r.html").code == 0
     page = Path("r.html").read_text("utf-8")
     assert words in page
-    assert row["alarms"][0]["id"] in page[page.index("For whoever signs") :]
-    assert words.strip("by )") in page[page.index("For whoever signs") :]
+    assert row["alarms"][0]["id"] in page[page.index('id="sign-off"') :]
+    assert words.strip("by )") in page[page.index('id="sign-off"') :]
     assert "Kim" in run("history", mill.path).out
 
 

@@ -37,6 +37,7 @@ from lobewatch.measurement import Measurement, measure
 from lobewatch.show.fleet.fleet_status import fleet_rows
 from lobewatch.show.programs.verdicts import VERDICT_STYLES
 from lobewatch.show.report.report import render_report
+from lobewatch.show.trend import change_text
 from lobewatch.tap.session import build_outcome
 from lobewatch.tool.lobe_chart import DynamicsSource, LobeMethod
 from lobewatch.verdicts import Advice, Stability, Verdict
@@ -154,7 +155,8 @@ def test_a_folder_that_cannot_be_written_is_read(shop: Shop, path: Path) -> None
             said = subprocess.run(command, capture_output=True, text=True, preexec_fn=without_override, check=False)
             if (name, options) == ("report", []):
                 assert said.returncode == 2
-                assert re.search("report.html: Permission denied.*--out", said.stderr)
+                assert "report.html: Permission denied" in said.stderr
+                assert "--out" in said.stderr
             else:
                 assert said.returncode == 0, said.stderr
                 assert "history.rows" in said.stdout + said.stderr
@@ -196,12 +198,9 @@ def test_one_program_has_one_verdict_in_every_place(
     stored = HistoryCache(logbook.folder).read(logbook.files).rows[-1]
     assert [one.stability for one in (stored.verdicts or {}).values()] == [word]
     html = render_report(logbook, "reference", "x")
-    first = html[: html.index("<h2")]
-    assert re.search(
-        rf'<th scope="row">{name}</th><td class="{VERDICT_STYLES[word].css_class}"[^>]*>. {word}</td>', first
-    )
+    style = VERDICT_STYLES[word].css_class
+    assert len(re.findall(rf'<th scope="row">{name}</th><td class="{style}">. {word}</td>', html)) == 1
     assert f"<td>{checked['limit_mm']:.2f}" in html
-    assert re.search(rf'<td>{name}</td><td class="{VERDICT_STYLES[word].css_class}">. {word}</td>', html)
     (remark,) = logbook.status(START).remarks
     assert (remark.code, remark.about) == (f"program-{word.replace(' ', '-')}", name)
     outcome = build_outcome(logbook, logbook.measurement(logbook.newest_tap().id))
@@ -261,7 +260,8 @@ def test_status_report_and_history_have_one_formula_for_the_fall(path: Path) -> 
     tap(path, 30, 1680.0)
     logbook = Logbook.open(path)
     (series,) = logbook.status(START).series
-    assert f"<td>{-series.drop.value:+.2f} %</td>" in render_report(logbook, "reference", "x")
+    page = render_report(logbook, "reference", "x").replace("\N{NO-BREAK SPACE}", " ")
+    assert f"<td>{change_text(series)}</td>" in page
 
 
 def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -436,8 +436,7 @@ def test_the_report_of_an_older_series_stands_on_what_is_known_now(path: Path) -
     tap(path, 1, 1690.0, "y")
     tap(path, 2, 1650.0, tool="another")
     html = render_report(Logbook.open(path), "reference", "x")
-    assert re.search("x and y", html)
-    assert not re.search("x direction (alone|only)", html)
+    assert "x and y directions" in html
 
 
 def test_a_program_is_charted_with_its_own_tool(path: Path) -> None:

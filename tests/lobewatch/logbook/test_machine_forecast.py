@@ -23,6 +23,7 @@ from lobewatch.logbook.machine_forecast import forecast_machine
 from lobewatch.monitoring.threshold_dates import ALREADY_REACHED, NO_FORECAST, ThresholdDates, date_of_days
 from lobewatch.monitoring.trend import days_since_epoch
 from lobewatch.show.measurement import measurement_json, measurement_texts
+from lobewatch.show.report.sections import DATE_HEADS
 from lobewatch.show.trend import forecast_date_rows, reach_text
 from lobewatch.verdicts import Stability
 from lobewatch.verdicts.setting_robustness import find_critical_drop, find_tolerable_drop, model_softening
@@ -219,17 +220,19 @@ def test_a_machine_that_was_never_tapped_has_no_trend(shop: Shop) -> None:
 
 def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert run("report", worn.path).exit_code == 0
-    html = (worn.path / "report.html").read_text("utf-8")
-    assert html.count("2026-01-30") > 1
-    assert "-5 %" in html
-    assert "80 %" in html
+    html = (worn.path / "report.html").read_text("utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert all(f'<th scope="col">{head}</th>' in html for head in DATE_HEADS)
+    assert html.count("2026-01-30</td>") == 2  # since when x and y fall
+    assert re.search(r": -5 %.* [\d-]{7,}.*, -10 %.* [\d-]{7,}", html)
+    lines = json.loads(html.partition('id="numbers-natural-frequency-2">')[2].partition("<")[0])["lines"]
+    assert {line[0] for line in lines} == {"test", "fitted", "forecast"}
 
 
 def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
     worn.run(("shallow", 12900, 0.05), tool="long end mill")
     assert run("report", worn.path).exit_code == 0
-    last = date_of_days(dates(forecast_machine(worn.logbook).programs["shallow"].doubtful)[3])
-    assert f"{last:%Y-%m}" in (worn.path / "report.html").read_text("utf-8")
+    last = f"not before {date_of_days(dates(forecast_machine(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
+    assert f"<td>{last}</td><td>" in (worn.path / "report.html").read_text("utf-8")
 
 
 def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothing(worn: Shop) -> None:
@@ -260,7 +263,8 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
     percent = f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %"
     assert percent in " ".join(run("trend", shop.path).stdout.split())
     run("report", shop.path)
-    assert percent in (shop.path / "report.html").read_text("utf-8")
+    page = (shop.path / "report.html").read_text("utf-8").replace("\N{NO-BREAK SPACE}", " ")
+    assert f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %" in page
 
 
 def printed_of(shop: Shop, tap_id: str) -> str:

@@ -1,8 +1,8 @@
 "use strict";
-// Numbers of each figure as a file, and the lobes of every test in turn.
+// Save numbers as CSV, show the numbers under the pointer, and draw the chosen curve.
 (function () {
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
-  // What a spreadsheet takes for a formula, never a number: as in csv_text.py.
+  // A text that a spreadsheet reads as a formula, never a number: as in csv_text.py.
   const formula = /^(?![+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$)[=+\-@\t\r]/;
   const cell = (value) => {
     const text = (value === null ? "" : String(value)).replace(formula, "'$&");
@@ -20,76 +20,65 @@
   }
   for (const button of document.querySelectorAll("button[data-numbers]")) button.addEventListener("click", () => save(button));
 
-  // No line ends within a date: a word joiner stands behind its hyphens.
+  // Word joiners behind its hyphens keep a date on one line.
   const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
   while (texts.nextNode()) {
     const { currentNode: node } = texts;
     if (node.parentNode.localName !== "script") node.data = node.data.replace(/(\d{4}-)(\d\d-)(?=\d\d)/g, "$1\u2060$2\u2060");
   }
 
-  // On a narrow screen each row is a card, and each cell says what it is.
+  // Where a table is too wide for the screen, each row is a card with the column heads before its cells.
   for (const table of document.querySelectorAll("table")) {
     const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent);
     for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, i) => { cell.dataset.head = heads[i]; });
-    table.classList.add("cards");
+    const isWide = heads.length > 7, narrow = matchMedia(`screen and (max-width: ${isWide ? 62 : 40}rem)`);
+    const turn = () => { table.classList.toggle("cards", narrow.matches); table.classList.toggle("many", isWide); };
+    narrow.addEventListener("change", turn);
+    turn();
   }
 
-  const slider = document.getElementById("lobes-when");
-  if (!slider) return;
-  document.getElementById("lobes-course").hidden = false;
-  const place = document.getElementById("lobes-plot"), said = document.getElementById("lobes-said");
-  const { heads, lines } = read(slider.dataset.numbers);
-  const columns = heads.map((_, i) => lines.map((line) => line[i]));
-  const names = heads.map((head) => head.split(": ")[0]);
-  const now = Number(slider.dataset.now);
-  const finite = columns.slice(1).flat().filter((depth) => depth !== null);
-  const lowest = finite.reduce((least, depth) => Math.min(least, depth), Infinity);
-  const top = Number.isFinite(lowest) ? 6 * lowest : 1;
-  const clipped = columns.map((column, i) => (i ? column.map((depth) => (depth === null ? top : Math.min(depth, top))) : column));
-  const lobes = (chosen) => [clipped[0], clipped[1], clipped[now], clipped[chosen]];
-  const heard = slider.dataset.heard ? read(slider.dataset.heard).lines : [];
-  const known = () => heard.filter(([from]) => from <= Number(slider.value));
-  const SIZE = 6;
-  function drawHeard(plot) {
-    const { ctx, bbox } = plot, size = SIZE * devicePixelRatio;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    ctx.lineWidth = 2.2 * devicePixelRatio;
-    for (const [, word, , rpm, depth] of known()) {
-      const x = plot.valToPos(rpm, "x", true), y = plot.valToPos(depth, "y", true);
-      ctx.strokeStyle = word === "stable" ? "#009E73" : "#A00000";
-      ctx.beginPath();
-      if (word === "stable") ctx.arc(x, y, size, 0, 2 * Math.PI);
-      else for (const side of [-1, 1]) {
-        ctx.moveTo(x - size, y - side * size);
-        ctx.lineTo(x + size, y + side * size);
-      }
-      ctx.stroke();
+  function link(figure) {
+    const { heads, lines } = read(figure.dataset.numbers);
+    const area = figure.querySelector(".area"), output = figure.querySelector("output"), slider = figure.querySelector("input");
+    const { x, y, width, height } = area.viewBox.baseVal;
+    area.innerHTML = `<path class="chosen"/><path class="cursor"/><rect x="${x}" y="${y}" width="${width}" height="${height}"/>`;
+    const [curve, cursor, rect] = area.children;
+    const day = heads.indexOf("date");
+    const places = lines.map((line) => (day < 0 ? line[0] : Date.parse(line[day]) / 864e5));
+    const choices = slider ? heads.length - Number(slider.max) : heads.length;
+    let chosen = heads.length, shown = -1;
+    const named = (head, value) => {
+      const [name] = head.split(/: | \(/), [, unit] = head.match(/\(([^()]*)\)+$/) ?? [];
+      return typeof value === "string" ? value : [name, value, unit].filter((part) => part !== undefined).join(" ");
+    };
+    const isSeen = (value, i) => value !== null && value !== "" && (i < choices || i === chosen);
+    function show(index) {
+      if (!lines[index]) return;
+      shown = index;
+      cursor.setAttribute("d", `M${places[index]} ${y}v${height}`);
+      output.textContent = lines[index].map((value, i) => (isSeen(value, i) ? named(heads[i], value) : "")).filter(Boolean).join(", ");
     }
-    ctx.restore();
+    rect.addEventListener("pointermove", (event) => {
+      const box = rect.getBoundingClientRect(), at = x + (width * (event.clientX - box.left)) / box.width;
+      show(places.reduce((best, place, i) => (Math.abs(place - at) < Math.abs(places[best] - at) ? i : best), 0));
+    });
+    figure.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+      if (event.target === figure && step) show(shown + step);
+    });
+    if (!slider) return;
+    function choose() {
+      chosen = choices + Number(slider.value) - 1;
+      const name = heads[chosen].split(": ")[0];
+      slider.previousElementSibling.textContent = name;
+      slider.setAttribute("aria-valuetext", name);
+      curve.setAttribute("d", `M${lines.map((line) => `${line[0]} ${line[chosen] === null ? 2 * y : -line[chosen]}`).join("L")}`);
+      show(shown);
+    }
+    slider.addEventListener("input", choose);
+    slider.parentElement.hidden = false;
+    choose();
   }
-  const plot = new uPlot({
-    hooks: { draw: [drawHeard] }, width: place.clientWidth, height: 300, scales: { x: { time: false }, y: { range: [0, top] } },
-    axes: [{ label: "spindle speed (rpm)" }, { label: "limiting depth (mm)" }],
-    series: [
-      { label: "rpm" },
-      { label: `first, ${names[1]}`, stroke: "#777777", dash: [6, 4], width: 1.2 },
-      { label: `now, ${names[now]}`, stroke: "#0072B2", width: 1.6 },
-      { label: "chosen", stroke: "#D55E00", width: 2 },
-    ],
-  }, lobes(Number(slider.value)), place);
-  function choose() {
-    const chosen = Number(slider.value);
-    const cuts = known().length;
-    said.textContent = cuts ? `${names[chosen]}, ${cuts} test cut${cuts > 1 ? "s" : ""}` : names[chosen];
-    slider.setAttribute("aria-valuetext", said.textContent);
-    plot.setData(lobes(chosen));
-  }
-  slider.addEventListener("input", choose);
-  const fit = () => plot.setSize({ width: place.clientWidth, height: 300 });
-  window.addEventListener("resize", fit);
-  window.addEventListener("beforeprint", fit);
-  choose();
+  for (const figure of document.querySelectorAll("figure[data-numbers]")) link(figure);
+  document.documentElement.dataset.ready = "";
 })();

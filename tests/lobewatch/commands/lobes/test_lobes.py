@@ -130,8 +130,8 @@ def test_now_is_compared_with_the_first_tests_of_the_same_directions(run: Run, f
     ]
     run("report", "m")
     html = Path("m/report.html").read_text("utf-8")
-    assert "<h2>Stability lobes, then and now</h2>" in html
-    assert "by zero order, x and y directions" in html
+    assert '<section id="stability-lobes"' in html
+    assert "x and y directions" in html
     assert BAND_LABEL in html
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -13,7 +14,7 @@ from lobes import Cut, StabilityLobes
 from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.machine.folder_updates import store_cut
 from lobewatch.machine.journal.entries import CutEntry, CutVerdict
-from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
+from lobewatch.show.figures.lobe_figures import TEST_CUT_MARKS, plot_lobes, select_test_cuts
 from lobewatch.show.report.report import render_report
 from lobewatch.tool import compute_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand
@@ -95,7 +96,7 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     assert float(np.min(learnt.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
     assert np.all(learnt.band.low <= learnt.lobes.depth)
     html = render_report(logbook, "reference", "x")
-    assert ">at speed, learnt from 3 test cuts</text>" in html
+    assert re.search(r">at speed.* 3 .*</text>", html)
     assert "at speed: limiting depth (mm)" in html
 
 
@@ -121,14 +122,13 @@ def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
     shop.run(("A <1>", 12900, 1.5))
     shop.tap(0, 1713.0)
     html = render_report(shop.logbook, "reference", "x")
-    assert "Test cuts" not in html
+    assert 'id="test-cuts"' not in html
     cut = shop.logbook.machine.build_cut(shop.logbook.machine.program[0])
     stored = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
     store_cut(shop.logbook.folder, stored)
     html = render_report(shop.logbook, "reference", "x")
-    assert (
-        "<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter at 1725 Hz</td><td>ear</td>" in html
+    assert re.search(
+        r"<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter .*1725.Hz</td><td>ear</td>", html
     )
-    assert "Rings and crosses: 1 test cut, as heard." in html
-    assert ">heard to chatter</text>" in html
+    assert f">{TEST_CUT_MARKS[True][0]}</text>" in html
     assert ">1725 Hz</text>" in html

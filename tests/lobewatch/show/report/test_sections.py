@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobewatch.show.figures.drawing import new_axes, render_svg
+from lobewatch.show.figures.drawing import new_axes
 from lobewatch.show.report.report import render_report
 from lobewatch.show.report.report_data import ReportData
 from lobewatch.show.report.section import BulletList, DataTable, Drawing, NumberTable, Paragraph, Section, TableCell
@@ -28,13 +28,13 @@ def hours(material: ReportData) -> list[Section]:
         Section(
             "Hours, <all>",
             [
-                Paragraph("When it was quiet."),
-                Paragraph("Of the clock & the day.", is_small=True),
+                Paragraph("Working hours."),
+                Paragraph("Local time & date.", is_small=True),
                 Paragraph(""),
                 BulletList(["early", "late"]),
                 DataTable(["hour", "how"], [["9", TableCell("fine", "ok")]], "words"),
-                DataTable(["minute"], [], if_empty="not looked at", numbers=NumberTable(["minute"], []), key="minutes"),
-                Drawing(render_svg(figure), NumberTable(["hour"], [[hour] for hour in taken])),
+                DataTable(["minute"], [], if_empty="no minutes", numbers=NumberTable(["minute"], [])),
+                Drawing.of(figure, NumberTable(["hour"], [[hour] for hour in taken])),
             ],
         )
     ]
@@ -43,20 +43,23 @@ def hours(material: ReportData) -> list[Section]:
 def test_a_new_section_is_one_function(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     before = render_report(shop.logbook, "reference", "x")
-    drawn = before.count('data-numbers="numbers-') - before.count('data-numbers="numbers-taps')
     html = render_report(shop.logbook, "reference", "x", sections=(*SECTIONS, hours))
-    added = html[html.index("<h2>Hours, &lt;all&gt;</h2>") : html.index("</main>")]
-    assert html.replace(f"\n\n\n{added}", "\n") == before
+    added = html[html.index('<section id="hours-all">') : html.index("</main>")]
+    assert html.replace(added, "") == before
     lines = added.splitlines()
-    assert lines[1:3] == ["<p>When it was quiet.</p>", '<p class="sub">Of the clock &amp; the day.</p>']
-    assert lines[3:6] == ["", "<ul><li>early</li>", "<li>late</li>"]
+    assert lines[1:4] == [
+        "<h2>Hours, &lt;all&gt;</h2>",
+        "<p>Working hours.</p>",
+        '<p class="sub">Local time &amp; date.</p>',
+    ]
+    assert lines[4:7] == ["", "<ul><li>early</li>", "<li>late</li>"]
     assert '<div class="wide" role="region" aria-label="Hours, &lt;all&gt;" tabindex="0"><table class="words">' in added
     assert '<thead><tr><th scope="col">hour</th><th scope="col">how</th></tr></thead>' in added
-    assert '<tr><td>9</td><td class="ok">fine</td></tr>' in added
-    assert '<tr><td colspan="1">not looked at</td></tr>' in added
-    assert '<figure class="large" tabindex="0"><svg role="img" aria-label="Hours, &lt;all&gt;"' in added
-    assert f'id="numbers-{drawn + 1}">{{"heads":["hour"],"lines":[[9.0]]}}</script>' in added
-    assert 'data-numbers="numbers-minutes" data-name="hours-&lt;all&gt;">CSV: hours, &lt;all&gt;</button>' in added
+    assert '<tr><th scope="row">9</th><td class="ok">fine</td></tr>' in added
+    assert '<tr><td colspan="1">no minutes</td></tr>' in added
+    assert '<svg role="img" aria-label="Hours, &lt;all&gt;"' in added
+    assert 'id="numbers-hours-all-7">{"heads":["hour"],"lines":[[9.0]]}</script>' in added
+    assert 'data-numbers="numbers-hours-all-6" data-name="hours-all">CSV: hours, &lt;all&gt;</button>' in added
 
 
 def test_numbers_have_keys_of_their_own(shop: Shop) -> None:
@@ -64,7 +67,21 @@ def test_numbers_have_keys_of_their_own(shop: Shop) -> None:
         shop.tap(7 * week, 1713.0 - week)
     html = render_report(shop.logbook, "reference", "x")
     keys = re.findall(r'<script type="application/json" id="(.*?)"', html)
-    assert keys == ["numbers-1", "numbers-2", "numbers-3", "numbers-5", "numbers-course", "numbers-taps"]
+    names = ["natural-frequency-2", "stability-lobes-2", "bearing-stiffness-2", "frequency-response-2", "tap-tests-1"]
+    assert keys == [f"numbers-{name}" for name in names]
+
+
+def test_the_area_of_a_figure_lies_over_its_axes_in_units_of_their_data() -> None:
+    figure, (axes,) = new_axes(1, (4.0, 2.0))
+    axes.plot([10.0, 30.0], [5.0, 7.0], gid="line")
+    axes.set(xlim=(10.0, 30.0), ylim=(5.0, 7.0))
+    svg = Drawing.of(figure).svg
+    (area,) = re.findall(r'<svg class="area" x="(.*?)" y="(.*?)" width="(.*?)" height="(.*?)" viewBox="(.*?)"', svg)
+    assert area[4] == "10 -7 20 2"
+    path = re.search(r'<g id="line">\s*<path d="M (\S+) (\S+) \nL (\S+) (\S+)', svg)
+    assert path is not None
+    (x, y, width, height), (left, bottom, right, top) = map(float, area[:4]), map(float, path.groups())
+    assert (x, y + height, x + width, y) == pytest.approx((left, bottom, right, top), abs=0.02)
 
 
 def test_the_oldest_test_is_left_out_where_its_file_turns_out_to_be_damaged(
@@ -81,5 +98,5 @@ def test_the_oldest_test_is_left_out_where_its_file_turns_out_to_be_damaged(
     logbook = shop.logbook
     assert len(logbook.taps) == 3
     html = render_report(logbook, "reference", "x")
-    assert "direction x: 2 tap tests" in html
+    assert ": 2 tap tests," in html
     assert oldest.name in html

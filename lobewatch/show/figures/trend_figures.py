@@ -20,7 +20,7 @@ from lobewatch.show.figures.drawing import Paint, new_axes
 TREND_FIGURE_SIZE = (8.0, 2.8)
 """Size of a figure of one value (inches)."""
 EXCLUDED_VALUE_RANGE = 0.15
-"""Largest relative distance from the values that count at which an excluded value is drawn."""
+"""Largest relative distance of a drawn excluded value from the values in use."""
 FORECAST_SHARE = 0.5
 """Forecast time drawn, as a share of the length of the series."""
 
@@ -72,9 +72,9 @@ class ValueTrend(NamedTuple):
     events: Sequence[tuple[datetime, str]] = ()
     """Times and texts of maintenance events."""
     limits: LimitsTable | None = None
-    """Limits of its drop; None where it has none."""
+    """Limits of its drop; None without limits."""
     curve: TrendCurve | None = None
-    """Fitted line and forecast; None where there is none."""
+    """Fitted line and forecast; None without one."""
 
     @property
     def drawn_excluded(self) -> list[tuple[datetime, float]]:
@@ -122,7 +122,7 @@ def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float], size: tuple
 
 
 def plot_trend(trend: ValueTrend, size: tuple[float, float] = TREND_FIGURE_SIZE) -> Figure:
-    """Plot a value over time with its 95 % interval, and the limits of its drop where given.
+    """Plot a value over time with its 95 % interval, and the limits of its drop if given.
 
     The limits are in % of the first value of the curve, or else of the first value; size: of the figure (inches).
     """

@@ -16,6 +16,7 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 
 
@@ -158,7 +159,8 @@ def history_lines(logbook: Logbook) -> list[str]:
     cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
     lines = align_columns([*HISTORY_HEADINGS, *cells], numbers=(4, 5, 6))
     texts = ["", "", *map(_note_text, entries)]
-    return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
+    parts = (part for line, text in zip(lines, texts, strict=True) for part in (line, *wrap_lines([text])))
+    return [part for part in parts if part.strip()]
 
 
 def shorten_ids(ids: Sequence[str]) -> list[str]:

@@ -9,6 +9,7 @@ from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPo
 from dsm import format_with_error
 from lobewatch.sensors.computer_check import Finding
 from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
+from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 
 NO_ANSWER_TEXT = (
@@ -28,7 +29,8 @@ def ports_texts(scan: PortScan) -> Texts:
         for port in [scanned.port]
     )
     problems = [scanned.problem for scanned in scan.ports if scanned.problem]
-    return [new_table(*headings, rows=rows), *problems, *remarks, _ports_summary(scan.ports)]
+    notes = wrap_lines([*problems, *remarks, _ports_summary(scan.ports)], "")
+    return [new_table(*headings, rows=rows), *notes]
 
 
 def _usb_id(port: PortInfo) -> str:

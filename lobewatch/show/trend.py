@@ -17,8 +17,8 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
+from lobewatch.show.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
-from lobewatch.show.wrapped_lines import wrap_lines
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "
@@ -110,7 +110,8 @@ def no_dates_text(outlook: MachineForecast) -> str:
 
 def trend_sentence(series: SeriesStatus) -> str:
     """Return the trend of the series in sentences, without the last full stop."""
-    return f"{series.name}: {join_sentences(*_trend_facts(series))}".removesuffix(".")
+    first, *others = _trend_facts(series)
+    return f"{series.name}: {join_sentences(first, *map(capitalize, others))}".removesuffix(".")
 
 
 def _trend_facts(series: SeriesStatus) -> list[str]:
@@ -124,12 +125,12 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
         known = trend.readings.scatter_prior.single
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
         fits = ["± is the error of the fits, without the scatter from reclamping"] if n > 1 else []
-        return [change, *fits, f"Alarms are possible from {least}"]
+        return [change, *fits, f"alarms are possible from {least}"]
     score = f"from {MIN_MONITORED_POINTS} points on"
     if math.isfinite(trend.detection.scores[-1]):
         score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more twice)"
     course = ", ".join(filter(None, (trend_text(trend), rate_text(trend))))
-    return [change, course[:1].upper() + course[1:], f"Scatter {trend.spread:.2f} %, change score {score}"]
+    return [change, course, f"scatter {trend.spread:.2f} %, change score {score}"]
 
 
 def rate_text(trend: Trend) -> str:

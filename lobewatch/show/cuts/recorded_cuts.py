@@ -121,7 +121,13 @@ def _energy_text(ratio: float) -> str:
 
 
 def cut_verdict_text(comparison: CutComparison) -> str:
-    """Return the verdict on a recorded cut, with the chatter frequency or the code of the fault."""
+    """Return the verdict on a recorded cut, with the chatter frequency or the fault."""
+    label = cut_verdict_label(comparison)
+    return f"{label}: {_fault_text(comparison)}" if comparison.detected.verdict == "cannot tell" else label
+
+
+def cut_verdict_label(comparison: CutComparison) -> str:
+    """Return the verdict on a recorded cut in a few words, with the chatter frequency or the code of the fault."""
     heard, chatter = comparison.detected, comparison.detected.chatter
     if heard.verdict == "cannot tell":
         return f"cannot tell ({heard.reason})"
@@ -134,8 +140,6 @@ def cut_verdict_text(comparison: CutComparison) -> str:
 def recorded_cut_texts(comparison: CutComparison) -> list[str]:
     """Return the verdict on a recorded cut, and its evidence."""
     detected, texts = comparison.detected, [cut_verdict_text(comparison)]
-    if detected.verdict == "cannot tell":
-        texts = [f"{texts[0]}: {_fault_text(comparison)}"]
     if detected.spindle_speed is not None:
         off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
         duration = math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
@@ -154,13 +158,17 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
         texts.append(MICROPHONE_NOTE)
     if comparison.power is not None:
         texts.append(power_text(comparison.power, comparison.setting.cut))
-    if (expected := comparison.predicted) is not None:
-        difference = comparison.frequency_difference
+    return [*texts, *_prediction_texts(comparison)]
+
+
+def _prediction_texts(comparison: CutComparison) -> Iterator[str]:
+    """Return the prediction from tap tests, and its difference from the detected chatter frequency."""
+    expected, difference = comparison.predicted, comparison.frequency_difference
+    if expected is not None:
         word = "stable" if expected.stable else "chatter"
-        texts.append(f"predicted from tap tests (not rotating): {word}, {expected.frequency:.1f} Hz at this depth")
+        yield f"predicted from tap tests (not rotating): {word}, {expected.frequency:.1f} Hz at this depth"
         if difference is not None:
-            texts.append(f"predicted to detected frequency: {difference:.1f} Hz (modulo tooth passing)")
-    return texts
+            yield f"predicted to detected frequency: {difference:.1f} Hz (modulo tooth passing)"
 
 
 def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:

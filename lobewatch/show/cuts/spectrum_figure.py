@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
+from lobewatch.show.cuts.recorded_cuts import cut_verdict_label
 from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
 
@@ -35,7 +35,7 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
-    axis.set_title(f"{named}: {cut_verdict_text(comparison)}", loc="left", fontsize=11, fontweight="bold")
+    axis.set_title(f"{named}: {cut_verdict_label(comparison)}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
     if spectrum is None:
         return

@@ -17,8 +17,8 @@ from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
+from lobewatch.show.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
-from lobewatch.show.wrapped_lines import wrap_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
@@ -141,11 +141,6 @@ def advice_items(program: ProgramAdvice, machine: Machine) -> list[str]:
     return items
 
 
-def capitalize(text: str) -> str:
-    """Return a text with a capital letter at its beginning."""
-    return f"{text[:1].upper()}{text[1:]}"
-
-
 def _chatter_items(program: ProgramAdvice) -> Iterator[str]:
     verdict = program.verdict
     word = "Period-two chatter" if verdict.kind == "flip" else "Chatter"
@@ -246,7 +241,8 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
     texts: Texts = [
-        f"{now.name}: {now.lobes.method_text}, from the {now.source} of {now.assembly.tap_id}",
+        f"{now.name}: {now.lobes.method_text}",
+        f"from the {now.source} of {now.assembly.tap_id}",
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
         else f"no limit in this speed range ({now.lobes.method_text})",

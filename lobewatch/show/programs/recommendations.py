@@ -13,13 +13,13 @@ from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import (
     LINE_REMARK_CODES,
-    capitalize,
     format_rpm,
     margins_text,
     setting_json,
     window_text,
     worst_feed_text,
 )
+from lobewatch.show.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import (
     MIN_COLUMN_WIDTH,
     JsonObject,
@@ -29,7 +29,6 @@ from lobewatch.show.terminal.output import (
     pick,
     remark_lines,
 )
-from lobewatch.show.wrapped_lines import wrap_lines
 from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation

@@ -1,4 +1,4 @@
-"""Wrap lists of sentences to lines that a narrow terminal shows in full."""
+"""Capitalize sentences, and wrap lists of them to lines that a narrow terminal shows in full."""
 
 import re
 import textwrap
@@ -8,6 +8,15 @@ from lobewatch.show.terminal.output import make_printable
 
 MAX_LINE_LENGTH = 80
 """Largest length of a line of a list (characters)."""
+
+
+def capitalize(text: str) -> str:
+    """Return a text with a capital letter at its beginning.
+
+    >>> capitalize("tap again")
+    'Tap again'
+    """
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def wrap_lines(texts: Iterable[str], indent: str = "  ") -> list[str]:

@@ -13,7 +13,7 @@ from lobes import Cut, StabilityLobes
 from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
 from lobewatch.machine.folder_updates import store_cut
 from lobewatch.machine.journal.entries import CutEntry, CutVerdict
-from lobewatch.show.figures.lobe_figures import plot_lobes, select_test_cuts
+from lobewatch.show.figures.lobe_figures import TEST_CUT_MARKS, plot_lobes, select_test_cuts
 from lobewatch.show.report.report import render_report
 from lobewatch.tool import compute_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand
@@ -56,7 +56,7 @@ def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> Non
     assert np.asarray(stable.get_xydata()).tolist() == [[1200.0, 1.0]]
     assert np.asarray(chatter.get_xydata()).tolist() == [[1500.0, 4.0], [1700.0, 2.0]]
     assert stable.get_marker() != chatter.get_marker()
-    assert [line.get_label() for line in (stable, chatter)] == ["heard stable", "heard to chatter"]
+    assert [line.get_label() for line in (stable, chatter)] == [TEST_CUT_MARKS[word][0] for word in (False, True)]
     assert [text.get_text() for text in axes.texts] == ["1650 Hz"]
     assert axes.get_ylim()[1] > 4.0
 
@@ -66,9 +66,9 @@ def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
     lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
     learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
     (axes,) = plot_lobes(diagram_of(speed, {"now": 2 * depth}, learned=learnt)).axes
-    (line,) = [artist for artist in axes.lines if artist.get_label() == "at speed, learnt from 4 test cuts"]
+    (line,) = [artist for artist in axes.lines if "4 test cuts" in str(artist.get_label())]
     assert line.get_ydata() == pytest.approx(1.0)
-    (band,) = [artist for artist in axes.collections if "left open" in str(artist.get_label())]
+    (band,) = [artist for artist in axes.collections if "98 %" in str(artist.get_label())]
     edge = np.asarray(band.get_paths()[0].vertices)[:, 1]
     assert (edge.min(), edge.max()) == pytest.approx((0.5, 3.0))
 
@@ -95,8 +95,8 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     assert float(np.min(learnt.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
     assert np.all(learnt.band.low <= learnt.lobes.depth)
     html = render_report(logbook, "reference", "x")
-    assert ">at speed, learnt from 3 test cuts</text>" in html
-    assert "at speed: limiting depth (mm)" in html
+    assert "3 test cuts</text>" in html
+    assert "at speed: limiting depth" in html
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
     shop.run(("A <1>", 12900, 1.5))
     shop.tap(0, 1713.0)
     html = render_report(shop.logbook, "reference", "x")
-    assert "Test cuts" not in html
+    assert "A &lt;1&gt;</td><td>reference</td>" not in html
     cut = shop.logbook.machine.build_cut(shop.logbook.machine.program[0])
     stored = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
     store_cut(shop.logbook.folder, stored)
@@ -129,6 +129,6 @@ def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
     assert (
         "<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter at 1725 Hz</td><td>ear</td>" in html
     )
-    assert "Rings and crosses: 1 test cut, as heard." in html
-    assert ">heard to chatter</text>" in html
+    assert "1 test cut" in html
+    assert f">{TEST_CUT_MARKS[True][0]}</text>" in html
     assert ">1725 Hz</text>" in html

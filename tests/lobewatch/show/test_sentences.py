@@ -13,9 +13,10 @@ from lobewatch.show.sentences import MAX_LINE_LENGTH, wrap_lines
 pytestmark = pytest.mark.quick
 
 
-@given(
-    st.lists(st.sampled_from(["Run", "this", "depth", "at", "11 440 rpm,", "2 %", "±0.1 Hz"]), min_size=1, max_size=60)
-)
+WORDS = ["Run", "this", "depth", "at", "11 440 rpm,", "2 %", "±0.1 Hz"]
+
+
+@given(st.lists(st.sampled_from(WORDS), min_size=1, max_size=60))
 def test_lines_are_short_and_keep_numbers_with_their_units(words: list[str]) -> None:
     lines = wrap_lines([" ".join(words)])
     assert max(map(len, lines)) <= MAX_LINE_LENGTH

@@ -9,11 +9,11 @@ from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPo
 from dsm import format_with_error
 from lobewatch.sensors.computer_check import Finding
 from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
-from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 
-NO_ANSWER_TEXT = (
-    "No DAQ answers. After plugging in, wait a few seconds and try again. A DATAQ device must blink yellow (CDC mode)."
+NO_ANSWER_TEXTS = (
+    "No DAQ answers. Wait a few seconds after plugging it in, then try again.",
+    "A DATAQ device must blink yellow (CDC mode).",
 )
 
 
@@ -29,8 +29,7 @@ def ports_texts(scan: PortScan) -> Texts:
         for port in [scanned.port]
     )
     problems = [scanned.problem for scanned in scan.ports if scanned.problem]
-    notes = wrap_lines([*problems, *remarks, _ports_summary(scan.ports)], "")
-    return [new_table(*headings, rows=rows), *notes]
+    return [new_table(*headings, rows=rows), *problems, *remarks, *_ports_summary(scan.ports)]
 
 
 def _usb_id(port: PortInfo) -> str:
@@ -63,14 +62,14 @@ def _answer_text(scanned: ScannedPort) -> str:
     return ", ".join(filter(None, words))
 
 
-def _ports_summary(ports: tuple[ScannedPort, ...]) -> str:
+def _ports_summary(ports: tuple[ScannedPort, ...]) -> Sequence[str]:
     """Return how many devices answer, and the next step."""
     answering = [(listed.port.device, listed.answer.driver) for listed in ports if listed.answer]
     if not answering:
-        return NO_ANSWER_TEXT
+        return NO_ANSWER_TEXTS
     port, driver = answering[0]
-    following = f'lobewatch tap MACHINE --port {port}, with driver = "{driver}" in [daq] of its machine.toml'
-    return f"{len(answering)} of {len(ports)} ports answer. Next: {following}"
+    following = f'write driver = "{driver}" in [daq] of machine.toml, then lobewatch tap MACHINE --port {port}'
+    return f"{len(answering)} of {len(ports)} ports answer", f"Next: {following}"
 
 
 def sensors_json(sensors: SensorList) -> JsonObject:

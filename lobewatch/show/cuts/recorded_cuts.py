@@ -55,7 +55,7 @@ FAULTS: Mapping[str, Fault] = {
     ),
     "faint": Fault("weak lines besides those of the spindle, too faint for chatter", "Cut longer or a little deeper"),
     "unexplained-tone": Fault(
-        "a tone that spindle, flutes and air do not explain, without the side bands of chatter",
+        "not explained by spindle, flutes or air, and without the side bands of chatter",
         "Cut a little deeper, and listen for the tone without cutting",
     ),
     "slow-sampling": Fault(
@@ -98,8 +98,8 @@ def _fault_text(comparison: CutComparison) -> str:
             remedy = f"Use {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
-            distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
-            finding = f"{tone:.1f} Hz{distance}: {finding}"
+            distance = "" if mode is None else f" ({abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz)"
+            finding = f"tone at {tone:.1f} Hz{distance} {finding}"
     return join_sentences(finding, remedy)
 
 
@@ -111,8 +111,8 @@ def _speed_conflict(comparison: CutComparison) -> Fault:
     finding = f"tachometer {measured:.1f} rpm, but {lines:.1f} rpm by {source}"
     if not is_pulse_multiple(measured / lines):
         return Fault(finding, FAULTS["tacho-contradicts"].remedy)
-    times, wanted = round(max(measured / lines, lines / measured)), "larger" if measured > lines else "smaller"
-    return Fault(finding, f"Give a {times} times {wanted} --pulses, or correct --speed")
+    change = "Multiply" if measured > lines else "Divide"
+    return Fault(finding, f"{change} --pulses by {round(max(measured / lines, lines / measured))}, or correct --speed")
 
 
 def _energy_text(ratio: float) -> str:

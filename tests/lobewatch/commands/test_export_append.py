@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -158,7 +159,7 @@ def test_what_was_excluded_or_analysed_again_since_is_reported_by_its_month(mill
     assert (told["added"], told["outdated_months"]) == (2, [])
     assert ("a", tap) not in [line[1:3] for line in lines(fleet)]
     result = invoke(["export", str(mills), "--append", str(fleet)])
-    assert result.stdout.endswith("in " + str(fleet) + "\n0 of them are new there\n")
+    assert re.search(rf"in {re.escape(str(fleet))}\n0 [^0-9]*\n$", result.stdout)
 
 
 def test_a_machine_that_cannot_be_read_keeps_its_lines(mills: Path, tmp_path: Path) -> None:

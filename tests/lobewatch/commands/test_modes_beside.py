@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lobewatch.show.modes import MATCHES_NOTE
 from modal import Mode, synthesize_frf
 from tests.lobewatch.commands.test_modes import command
 
@@ -60,10 +61,10 @@ def test_the_table_says_in_how_many_others_and_what_the_column_is(
     shown = capsys.readouterr().out
     assert "2 of 2" in shown
     assert "0 of 2" in shown
-    assert "again: how many of the other measurements have it within 0.5 %" in shown
+    assert MATCHES_NOTE in shown
     assert max(map(len, shown.splitlines()[1:4])) <= 80
     assert command(monkeypatch, third) == 0
-    assert "again:" not in capsys.readouterr().out
+    assert MATCHES_NOTE not in capsys.readouterr().out
 
 
 def test_other_responses_of_one_measured_file_by_their_numbers(

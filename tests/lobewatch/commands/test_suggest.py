@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from typing import Any
 
@@ -32,8 +33,8 @@ def test_cuts_are_suggested_learnt_from_and_come_to_an_end(shop: Shop, run: Any)
     shop.tap_both()
     code, text, _ = run("suggest", "--program", "A")
     assert code == 0
-    assert "A: test cut 1 of 5: " in text
-    assert "a test cut is no advice" in text
+    assert re.match(r"A: [0-9 ]+ rpm, [0-9.]+ mm .*1 of 5", text)
+    assert "lobewatch check" in text
     cut = json.loads(run("suggest", "--program", "A", "--json")[1])["suggested"]
     assert 0 < cut["chance_of_chatter"] < 0.5
     place = ("--program", "A", "--speed", f"{cut['speed_rpm']:g}", "--depth", f"{cut['depth_mm']:g}")
@@ -48,7 +49,7 @@ def test_cuts_are_suggested_learnt_from_and_come_to_an_end(shop: Shop, run: Any)
     assert [remark["code"] for remark in found["remarks"]] == ["frequency-not-learnt"]
     code, text, _ = run("suggest", "--program", "A", "--cuts", "1")
     assert (code, "1 test cuts are made" in text) == (0, True)
-    assert "not learnt" in text
+    assert re.search(r"^frequency in x.*\d\)  [^0-9]+$", text, re.MULTILINE)
 
 
 def test_power_is_asked_for_where_it_can_say_a_kt(shop: Shop, run: Any) -> None:
@@ -56,7 +57,8 @@ def test_power_is_asked_for_where_it_can_say_a_kt(shop: Shop, run: Any) -> None:
     assert "--power" not in run("suggest", "--program", "A")[1]
     shop.edit("radial_depth_mm = 20", "radial_depth_mm = 20\nfeed_per_tooth_mm = 0.1")
     text = run("suggest", "--program", "A")[1]
-    assert "--stable (or --chatter --frequency HZ); --power KW, where it is shown, tells Kt\n" in text
+    assert "--stable (or --chatter --frequency HZ)\n" in text
+    assert re.search("--power KW .*Kt", text)
 
 
 def test_a_cut_that_contradicts_is_reported_and_left_out(shop: Shop, run: Any) -> None:

@@ -145,8 +145,8 @@ def tools_texts(calibration: JointCalibration) -> Texts:
         caution = f" (undetermined: {unsure}, use only with the others)" if unsure else ""
         lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
-        misfit = "the tools do not fit one spindle"
-        finding = misfit if calibration.fit.has_misfit else "no measured mode depends on the joints"
+        misfit = "The tools do not fit one spindle"
+        finding = misfit if calibration.fit.has_misfit else "No measured mode depends on the joints"
         lines.append(join_sentences(finding, "Leave machine.toml as it is"))
     if not calibration.predicted or calibration.fit.has_misfit:
         return [*lines]

@@ -55,7 +55,7 @@ FAULTS: Mapping[str, Fault] = {
     ),
     "faint": Fault("weak lines besides those of the spindle, too faint for chatter", "Cut longer or a little deeper"),
     "unexplained-tone": Fault(
-        "not explained by spindle, flutes or air, and without the side bands of chatter",
+        "is not explained by spindle, flutes or air, and has no side bands of chatter",
         "Cut a little deeper, and listen for the tone without cutting",
     ),
     "slow-sampling": Fault(
@@ -98,8 +98,8 @@ def _fault_text(comparison: CutComparison) -> str:
             remedy = f"Use {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
-            distance = "" if mode is None else f" ({abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz)"
-            finding = f"tone at {tone:.1f} Hz{distance} {finding}"
+            distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz,"
+            finding = f"the tone at {tone:.1f} Hz{distance} {finding}"
     return join_sentences(finding, remedy)
 
 

@@ -172,7 +172,7 @@ def _map_limit(depth: Floats) -> float:
 
 def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     """Draw the line and the band of the rotating spindle, clipped at the deepest depth (mm)."""
-    label = f"rotating, learned from {count_noun(learnt.n_cuts, 'test cut')}"
+    label = f"at speed, learned from {count_noun(learnt.n_cuts, 'test cut')}"
     left = "uncertainty band (98 %) after test cuts"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)

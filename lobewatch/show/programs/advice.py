@@ -253,7 +253,9 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
         texts += [heading, pocket_table(comparison.pockets)]
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
     if verdicts:
-        texts += [verdict_table(verdicts), f"Verdicts by {verdicts[0].method}, as in lobewatch check"]
+        texts.append(verdict_table(verdicts))
+        methods = dict.fromkeys(verdict.method for verdict in verdicts if verdict.method)
+        texts += [f"Verdicts by {method}, as in lobewatch check" for method in methods]
     if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
         shown = "The diagram and its pockets are" if now.name == REFERENCE_CUT else "The diagram is"
         texts.append(join_sentences(at_speed_text(taught), f"{shown} for the spindle not rotating"))

@@ -63,9 +63,9 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             learned += [verdict] if verdict.n_cuts else []
     lines = [*NOT_ROTATING_TEXTS] if len(learned) < evaluated else []
     lines += [at_speed_text(learned)] if learned else []
-    for parts, names in named.items():
+    for causes, names in named.items():
         about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
-        lines += [f"{about} (docs/lobes.md):", *(f"  {part}" for part in parts)]
+        lines += [f"{about} (docs/lobes.md):", *(f"  {cause}" for cause in causes)]
     return lines
 
 

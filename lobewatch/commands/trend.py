@@ -28,7 +28,7 @@ def trend(
     from lobewatch.logbook.machine_forecast import forecast_machine
     from lobewatch.monitoring import StatusLevel
     from lobewatch.monitoring.series_history import estimate_preload
-    from lobewatch.show.trend import trend_csv, trend_json, trend_texts
+    from lobewatch.show.trend import trend_csv, trend_json, trend_remarks, trend_texts
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
@@ -41,5 +41,6 @@ def trend(
         preload = estimate_preload(series.history, logbook.machine)
         texts = [] if as_json else trend_texts(machine_outlook, series, preload)
         emit(trend_json(machine_outlook, series, preload), as_json, *texts)
-    print_remarks([*machine_outlook.status.remarks, *logbook.remarks])
+    remarks = machine_outlook.status.remarks if as_csv or as_json else trend_remarks(machine_outlook)
+    print_remarks([*remarks, *logbook.remarks])
     raise Exit(int(machine_outlook.status.status is StatusLevel.ALARM))

@@ -16,6 +16,7 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 
 
@@ -28,7 +29,7 @@ def cut_summary_text(cut: CutEntry) -> str:
     """Return name, speed and depth of a test cut, its result, and its power."""
     named = cut.program or "reference cut"
     words = f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {cut_result_text(cut)}, by {cut.by}"
-    return words if cut.power is None else f"{words}; {power_text(cut.power, cut.cut)}"
+    return words if cut.power is None else f"{words}, {power_text(cut.power, cut.cut)}"
 
 
 def cut_result_text(cut: CutEntry) -> str:
@@ -84,21 +85,21 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
     """Return a remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
-    text = "was never tapped: the cut is kept, and counts when it is"
-    return [Remark("tool-not-tapped", cut.tool, text, f"tap it with: lobewatch tap {logbook.folder.path}")]
+    text = "no tap test yet, so that the test cut does not count"
+    return [Remark("tool-not-tapped", cut.tool, text, f"Tap it with lobewatch tap {logbook.folder.path}")]
 
 
 def contradiction_remark(cut: CutEntry) -> Remark:
-    """Return a remark that an earlier cut at the same point had another result."""
-    text = f"heard otherwise at the same point ({cut_summary_text(cut)}); both are kept"
-    cure = f"lobewatch exclude MACHINE {cut.id} --reason TEXT takes out the one that is wrong"
+    """Return a remark on an earlier cut with another result at the same point."""
+    text = f"contradicts another test cut at the same point ({cut_summary_text(cut)})"
+    cure = f"Exclude the wrong one, such as with lobewatch exclude MACHINE {cut.id} --reason TEXT"
     return Remark("cuts-contradict", cut.id, text, cure)
 
 
 VALUE_SCALES = {"frequency_hz": 1.0, "damping_ratio": 0.01, "stiffness_n_per_m": 1e6}
 """Size of the unit shown for each JSON key and CSV column of a value."""
 HISTORY_HEADINGS = (
-    ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
+    ("time", "entry", "tool", "axis", "frequency", "damping", "stiffness", "name"),
     ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
 )
 MIN_SHORT_NAME = 6
@@ -109,7 +110,7 @@ CONDITION_FORMATS = {
     "drawbar_kn": "drawbar {:g} kN",
     "hours": "{:g} h",
     "state": "state {}",
-    "reclamped": "clamped anew",
+    "reclamped": "reclamped",
     "note": "note: {}",
 }
 """Words for each condition of a tap test."""
@@ -158,11 +159,12 @@ def history_lines(logbook: Logbook) -> list[str]:
     cells = ([*_history_cells(entry), names[entry["id"]]] for entry in entries)
     lines = align_columns([*HISTORY_HEADINGS, *cells], numbers=(4, 5, 6))
     texts = ["", "", *map(_note_text, entries)]
-    return [part for line, text in zip(lines, texts, strict=True) for part in (line, f"  {text}") if part.strip()]
+    parts = (part for line, text in zip(lines, texts, strict=True) for part in (line, *wrap_lines([text])))
+    return [part for part in parts if part.strip()]
 
 
 def shorten_ids(ids: Sequence[str]) -> list[str]:
-    """Return the shortest end of each identity that no other identity contains, of six characters at least.
+    """Return the shortest end of each identity that no other identity contains, at least six characters.
 
     Commands accept it instead of the identity.
     """
@@ -232,15 +234,15 @@ def _excluded_json(tap: TapEntry) -> JsonObject:
 def _note_text(line: Mapping[str, Any]) -> str:
     """Return text or reason of an entry, or conditions, questions and verdicts of a tap test."""
     if "text" in line:
-        return f"{line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
+        return ", ".join(filter(None, (line["text"], line.get("reason"))))
     under = condition_texts(Conditions.from_mapping(line["conditions"]))
     if line["kind"] == "excluded":
-        return "; ".join([line["reason"], *under])
+        return ", ".join([line["reason"], *under])
     words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
-    return "; ".join([*under, *(f"question {code}" for code in line["questions"]), *words])
+    return ", ".join([*under, *(f"question {code}" for code in line["questions"]), *words])
 
 
 def condition_texts(conditions: Conditions) -> list[str]:
-    """Return a few words for each condition of a tap test that is specified."""
+    """Return a few words for each specified condition of a tap test."""
     given = conditions.specified
     return [words.format(given[name]) for name, words in CONDITION_FORMATS.items() if name in given]

@@ -14,7 +14,7 @@ from lobewatch.show.history import condition_texts
 from lobewatch.show.models import calibration_json
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
 from lobewatch.show.programs.advice import lobes_json
-from lobewatch.show.programs.verdicts import program_texts, verdict_json, verdict_table
+from lobewatch.show.programs.verdicts import CHECK_HINT, program_texts, verdict_json, verdict_table
 from lobewatch.show.terminal.output import JsonObject, Texts, emit, notes, pick, remark_lines
 from lobewatch.show.terminal.status_labels import status_label
 from lobewatch.tap.session import TapSession
@@ -75,7 +75,7 @@ def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:
 
 
 def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: bool, details: bool) -> None:
-    """Print what was stored and what it says; as JSON the last test. details: modes, model and doubt, too."""
+    """Print the stored tap tests and their results; as JSON the last test. details: modes, model, uncertainty, too."""
     for session in finished:
         measurement = session.measurement
         notes.print(*(f"saved {tap_id}\n" for tap_id in session.saved), sep="", end="")
@@ -100,6 +100,6 @@ def _result_texts(logbook: Logbook, finished: Sequence[TapSession], details: boo
     if details:
         texts += program_texts(logbook)
     elif verdicts := logbook.verdicts():
-        texts += [verdict_table(verdicts), "lobewatch check says what decides; --details shows modes, model and doubt"]
+        texts += [verdict_table(verdicts), CHECK_HINT, "Modes, model and uncertainty: --details"]
     standing = logbook.status()
-    return [*texts, f"{status_label(standing.status, standing.is_early)}  next: {standing.next_step}"]
+    return [*texts, f"{status_label(standing.status, standing.is_early)}  Next: {standing.next_step}"]

@@ -4,13 +4,14 @@ import json
 
 import numpy as np
 
+from acquisition.errors import join_sentences
 from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
 from lobewatch.measurement import ModelCalibration, ModelSummary
 from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 
 NODE_STIFFNESS_RATIO = 1e4
-"""Stiffness of a mode at the tip over the static one from which on the tip is a node of the mode."""
+"""Smallest ratio of modal to static stiffness at the tip if the tip is a node of the mode."""
 
 
 def calibration_json(calibration: Calibration) -> JsonObject:
@@ -58,7 +59,7 @@ def model_json(model: ModelSummary) -> JsonObject:
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> JsonObject:
-    """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for those that the modes leave open."""
+    """Return stiffnesses fitted to several modes (N/m, tilting N m/rad), NaN for undetermined ones."""
     is_fitted, std = [group not in fit.open_groups for group in fit.groups], fit.stiffness_std
     errors = None if std is None else np.where(is_fitted, std, np.nan)
     values = np.where(is_fitted, fit.stiffness, np.nan)
@@ -87,7 +88,7 @@ def model_calibration_json(calibration: ModelCalibration) -> JsonObject:
 
 
 def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
-    """Return what makes a model fit in words."""
+    """Return the stiffnesses and dampers that make a model fit, in words."""
     stiffness = calibration.stiffness
     preload = stiffness.remaining_preload if isinstance(stiffness, Calibration) else None
     parts = (stiffness, preload, calibration.dampers)
@@ -101,7 +102,7 @@ def model_texts(model: ModelSummary) -> Texts:
     table = new_table("mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)")
     for number, mode in enumerate(model.modes, 1):
         is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
-        stiffness = "at rest" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
+        stiffness = "node" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
         shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
         table.add_row(str(number), f"{mode.frequency:.2f}", stiffness, *shares)
     return [
@@ -115,7 +116,7 @@ def model_texts(model: ModelSummary) -> Texts:
 
 
 def tools_json(calibration: JointCalibration) -> JsonObject:
-    """Return the fit to several tools, what it rests on, and tools that it predicts."""
+    """Return the fit to several tools, its tap tests, and tools that it predicts."""
     fit = calibration.fit
     return {
         **stiffness_fit_json(fit),
@@ -130,25 +131,26 @@ def tools_json(calibration: JointCalibration) -> JsonObject:
 
 
 def tools_texts(calibration: JointCalibration) -> Texts:
-    """Return the fit to several tools in words, what it rests on, and tools that it predicts."""
+    """Return the fit to several tools in words, its tap tests, and tools that it predicts."""
     lines = [f"model: {calibration.label}"] if calibration.label else []
     for number, tap in enumerate(calibration.taps, 1):
-        lines.append(f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} is followed")
+        lines.append(f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.mode_number} followed")
     lines.append(str(calibration.fit))
     for tool, frequencies in calibration.unmatched.items():
         left_out = ", ".join(f"{frequency:.1f}" for frequency in frequencies)
-        lines.append(f"not counted: {left_out} Hz of tool {tool}, nothing of the model is near")
+        lines.append(f"not used: {left_out} Hz of tool {tool}, no mode of the model nearby")
     lines += [f"warning: {remark}" for remark in calibration.remarks]
     if calibration.joints:
         unsure = ", ".join(sorted(calibration.fit.open_groups))
-        caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
+        caution = f" (undetermined: {unsure}, use only with the others)" if unsure else ""
         lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
-        why = "the tools do not fit one spindle" if calibration.fit.has_misfit else "no measured mode feels the joints"
-        lines.append(f"{why}: nothing is to be written into machine.toml")
+        misfit = "The tools do not fit one spindle"
+        finding = misfit if calibration.fit.has_misfit else "No measured mode depends on the joints"
+        lines.append(join_sentences(finding, "Leave machine.toml as it is"))
     if not calibration.predicted or calibration.fit.has_misfit:
         return [*lines]
-    table = new_table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
+    table = new_table("~tool without tap test", "softest mode (Hz)", "K at the tip (N/um)")
     for name, mode in calibration.predicted.items():
         stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
         table.add_row(name, format_with_error(mode.frequency, mode.frequency_std), stiffness)

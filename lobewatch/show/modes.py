@@ -18,9 +18,9 @@ MIN_SHOWN_PHASE = 1.0
 """Smallest phase of a modal constant that is shown (degrees)."""
 MIN_SHOWN_CORRELATION = 0.5
 """Smallest correlation of errors that is shown."""
-FOUND_AGAIN_NOTE = "again: how many of the other measurements have it within 0.5 %"
-"""Line below a table with the column "again"."""
-ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
+MATCHES_NOTE = "matches: other measurements with this mode within 0.5 %"
+"""Line below a table with the column "matches"."""
+ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "assumed"}
 """Words for the origin of a fact on a file."""
 NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
@@ -62,19 +62,19 @@ def sort_modes(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
-    """Return a table of modes, each value ± its standard error, with a mark on those that are not trusted.
+    """Return a table of modes, each value ± its standard error, with a mark on modes that are not trusted.
 
-    The phase and how many other FRFs have the mode are columns only where there is something to show.
+    The phase and the number of other FRFs with the mode are columns only if some mode has them.
     """
     with_phase = any(abs(mode.phase_deg) > MIN_SHOWN_PHASE for mode in modes)
     with_matches = any(mode.match_count for mode in modes)
-    headings = [*(["phase (deg)"] if with_phase else []), *(["again"] if with_matches else [])]
-    table = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
+    headings = [*(["phase (deg)"] if with_phase else []), *(["matches"] if with_matches else [])]
+    table = new_table("fn (Hz)", "zeta (%)", "K (N/um)", *headings, "<")
     percents = False, False, not with_phase
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness), mode.standard_error, (1.0, 0.01, 1e6), percents
         texts = [
-            "not known" if math.isnan(value) else format_with_error(value, std, scale, percent=percent)
+            "unknown" if math.isnan(value) else format_with_error(value, std, scale, percent=percent)
             for value, std, scale, percent in zip(*values, strict=True)
         ]
         phase = format_with_error(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
@@ -87,10 +87,10 @@ def mode_table(modes: Sequence[Mode]) -> Table:
 def mode_notes(modes: Sequence[Mode]) -> list[str]:
     """Return lines below a table of modes: source of ±, matches, correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
-    how = "jackknife" if all(mode.has_stiffness for mode in modes) else "by how each moves the fit"
+    how = "jackknife" if all(mode.has_stiffness for mode in modes) else "from the influence of each hit"
     lines = [f"± is the standard error over the {hits} hits ({how}, {hits - 1} degrees of freedom)"] if hits else []
-    lines += [FOUND_AGAIN_NOTE] if any(mode.match_count for mode in modes) else []
-    for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
+    lines += [MATCHES_NOTE] if any(mode.match_count for mode in modes) else []
+    for (i, j), names in (((0, 1), "fn and zeta"), ((0, 2), "fn and K"), ((1, 2), "zeta and K")):
         of = [(mode.correlation[i, j], mode.frequency) for mode in modes]
         high = [f"{value:+.2f} ({at:.0f} Hz)" for value, at in of if abs(value) > MIN_SHOWN_CORRELATION]
         if high:
@@ -104,7 +104,7 @@ def mode_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[
 
 
 def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
-    """Return a line for each code of a remark: that of the first mode, and which other modes have one alike."""
+    """Return a line for each code of a remark: that of the first mode, and the other modes with the same code."""
     by_code: dict[str, list[Remark]] = {}
     for remark in (*(remark for mode in modes for remark in mode.remarks), *remarks):
         by_code.setdefault(remark.code, []).append(remark)
@@ -112,7 +112,7 @@ def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> li
     for same in by_code.values():
         first, *others = map(str, merged := merge_remarks(same))
         about = ", ".join(remark.about for remark in merged[1:])
-        lines += [f"{first} (the like of {about})"] if about else [first, *others]
+        lines += [f"{first} (also {about})"] if about else [first, *others]
     return lines
 
 
@@ -121,13 +121,13 @@ def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
     count = Counter(assess_trust(mode) for mode in modes)
     counts = ", ".join(f"{count[trust]} {trust}" for trust in Trust)
     looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
-    hints = [] if looked else ["--beside looks for them in other measurements"]
-    hints = hints if everything or not modes else ["--all shows each, with every remark", *hints]
-    return counts + (f" ({'; '.join(hints)})" if hints else "")
+    hints = [] if looked else ["compare with other files: --beside"]
+    hints = hints if everything or not modes else ["all modes and remarks: --all", *hints]
+    return counts + (f" ({', '.join(hints)})" if hints else "")
 
 
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
-    """Return which modes are no driving point, and the rules by which modes are doubtful or rejected."""
+    """Return the modes without a driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
     lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in (Trust.DOUBTFUL, Trust.REJECTED):
@@ -138,13 +138,13 @@ def trust_reasons(modes: Sequence[Mode]) -> list[str]:
 
 
 def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
-    """Return a table of modes by peak picking, and how far each is from the nearest fitted mode."""
-    table = new_table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    """Return a table of modes by peak picking, with the difference of each from the nearest fitted mode."""
+    table = new_table("fn (Hz)", "zeta (%)", "K (N/um)", "<difference from the fit")
     for mode in picked:
         fit, difference = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None), "not fitted"
         if fit is not None and abs(fit.frequency - mode.frequency) < mode.damping_ratio * mode.frequency:
             zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
-            difference = f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+            difference = f"fn {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
         stiffness = format_rounded(mode.stiffness, scale=1e6, digits=5)
         table.add_row(f"{mode.frequency:.5g}", f"{100 * mode.damping_ratio:.5g}", stiffness, difference)
     return table
@@ -197,4 +197,4 @@ def _frf_text(file_modes: FileModes) -> str:
 def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGIN_WORDS)) -> list[str]:
     """Return the facts on a file, a line for each origin."""
     texts = {origin: [f"{fact.name} {fact.value}" for fact in facts if fact.origin == origin] for origin in origins}
-    return [f"{ORIGIN_WORDS[origin]}: {'; '.join(words)}" for origin, words in texts.items() if words]
+    return [f"{ORIGIN_WORDS[origin]}: {', '.join(words)}" for origin, words in texts.items() if words]

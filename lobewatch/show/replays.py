@@ -23,7 +23,7 @@ from lobewatch.show.programs.verdicts import program_texts, verdict_json
 from lobewatch.show.terminal.output import JsonObject, Texts, emit, new_table, notes, remark_lines
 from modal import Mode
 
-REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "working out"}
+REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "evaluating"}
 """Names of the steps of a replay."""
 
 
@@ -57,15 +57,15 @@ MAX_PREVIEWS_IN_FULL = 6
 
 
 def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, as_json: bool) -> None:
-    """Print what would become of files; passed: other files of the folders. Raise DataError for unusable files."""
+    """Print a preview of a replay; passed: other files of the folders. Raise DataError for unusable files."""
     payload = {"dry_run": True, "files": [*map(preview_json, previews)], "passed_over": [*map(str, passed)]}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     if refused := sum(bool(preview.rejection) for preview in previews):
-        raise DataError(f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above")
+        raise DataError(f"{refused} of {len(previews)} file(s) cannot be used. See the reasons above.")
 
 
 def preview_json(preview: ReplayPreview) -> JsonObject:
-    """Return what would become of one file."""
+    """Return the preview of one file."""
     recording, tap, measurement = preview.recording, preview.tap, preview.measurement
     status = {"file": str(preview.file), "known": preview.stored_tap_id, "refused": preview.rejection}
     if measurement is None or tap is None or recording is None:
@@ -99,13 +99,13 @@ def preview_texts(previews: Sequence[ReplayPreview]) -> Texts:
 
 
 def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
-    """Return how many files would be stored, are known, rejected and passed over."""
+    """Return how many files would be stored, are known, rejected and ignored."""
     fresh = sum(preview.tap is not None for preview in previews)
     n_known = sum(bool(preview.stored_tap_id) for preview in previews)
     refused = sum(bool(preview.rejection) for preview in previews)
-    passed = f", {n_passed} other files in the folders passed over" if n_passed else ""
+    passed = f", {n_passed} other files ignored" if n_passed else ""
     count = f"{fresh} of {len(previews)} file(s) would be stored, {n_known} stored already, {refused} cannot be used"
-    return f"{count}{passed}; nothing is stored (--dry-run)"
+    return f"{count}{passed}. Nothing was stored (--dry-run)."
 
 
 def _preview_lines(preview: ReplayPreview) -> list[str]:
@@ -118,7 +118,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
     followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
     details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
-    details += [f"followed: {followed}", *(questions or ["plausible for this machine: nothing would be asked"])]
+    details += [f"followed: {followed}", *(questions or ["plausible for this machine, no questions"])]
     words = Counter(flags.words for flags in preview.tap.flags)
     hits = f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
     kind = hits if preview.tap.hits else "an FRF"
@@ -135,12 +135,12 @@ def _mode_text(mode: Mode) -> str:
 def _preview_row(preview: ReplayPreview) -> list[str]:
     measurement, tap = preview.measurement, preview.tap
     if measurement is None or tap is None:
-        return ["", "", "", "", "stored already" if preview.stored_tap_id else "refused", preview.file.name]
+        return ["", "", "", "", "stored already" if preview.stored_tap_id else "rejected", preview.file.name]
     asked = find_open_questions(measurement.remarks)
     good = f"{len(tap.accepted)}/{len(tap.hits)}" if tap.hits else "FRF"
     frequency = "" if measurement.followed is None else f"{measurement.followed.frequency:.2f}"
     series, day = f"{measurement.tool} {measurement.direction}", f"{measurement.time:%Y-%m-%d}"
-    return [day, series, good, frequency, "asked about" if asked else "plausible", preview.file.name]
+    return [day, series, good, frequency, "question" if asked else "plausible", preview.file.name]
 
 
 def _preview_notes(previews: Sequence[ReplayPreview]) -> list[str]:
@@ -176,11 +176,11 @@ MAX_KNOWN_LISTED = 3
 def emit_replay(
     outcome: ReplayOutcome, logbook: Logbook, n_files: int, passed: Sequence[Path], codes: Sequence[str], as_json: bool
 ) -> None:
-    """Print what has become of files; passed: other files of the folders; codes: of questions answered."""
+    """Print the outcome of a replay; passed: other files of the folders; codes: of questions answered."""
     known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
     if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
         known = [f"{len(known)} of {n_files} files are stored already"]
-    known += [f"passed over: {len(passed)} other files, such as {passed[0].name}"] if passed else []
+    known += [f"ignored: {len(passed)} other files, such as {passed[0].name}"] if passed else []
     for line in known:
         notes.print(line, markup=False)
     if as_json:
@@ -191,7 +191,7 @@ def emit_replay(
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
-    """Return all tap tests that were stored, and the files that were known already or rejected."""
+    """Return all new tap tests, and the files that were known already or rejected."""
     stored = outcome.new_tap_ids
     return {
         "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored],
@@ -213,9 +213,9 @@ def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
         asked = {row.tap_id: row.questions for row in rows}
         texts.append(_series_table([row for row in rows if row.tap_id in set(stored)]))
         questions = question_remarks(asked, logbook.folder.path, [tap_id for tap_id in stored if tap_id in asked])
-        texts += [f"asked of {question.finding}" for question in questions]
+        texts += [f"question on {question.finding}" for question in questions]
     if outcome.assumed_facts:
-        texts.append(f"taken where the files do not say: {', '.join(outcome.assumed_facts)}")
+        texts.append(f"assumed, not in the files: {', '.join(outcome.assumed_facts)}")
     return [*texts, *(program_texts(logbook) if stored else [])]
 
 
@@ -257,8 +257,8 @@ def rebuild_json(rebuild: MachineRebuild) -> JsonObject:
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
-    made = f"made anew from {rebuild.n_taps} tap test(s)"
-    missing = "not made anew (see above); the next command that can write makes it"
+    made = f"rebuilt from {rebuild.n_taps} tap test(s)"
+    missing = "not rebuilt, see above. The next command with write access rebuilds it."
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), f"history.rows: {made if rebuild.is_saved else missing}"]
 
 

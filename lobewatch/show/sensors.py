@@ -1,4 +1,4 @@
-"""Show serial ports and the devices that answer, their sensors with checks, and what was found of the computer."""
+"""Show serial ports with their devices, sensors with checks, and findings on the computer."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,16 +9,17 @@ from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPo
 from dsm import format_with_error
 from lobewatch.sensors.computer_check import Finding
 from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
-from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 
-NO_ANSWER_TEXT = (
-    "No DAQ answers. One that was just plugged in may need some seconds; a DATAQ device must blink yellow (CDC mode)."
+NO_ANSWER_TEXTS = (
+    "No DAQ answers. Wait a few seconds after plugging it in, then try again.",
+    "A DATAQ device must blink yellow (CDC mode).",
 )
 
 
 def ports_texts(scan: PortScan) -> Texts:
     """Return a table of the ports, their problems, and the next step."""
-    remarks = [f"{remark}." for remark in scan.remarks]
+    remarks = [*map(str, scan.remarks)]
     if not scan.ports:
         return [explain_no_ports(), *remarks]
     headings = "<port", "<VID:PID", "<serial number", "<description", "<answer"
@@ -28,7 +29,7 @@ def ports_texts(scan: PortScan) -> Texts:
         for port in [scanned.port]
     )
     problems = [scanned.problem for scanned in scan.ports if scanned.problem]
-    return [new_table(*headings, rows=rows), *problems, *remarks, _ports_summary(scan.ports)]
+    return [new_table(*headings, rows=rows), *problems, *remarks, *_ports_summary(scan.ports)]
 
 
 def _usb_id(port: PortInfo) -> str:
@@ -36,7 +37,7 @@ def _usb_id(port: PortInfo) -> str:
 
 
 def ports_json(scan: PortScan) -> JsonObject:
-    """Return every port with the device that answers, and what is wrong with drivers."""
+    """Return every port with its device, and the problems of drivers."""
     return {"ports": list(map(_port_json, scan.ports)), "remarks": scan.remarks}
 
 
@@ -61,14 +62,14 @@ def _answer_text(scanned: ScannedPort) -> str:
     return ", ".join(filter(None, words))
 
 
-def _ports_summary(ports: tuple[ScannedPort, ...]) -> str:
+def _ports_summary(ports: tuple[ScannedPort, ...]) -> Sequence[str]:
     """Return how many devices answer, and the next step."""
     answering = [(listed.port.device, listed.answer.driver) for listed in ports if listed.answer]
     if not answering:
-        return NO_ANSWER_TEXT
+        return NO_ANSWER_TEXTS
     port, driver = answering[0]
-    following = f'lobewatch tap MACHINE --port {port}, with driver = "{driver}" in [daq] of its machine.toml'
-    return f"{len(answering)} of {len(ports)} answer; next: {following}"
+    following = f'write driver = "{driver}" in [daq] of machine.toml, then lobewatch tap MACHINE --port {port}'
+    return f"{len(answering)} of {len(ports)} ports answer", f"Next: {following}"
 
 
 def sensors_json(sensors: SensorList) -> JsonObject:
@@ -127,16 +128,26 @@ def sensors_texts(sensors: SensorList) -> Texts:
     """Return the device in words, a table of its channels, its sample rate, and warnings."""
     measured = sensors.measured_rate
     rate = "not measured" if measured is None else f"measured {format_with_error(measured.rate, measured.std)} Hz"
-    rate += ", which is worked with" if sensors.replaces_nominal else ""
+    rate += " (used)" if sensors.replaces_nominal else ""
     return [
-        f"{sensors.identity.model}, serial number {sensors.identity.serial or 'not known'}",
+        f"{sensors.identity.model}, serial number {sensors.identity.serial or 'unknown'}",
         new_table(*CHANNEL_HEADINGS, rows=(_channel_cells(i, channel) for i, channel in enumerate(sensors.channels))),
         f"rate: {sensors.nominal_rate:g} Hz, {rate}",
         *(f"{'error' if remark in sensors.errors else 'warning'}: {remark}" for remark in sensors.remarks),
     ]
 
 
-CHANNEL_HEADINGS = "no", "<quantity", "sensitivity", "range", "input", "bits", "skew\n(us)", "~serial", "<calibrated"
+CHANNEL_HEADINGS = (
+    "channel",
+    "<quantity",
+    "sensitivity",
+    "range",
+    "input",
+    "bits",
+    "skew\n(us)",
+    "~serial",
+    "<calibrated",
+)
 
 
 def _channel_cells(number: int, channel: Channel) -> list[str]:
@@ -149,7 +160,7 @@ def _channel_cells(number: int, channel: Channel) -> list[str]:
 
 
 def mass_check_texts(check: MassCheck) -> list[str]:
-    """Return the result of the mass check, and what to change where."""
+    """Return the result of the mass check, and the change to make."""
     ratio = check.calibration.ratio
     if check.calibration.sizes_agree:
         return [str(check.calibration)]
@@ -157,20 +168,20 @@ def mass_check_texts(check: MassCheck) -> list[str]:
     if check.place is not None:
         force, acceleration = f"{check.place.sensitivity} of the force channel", "that of the acceleration channel"
         place = check.place.place
-    change = f"To change in {place}: multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}."
+    change = f"In {place}, multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}"
     return [str(check.calibration), change]
 
 
 def skew_check_texts(check: SkewCheck) -> list[str]:
-    """Return the skew, and where to enter it."""
+    """Return the skew, and the line to enter."""
     skew, channel = check.measured, check.channel
     entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
     if check.place is not None:
         entry = f"{check.place.skew} = {skew.skew:.3e} in {check.place.place}"
     return [
         f"channel 1 ({channel.quantity}) is sampled {format_with_error(skew.skew, skew.std, 1e-6)} us "
-        f"({skew.skew * check.sample_rate:.4f} samples) after channel 0; entered is {channel.skew * 1e6:.3f} us",
-        f"To enter: {entry}; 0 for channel 0",
+        f"({skew.skew * check.sample_rate:.4f} samples) after channel 0 (entered: {channel.skew * 1e6:.3f} us)",
+        f"Enter {entry}, and 0 for channel 0",
     ]
 
 
@@ -184,8 +195,8 @@ def findings_texts(findings: Sequence[Finding]) -> Texts:
     """Return a table of the findings with their remedies, and a count."""
     marks = {"fine": "✓", "note": "·", "hinders": "✗"}
     rows = ((marks[item.state], *map(escape, (item.subject, item.text, item.cure))) for item in findings)
-    table = new_table("<", "<what", "~there is", "~what to do", rows=rows)
+    table = new_table("<", "<item", "~finding", "~remedy", rows=rows)
     count = Counter(finding.state for finding in findings)
     hinder, notes = count["hinders"], count["note"]
-    end = f"{hinder} of {len(findings)} stand in the way of a tap test" if hinder else "Nothing stands in the way"
-    return [table, f"{end}; {notes} worth knowing" if notes else end]
+    end = f"{hinder} of {len(findings)} findings prevent a tap test" if hinder else "No finding prevents a tap test"
+    return [table, f"{end} ({count_noun(notes, 'note')})" if notes else end]

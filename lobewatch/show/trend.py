@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from acquisition import Remark
+from acquisition.errors import join_sentences
 from dsm import RemainingPreload, format_with_error
 from lobewatch.arrays import Floats, Indices
 from lobewatch.logbook.machine_forecast import MachineForecast
@@ -15,13 +17,16 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
+from lobewatch.show.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
 
 FORECAST_ASSUMPTIONS = (
-    "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
-    " visible, and one time in three or four a fall that slows down or grows exponentially."
+    "Dates assume unchanged use of the machine, without crashes or new faults. "
+    "One forecast in three or four misses a drop that slows down or grows exponentially."
 )
 """Note below every table of forecast dates."""
+TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")
+"""Codes of remarks that the trend of a machine contains."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
 
@@ -63,16 +68,23 @@ def trend_csv(series: SeriesStatus) -> str:
 
 
 def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> Texts:
-    """Return chart, sentence and forecast dates, and the change of the other series."""
+    """Return chart, facts and forecast dates of a series, the change of the other series, and the next step."""
     if series.trend is None:
-        return [f"{series.name}: no tap test that others can be compared with"]
-    texts: Texts = [*chart_lines(series.trend), trend_sentence(series)]
-    texts += [] if preload is None else [str(preload)]
-    dates = new_table("~what", "~becomes doubtful", "~is not stable", rows=forecast_date_rows(outlook))
+        return [f"{series.name}: no tap test to compare others with"]
+    facts = [*_trend_facts(series), *([] if preload is None else [str(preload)])]
+    texts: Texts = [*chart_lines(series.trend), f"{series.name}:", *wrap_lines(facts)]
+    texts += [
+        f"{other.name}: {change_since_start_text(other)}" for other in outlook.status.series if other is not series
+    ]
+    dates = new_table("~program or limit", "~doubtful", "~not stable", rows=forecast_date_rows(outlook))
     why_none = no_dates_text(outlook)
-    texts += [why_none] if why_none else [dates, FORECAST_ASSUMPTIONS]
-    others = (other for other in outlook.status.series if other is not series)
-    return [*texts, *(f"{other.name}: {change_since_start_text(other)}" for other in others)]
+    texts += [why_none] if why_none else [dates, *wrap_lines([FORECAST_ASSUMPTIONS], "")]
+    return [*texts, *wrap_lines([f"Next: {outlook.status.next_step}"], "")]
+
+
+def trend_remarks(outlook: MachineForecast) -> list[Remark]:
+    """Return the remarks on a machine that its trend in words does not contain."""
+    return [remark for remark in outlook.status.remarks if remark.code not in TREND_CODES]
 
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
@@ -80,39 +92,45 @@ def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     now, rows = outlook.status.time, list[tuple[str, str, str]]()
     for name, fate in outlook.programs.items():
         dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
-        rows.append((name, *(("unknown now, see check",) * 2 if name in outlook.unknown_programs else dates)))
+        rows.append((name, *(("unknown, see check",) * 2 if name in outlook.unknown_programs else dates)))
     return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
 
 
 def no_dates_text(outlook: MachineForecast) -> str:
-    """Return why no date can be forecast; empty where one can, or where all limits are reached already."""
+    """Return the reason for no forecast; empty if there is one, or if all limits are reached already."""
     reaches = [reach for fate in outlook.programs.values() for reach in (fate.doubtful, fate.not_stable)]
     reaches += [reach for _, reach in outlook.limits]
     if any(reach.forecast_end is not None for reach in reaches) or all(reach.is_measured for reach in reaches):
         return ""
     points = max((len(series.trend.points) for series in outlook.status.series if series.trend), default=0)
     if points >= MIN_FORECAST_POINTS:
-        return "No dates: what was tapped lies too far back to foretell from it."
-    there = f"there {'is' if points == 1 else 'are'} {points}"
-    return f"No dates yet: a forecast needs {MIN_FORECAST_POINTS} points, {there}."
+        return "No forecast: the last tap tests are too old. Tap again."
+    return f"No forecast yet: it needs {MIN_FORECAST_POINTS} points, and this series has {points}."
 
 
 def trend_sentence(series: SeriesStatus) -> str:
-    """Return the trend of the series in a sentence."""
+    """Return the trend of the series in sentences, without the last full stop."""
+    first, *others = _trend_facts(series)
+    return f"{series.name}: {join_sentences(first, *map(capitalize, others))}".removesuffix(".")
+
+
+def _trend_facts(series: SeriesStatus) -> list[str]:
+    """Return change, trend and scatter of a series."""
     trend = series.trend
     if trend is None:
-        return f"{series.name}: unknown"
+        return ["unknown"]
     n = len(trend.points)
-    text = f"{series.name}: {change_since_start_text(series)}{f' ({n} points)' if n > 1 else ''}"
+    change = f"{change_since_start_text(series)}{f' ({n} points)' if n > 1 else ''}"
     if trend.forecast is None:
         known = trend.readings.scatter_prior.single
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
-        fits = "; ± of the fits alone, remounting is not in it" if n > 1 else ""
-        return f"{text}{fits}; an alarm can ring from {least}"
+        fits = ["± is the error of the fits, without the scatter from reclamping"] if n > 1 else []
+        return [change, *fits, f"alarms are possible from {least}"]
     score = f"from {MIN_MONITORED_POINTS} points on"
     if math.isfinite(trend.detection.scores[-1]):
-        score = f"{trend.detection.scores[-1]:.1f} (alarm at {SURE_CHANGE_SCORE:g} twice)"
-    return f"{text}; {trend_text(trend)}; scatter {trend.spread:.2f} %, score {score}; {rate_text(trend)}"
+        score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more twice)"
+    course = ", ".join(filter(None, (trend_text(trend), rate_text(trend))))
+    return [change, course, f"scatter {trend.spread:.2f} %, change score {score}"]
 
 
 def rate_text(trend: Trend) -> str:
@@ -129,7 +147,7 @@ def rate_text(trend: Trend) -> str:
 def change_since_start_text(series: SeriesStatus) -> str:
     """Return the frequency change since the series started."""
     if series.is_baseline:
-        return "first test, nothing to compare it with yet"
+        return "first test, no comparison yet"
     return f"frequency {change_text(series)} since the first tests" if series.drop.is_known else "unknown"
 
 
@@ -140,18 +158,21 @@ def change_text(series: SeriesStatus) -> str:
 
 
 def trend_text(trend: Trend) -> str:
-    """Return since when the frequency drops, or else the shape that fits best; empty below 8 points."""
+    """Return the date from which the frequency drops, or else the best shape; empty below 8 points."""
     fallen, since = trend.open_drop, trend.drop_since
     if fallen is not None and since is not None:
-        course = f"{'fell at once before' if fallen.change.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
-        return f"{course}, settling" if trend.is_run_in else course
+        course = f"{'dropped at once before' if fallen.change.kind == 'step' else 'dropping since'} {since:%Y-%m-%d}"
+        return f"{course}, slower now (run-in)" if trend.is_run_in else course
     if trend.likeliest_shape is None or trend.forecast is None:
         return ""
     return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
 
 
 def _shape_text(shape: TrendShape, falls: bool) -> str:
-    since, goes, went = f"{date_of_days(shape.start):%Y-%m-%d}", *(("falling", "fell") if falls else ("rising", "rose"))
+    since, goes, went = (
+        f"{date_of_days(shape.start):%Y-%m-%d}",
+        *(("dropping", "dropped") if falls else ("rising", "rose")),
+    )
     steadily = f"{goes} steadily since {since}"
     words = {
         "none": "steady",
@@ -160,11 +181,11 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
         "step": f"{went} once before {since}, steady since",
         "slopes": f"{goes} at another rate since {since}",
         "breaks": f"{goes} at another rate since {since}",
-        "crash": f"{went} at once before {since}, {goes} beside that",
-        "wander": f"{goes} by fits and starts",
-        "bend": f"{goes} at a rate that changes",
+        "crash": f"{went} at once before {since}, also {goes} steadily",
+        "wander": f"{goes} irregularly",
+        "bend": f"{goes} at a changing rate",
     }
-    return words.get(shape.kind, f"{goes}, {'faster and faster' if shape.accelerates else 'ever more slowly'}")
+    return words.get(shape.kind, f"{goes} {'faster and faster' if shape.accelerates else 'more and more slowly'}")
 
 
 def reach_text(reach: ThresholdDates, now: datetime) -> str:
@@ -179,7 +200,7 @@ def reach_text(reach: ThresholdDates, now: datetime) -> str:
     if reach.latest is None:
         return f"not before {_day_or_now(reach.earliest, today)}"
     if reach.latest <= today:
-        return f"by now, at this rate (probably {date_of_days(reach.probable or today):%Y-%m-%d})"
+        return f"by now at this rate (probably {date_of_days(reach.probable or today):%Y-%m-%d})"
     days = reach.earliest, reach.probable or today, reach.latest
     earliest, probable, latest = (_day_or_now(day, today) for day in days)
     return f"between {earliest} and {latest} (80 %), probably {probable}"

@@ -8,14 +8,14 @@ from matplotlib.axes import Axes
 
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.show.cuts.recorded_cuts import cut_verdict_text
+from lobewatch.show.cuts.recorded_cuts import cut_verdict_label
 from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
 
 LINE_KIND_MARKS = {
-    "turns": ("turns of the spindle", Paint.FIRST, "|"),
+    "turns": ("spindle harmonics", Paint.FIRST, "|"),
     "tooth": ("tooth passing", Paint.NEWEST, "o"),
-    "air": ("there in air", Paint.EVENT, "x"),
+    "air": ("also in air", Paint.EVENT, "x"),
     "chatter": ("chatter", Paint.ALARM, "D"),
 }
 """Label, grey-safe mark and paint of each kind of spectral line."""
@@ -24,7 +24,7 @@ MIN_SHOWN_AMPLITUDE = 1e-4
 
 
 def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
-    """Plot amplitude over frequency to a file, a panel for each cut; only its title where there is no spectrum."""
+    """Plot amplitude over frequency to a file, a panel for each cut; only its title without a spectrum."""
     figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
     for axis, comparison in zip(axes, comparisons, strict=True):
         _draw_spectrum(axis, comparison)
@@ -35,8 +35,7 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
-    word = cut_verdict_text(comparison).partition(":")[0]
-    axis.set_title(f"{named}: {word}", loc="left", fontsize=11, fontweight="bold")
+    axis.set_title(f"{named}: {cut_verdict_label(comparison)}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
     if spectrum is None:
         return
@@ -48,7 +47,7 @@ def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
         axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
     tool = comparison.assembly
     for direction, modes, dashes in () if tool is None else (("x", tool.x, ":"), ("y", tool.y, "--")):
-        label = f"modes in {direction}, at rest"
+        label = f"modes in {direction} (not rotating)"
         for mode in modes or ():
             axis.axvline(mode.frequency, color=Paint.GOOD, ls=dashes, lw=1, label=label)
             label = ""

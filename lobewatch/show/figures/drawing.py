@@ -41,10 +41,9 @@ FIGURE_STYLE: dict[Any, Any] = {
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure in the format of its file ending. ValueError for an unknown ending."""
+    """Write a figure in the format of its file ending. ValueError for an unsupported ending."""
     if path.suffix.lower() not in (".svg", ".png", ".pdf"):
-        cure = "name a file that ends in .svg, .png or .pdf"
-        raise ValueError(f"{path}: a picture cannot end in {path.suffix!r}; {cure}")
+        raise ValueError(f"{path}: unsupported file type {path.suffix!r}. Use .svg, .png or .pdf.")
     _disable_math_text(figure)
     with mpl.rc_context(FIGURE_STYLE):
         figure.savefig(path, dpi=150)
@@ -111,7 +110,7 @@ class LabelPlacer:
         self._taken: list[Bbox] = []
 
     def add(self, text: str, place: Point, color: str = "black", sides: Sequence[LabelSide] = (*LABEL_SIDES,)) -> None:
-        """Add a label at the side of a point where it covers least, the first of several equal sides."""
+        """Add a label at the side of a point that has most room, the first of several equal sides."""
         boxes = {side: self._box(text, place, side) for side in sides}
         best = min(boxes, key=lambda side: self._covered(boxes[side]))
         if self._may_lack and self._covered(boxes[best]) > MAX_HIDDEN_SHARE * _area(boxes[best]):
@@ -123,11 +122,11 @@ class LabelPlacer:
         self._axes.annotate(text, place, (LABEL_DISTANCE * right, LABEL_DISTANCE * 2 / 3 * up), color=color, **style)
 
     def reserve_area(self, low: Point, high: Point) -> None:
-        """Keep labels out of the rectangle between two corners where they have a choice."""
+        """Keep labels out of the rectangle between two corners if there is another place."""
         self._taken.append(Bbox.from_extents(*self._points(low), *self._points(high)))
 
     def reserve_mark(self, place: Point, size: float) -> None:
-        """Keep labels off a mark of this size (points) where they have a choice."""
+        """Keep labels off a mark of this size (points) if there is another place."""
         x, y = self._points(place)
         self._taken.append(Bbox.from_extents(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
 

@@ -16,6 +16,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from acquisition import DataError, Remark
+from acquisition.errors import join_sentences
 from lobes import Cut, RadialLobes, StabilityLobes, radial_lobes
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.program_learning import LobesAtSpeed, compute_lobes_at_speed
@@ -32,7 +33,7 @@ from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 
 DEPTH_COLORMAP = "cividis"
 """Colormap of depth: dark is shallow, bright is deep, in grey too."""
-BAND_LABEL = "what is not known of spindle and cut moves the limit within this band"
+BAND_LABEL = "uncertainty band (98 %): spindle and cutting data"
 VERDICT_MARKS = {
     Stability.STABLE: (Paint.GOOD, "o"),
     Stability.DOUBTFUL: ("#B58900", "^"),
@@ -46,10 +47,10 @@ LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (6.4, 4.4)
 """Size of a separate diagram, and of the one in the report (inches)."""
 MAP_LEVELS = 12
 """Number of levels of a map."""
-DEPTH_SCALE_LABEL = "limiting depth (mm); brightest: this or more"
+DEPTH_SCALE_LABEL = "limiting depth ap (mm), brightest: this or more"
 MAX_DAYS_WITH_TIME = 10.0
 """Longest range that is labelled with times, not only with dates (days)."""
-TEST_CUT_MARKS = {False: ("heard stable", Paint.GOOD, "o"), True: ("heard to chatter", Paint.ALARM, "x")}
+TEST_CUT_MARKS = {False: ("test cut, stable", Paint.GOOD, "o"), True: ("test cut, chatter", Paint.ALARM, "x")}
 """Label, paint and mark of stable cuts and of cuts with chatter, wide and hollow."""
 TEST_CUT_MARK_SIZE, PROGRAM_MARK_SIZE = 11.0, 9.0
 """Size of the marks of test cuts and of programs (points)."""
@@ -105,7 +106,7 @@ def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False)
     if diagram.learned is not None:
         _draw_learned(axes, diagram.learned, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
+    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth ap (mm)")
     _draw_marks(axes, diagram)
     figure.legend(loc="outside lower center", ncols=1 if is_small else 2, frameon=False, fontsize=9)
     lay_out(figure)
@@ -146,8 +147,8 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
     if lobes.remarks:
-        figure.supxlabel(fill("; ".join(map(str, lobes.remarks)), 120), fontsize=8)
-    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth (mm); dashed: now")
+        figure.supxlabel(fill(join_sentences(*map(str, lobes.remarks)), 120), fontsize=8)
+    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth ae (mm), dashed: this cut")
     axes.grid(visible=False)
     return figure
 
@@ -167,8 +168,8 @@ def _map_limit(depth: Floats) -> float:
 
 def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     """Draw the line and the band of the rotating spindle, clipped at the deepest depth (mm)."""
-    label = f"at speed, learnt from {count_noun(learnt.n_cuts, 'test cut')}"
-    left = "98 % of what test cuts have left open"
+    label = f"at speed, learned from {count_noun(learnt.n_cuts, 'test cut')}"
+    left = "uncertainty band (98 %) after test cuts"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)
     axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
@@ -184,7 +185,9 @@ def _draw_marks(axes: Axes, diagram: LobeDiagram) -> None:
     style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
     for i, pocket in enumerate(diagram.pockets):
         (low, high), depth = pocket.window_rpm, pocket.depth_mm
-        axes.add_patch(Rectangle((low, 0), high - low, depth, label="" if i else "safe speeds and depths", **style))
+        axes.add_patch(
+            Rectangle((low, 0), high - low, depth, label="" if i else "recommended speeds and depths", **style)
+        )
     for program in diagram.verdicts:
         paint, symbol = VERDICT_MARKS[program.stability]
         place = program.program.speed_rpm, program.program.depth_mm
@@ -285,9 +288,9 @@ def plot_series_waterfall(logbook: Logbook, now: LobeChart) -> Figure:
     diagrams = [(row.time, compute_row_lobes(row, logbook.machine, [cut]).get(cut)) for row in shown]
     limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
     if not limits:
-        raise DataError(f"--waterfall shows measured lobes; no tap test with tool {tool!r} has any of {cut!r}")
+        raise DataError(f"--waterfall: no measured lobes of {cut!r} with tool {tool!r}")
     times, depths = zip(*limits, strict=True)
-    title = f"{logbook.machine.machine.name}: {cut}\nzero order"
+    title = f"{logbook.machine.machine.name}: {cut}\nzero-order approximation"
     return plot_waterfall(speed_grid(logbook.machine), times, np.stack(depths), title)
 
 

@@ -115,7 +115,7 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
     for frequency, place in zip(others, places, strict=True):
         text, style = _frequency_text(frequency), {"fontsize": 7, "color": Paint.NEWEST, **VERTICAL_LABEL}
         axes.annotate(text, (place, ORDER_AXIS_TOP), **style)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
+    axes.set(xlabel="frequency (Hz), grey: fitted bands, blue: stable pole without a mode, ?: doubtful, -: rejected")
     axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
     axes.yaxis.set_major_locator(MultipleLocator(2))
     axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
@@ -215,14 +215,14 @@ def _radius_at(spindle: Spindle, position: float) -> float:
 
 
 def draw_shapes(axes: Axes, modes: Modes) -> None:
-    """Draw the deflection of each mode over its largest one, positive at the tip."""
+    """Draw the deflection of each mode over its maximum, positive at the tip."""
     for number, (colour, dashes) in zip(range(modes.frequency.size), MODE_LINES, strict=False):
         shape = modes.deflection[number]
         shape = shape / np.max(np.abs(shape)) * (np.sign(shape[0]) or 1.0)
         label = f"mode {number + 1}: {modes.frequency[number]:.0f} Hz"
         axes.plot(modes.position * 1e3, shape, color=colour, ls=dashes, lw=1.6, label=label)
     axes.axhline(0, color="black", lw=0.6)
-    axes.set(xlabel="distance from the tool tip (mm)", ylabel="deflection / its largest (-)", title="mode shapes")
+    axes.set(xlabel="distance from the tool tip (mm)", ylabel="deflection / maximum (-)", title="mode shapes")
     axes.set_ylim(-1.1, 1.1)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
 
@@ -242,16 +242,16 @@ def draw_whirl(axes: Axes, whirl: WhirlMap, highest_speed: float) -> None:
     speed = whirl.speed_rpm / 1e3
     for number, (colour, _) in zip(range(whirl.forward.shape[0]), MODE_LINES, strict=False):
         lines: Sequence[tuple[Floats, str, float, float, str]] = (
-            (whirl.forward, "-", 1.5, 1.0, "forward, from the housing"),
-            (whirl.backward, "--", 1.5, 1.0, "backward, from the housing"),
-            (whirl.rotating_forward, "-", 0.8, 0.55, "the same, turning with the shaft"),
+            (whirl.forward, "-", 1.5, 1.0, "forward, fixed frame"),
+            (whirl.backward, "--", 1.5, 1.0, "backward, fixed frame"),
+            (whirl.rotating_forward, "-", 0.8, 0.55, "rotating frame"),
             (whirl.rotating_backward, "--", 0.8, 0.55, ""),
         )
         for values, dashes, lw, alpha, label in lines:
             label = label if number == 0 else ""
             axes.plot(speed, values[number], color=colour, ls=dashes, label=label, lw=lw, alpha=alpha)
     top = float(np.max(whirl.forward)) * 1.1
-    axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once a revolution")
+    axes.plot(speed, whirl.speed_rpm / 60, color="black", lw=1, ls=":", label="once per revolution")
     axes.axvspan(0, highest_speed / 1e3, color=Paint.GOOD, alpha=0.10, lw=0, label="speed range of the machine")
     axes.set(xlabel="spindle speed (1000 rpm)", ylabel="frequency (Hz)", title="whirl speeds")
     axes.set(xlim=(0, speed[-1]), ylim=(0, top))

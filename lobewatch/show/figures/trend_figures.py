@@ -20,7 +20,7 @@ from lobewatch.show.figures.drawing import Paint, new_axes
 FIGURE_WIDTH, TREND_HEIGHT, RESPONSE_HEIGHT = 6.4, 3.4, 1.7
 """Width of figures, heights of a trend and of each part of a frequency response (inches)."""
 EXCLUDED_VALUE_RANGE = 0.15
-"""Largest relative distance from the values that count at which an excluded value is drawn."""
+"""Largest relative distance of a drawn excluded value from the values in use."""
 FORECAST_SHARE = 0.5
 """Forecast time drawn, as a share of the length of the series."""
 
@@ -72,9 +72,9 @@ class ValueTrend(NamedTuple):
     events: Sequence[tuple[datetime, str]] = ()
     """Times and texts of maintenance events."""
     limits: LimitsTable | None = None
-    """Limits of its drop; None where it has none."""
+    """Limits of its drop; None without limits."""
     curve: TrendCurve | None = None
-    """Fitted line and forecast; None where there is none."""
+    """Fitted line and forecast; None without one."""
 
     @property
     def drawn_excluded(self) -> list[tuple[datetime, float]]:
@@ -119,7 +119,7 @@ def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
 
 
 def plot_trend(trend: ValueTrend) -> Figure:
-    """Plot a value over time with its 95 % interval, and the limits of its drop where given.
+    """Plot a value over time with its 95 % interval, and the limits of its drop if given.
 
     The limits are in % of the first value of the curve, or else of the first value.
     """

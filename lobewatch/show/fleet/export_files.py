@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import DataError
+from acquisition.errors import join_sentences
 from acquisition.file_io import make_folder, sync_folder
 from lobewatch.arrays import Floats, Indices
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
@@ -24,7 +25,7 @@ from lobewatch.show.terminal.output import format_csv_cell
 
 
 class ExportOutcome(NamedTuple):
-    """Exported tap tests, and what to tell about the export."""
+    """Exported tap tests, and sentences on the export."""
 
     tap_tests: int
     """Number of tap tests of all machines that could be read."""
@@ -48,7 +49,7 @@ def open_duckdb(tables: Iterable[TapTestTable], purpose: str) -> Iterator[Any]:
     try:
         import duckdb
     except ImportError as error:
-        raise DataError(f'{purpose} needs DuckDB; install it with: pip install "lobewatch[fleet]"') from error
+        raise DataError(f'{purpose} needs DuckDB. Install it with pip install "lobewatch[fleet]".') from error
     parts = [_table_arrays(table) for table in tables] or [_table_arrays(EMPTY_TABLE)]
     whole = {name: np.concatenate([part[name] for part in parts]) for name in EXPORT_COLUMNS}
     named = ", ".join("to_timestamp(time)::TIMESTAMP AS time" if n == "time" else n for n in EXPORT_COLUMNS)
@@ -62,7 +63,7 @@ def open_duckdb(tables: Iterable[TapTestTable], purpose: str) -> Iterator[Any]:
 
 
 def write_parquet(base: Any, query: str, path: Path) -> int:
-    """Write what a query gives as Parquet; the number of lines."""
+    """Write the result of a query as Parquet, and return the number of lines."""
     name = path.as_posix().replace("'", "''")
     return int(base.execute(f"COPY ({query}) TO '{name}' (FORMAT parquet, COMPRESSION zstd)").fetchone()[0])
 
@@ -95,13 +96,14 @@ _POWERS_OF_TEN = 10.0 ** np.arange(23)
 
 
 def write_table(tables: Iterable[TapTestTable], path: Path) -> ExportOutcome:
-    """Write a file by the ending of its name, whole or not at all.
+    """Write a complete file in the format of its ending, or none.
 
-    DataError for an ending that is not known, and for Parquet without DuckDB.
+    Raise DataError for an unsupported ending, and for Parquet without DuckDB.
     """
     write = next((writer for ending, writer in TABLE_WRITERS.items() if path.name.endswith(ending)), None)
     if write is None:
-        raise DataError(f"{path}: {path.suffix or 'no ending'} is no kind of table; give {', '.join(TABLE_WRITERS)}")
+        finding = f"{path}: unsupported file type {path.suffix!r}"
+        raise DataError(join_sentences(finding, f"Use a name with the ending {', '.join(TABLE_WRITERS)}"))
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         count = write(tables, temporary)
@@ -199,7 +201,7 @@ def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome
     """Add missing tap tests to a folder as `month=YYYY-MM/*.parquet` (month in UTC), each file complete or not written.
 
     Folder and tap_id identify a tap test. Existing files are never changed. Raise DataError without DuckDB, for a file
-    that is no such table, and where another export takes longer than EXPORT_LOCK_WAIT.
+    that is no such table, and if another export takes longer than EXPORT_LOCK_WAIT.
     """
     tables = [*tables]
     with open_duckdb(tables, f"--append {folder}") as base:
@@ -215,12 +217,12 @@ def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome
         differ = " OR ".join(f"present.{name} IS DISTINCT FROM lines.{name}" for name in EXPORT_COLUMNS[3:])
         query = OUTDATED_QUERY.format(differ=differ)
         outdated = [month for (month,) in base.execute(query, [[table.folder for table in tables]]).fetchall()]
-    sentences = [f"{added} of them are new there"]
+    sentences = [f"{added} of them new in this folder"]
     if outdated:
         months = ", ".join(f"month={month}" for month in outdated)
         folders = "this folder" if len(outdated) == 1 else "these folders"
-        cure = f"to have them as they are now, delete {folders} and export again"
-        sentences.append(f"{months}: some there were excluded or analysed anew since; {cure}")
+        finding = f"{months}: some tap tests were excluded or analysed again after their export"
+        sentences.append(join_sentences(finding, f"To update them, delete {folders} and export again"))
     return ExportOutcome(count, {"folder": str(folder), "added": added, "outdated_months": outdated}, sentences)
 
 

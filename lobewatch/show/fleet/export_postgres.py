@@ -7,6 +7,7 @@ from itertools import chain
 from typing import Any
 
 from acquisition import DataError
+from acquisition.errors import join_sentences
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.show.fleet.export_files import EXPORT_COLUMNS, ExportOutcome
 
@@ -60,8 +61,8 @@ def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     """Update the table `lobewatch_taps` to the tap tests of the machines, in transactions of a few machines each.
 
     Rows that no longer count stay and are marked. Each transaction reads its machines while no other export writes.
-    With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and where
-    the server fails; rows written before that stay.
+    With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and if
+    the server fails. Rows written before that stay.
     """
     place, remaining = server_name(address), iter(tables)
     read = written = set_aside = 0
@@ -70,8 +71,8 @@ def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
         while (counts := _write_next(connection, remaining)) is not None:
             read, written, set_aside = read + counts[0], written + counts[1], set_aside + counts[2]
     kind = "a hypertable of TimescaleDB" if is_hypertable else "a plain table"
-    sentences = [f"{POSTGRES_TABLE} is {kind}; {written} of them written, the others stand there as they are"]
-    sentences += [f"{set_aside} there count no longer"] if set_aside else []
+    sentences = [f"{POSTGRES_TABLE} is {kind}, {written} rows added or changed"]
+    sentences += [f"{set_aside} stored rows marked as no longer counting"] if set_aside else []
     fields = {"database": place, "written": written, "set_aside": set_aside, "hypertable": is_hypertable}
     return ExportOutcome(read, fields, sentences)
 
@@ -82,14 +83,14 @@ def server_name(address: str) -> str:
         from psycopg import ProgrammingError
         from psycopg.conninfo import conninfo_to_dict
     except ImportError as error:
-        raise DataError('--to needs psycopg; install it with: pip install "lobewatch[postgres]"') from error
+        raise DataError('--to needs psycopg. Install it with pip install "lobewatch[postgres]".') from error
     try:
         settings = conninfo_to_dict(address) if address.startswith(("postgresql://", "postgres://")) else {}
     except ProgrammingError:  # its text may hold the password
         settings = {}
     if not settings:
-        cure = "give postgresql://USER@HOST:PORT/DATABASE, the password by PGPASSWORD or ~/.pgpass"
-        raise DataError(f"--to: is no address of PostgreSQL; {cure}")
+        cure = "Use postgresql://USER@HOST:PORT/DATABASE, with the password in PGPASSWORD or ~/.pgpass."
+        raise DataError(f"--to: invalid PostgreSQL address. {cure}")
     return f"{settings.get('host', '')}:{settings.get('port', 5432)}/{settings.get('dbname', '')}"
 
 
@@ -107,15 +108,15 @@ def _connection(address: str, place: str) -> Iterator[Any]:
             connection.execute(f"SET lock_timeout = '{POSTGRES_LOCK_WAIT}s'")
             yield connection
     except psycopg.errors.LockNotAvailable:
-        raise DataError(f"--to {place}: another export is writing there; wait until it is done") from None
+        raise DataError(f"--to {place}: another export is writing there. Wait until it has ended.") from None
     except psycopg.Error as error:
         reason = str(error).partition("\n")[0]
-        cure = "what was written stays; the same command again writes what is missing"
-        raise DataError(f"--to {place}: {reason}; {cure}") from None
+        cure = "Repeat the command: rows already written stay, missing ones are added"
+        raise DataError(join_sentences(f"--to {place}: {reason}", cure)) from None
 
 
 def _make_table(connection: Any) -> bool:
-    """Make the table where it is not there; whether it is a hypertable."""
+    """Make the table if it is missing, and return whether it is a hypertable."""
     with connection.transaction(), connection.cursor() as cursor:
         cursor.execute(EXPORT_LOCK_QUERY)
         (is_new,) = cursor.execute("SELECT to_regclass(%s) IS NULL", [POSTGRES_TABLE]).fetchone()

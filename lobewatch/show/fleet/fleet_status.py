@@ -6,15 +6,19 @@ from datetime import datetime
 from typing import Any
 
 from acquisition import merge_remarks
+from acquisition.errors import join_sentences
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.monitoring import threshold_dates
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
+from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
 """Codes of reasons that have columns of their own."""
+MAX_SHOWN_REASONS = 4
+"""Largest number of reasons below the line of a machine."""
 
 
 def fleet_rows(machines: Sequence[FleetMachine]) -> list[JsonObject]:
@@ -41,8 +45,8 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "last_tap": summary.last_tap,
         "days_left": dated.days_left,
         "reasons": reasons,
-        "note": "; ".join(reasons),
-        "why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue"),
+        "note": join_sentences(*reasons),
+        "why": join_sentences(*(remark.finding for remark in remarks if remark.code != "overdue")),
         "next_step": dated.next_step,
         "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
         "next_limit": threshold_dates.build_limit_row(ahead),
@@ -63,7 +67,7 @@ def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -
     first, last = _month_text(reach.earliest or reach.forecast_end), _month_text(reach.latest)
     when = f"{first} to {last}" if last else f"not before {first}"
     is_past = reach.latest is not None and reach.latest <= now.timestamp() / 86400
-    return f"{percent:g} %: {'by now, at this rate' if is_past else when}"
+    return f"{percent:g} %: {'by now at this rate' if is_past else when}"
 
 
 def _month_text(days: float | None) -> str:
@@ -75,8 +79,8 @@ FLEET_COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap
 
 
 def fleet_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return a line for each machine, with its worst reason and the next step below it."""
-    headings = "machine", "light", "fallen (%)", "last tap", "limit ahead"
+    """Return a line for each machine, with the next step and a list of the reasons below it."""
+    headings = "machine", "status", "f1 drop (%)", "last tap test", "next limit"
     first, *lines = align_columns([headings, *map(_fleet_cells, rows)])
     parts = (part for line, row in zip(lines, rows, strict=True) for part in (line, *_machine_notes(row)))
     return "\n".join([first, *parts])
@@ -104,11 +108,11 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
-    """Return its name where the folder has another, the worst reason, and the next step."""
-    first, *further = row["reasons"] or [row["why"]]
-    why = first + (f" (and {len(further)} more)" if further else "")
-    named = row["name"] if row["name"] != row["key"] else ""
-    return [f"  {_to_one_line(text)}" for text in (": ".join(filter(None, (named, why))), row["next_step"]) if text]
+    """Return the name of a machine if the folder has another, the next step, and the reasons."""
+    named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
+    shown, further = row["reasons"][:MAX_SHOWN_REASONS], row["reasons"][MAX_SHOWN_REASONS:]
+    more = [f"{len(further)} more: lobewatch trend"] if further else []
+    return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])
 
 
 def _to_one_line(text: str) -> str:

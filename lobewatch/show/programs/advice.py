@@ -10,12 +10,14 @@ import numpy as np
 from rich.table import Table
 
 from acquisition import Remark, merge_remarks
+from acquisition.errors import join_sentences
 from lobes import PocketShift, StabilityLobes
 from lobewatch.logbook import Analysis, LobeComparison, Logbook
 from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
+from lobewatch.show.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
@@ -76,15 +78,15 @@ def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> 
 
 
 def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> Texts:
-    """Return all programs in words: the table, the advice, and notes on reading it."""
-    decays = [frequency_margin_text(program.advice) for program in programs]
+    """Return all programs in words: the table, a list of advice for each, and notes on reading them."""
+    margins = [frequency_margin_text(program.advice) for program in programs]
     verdicts, about = [program.verdict for program in programs], chain(*(program.remarks for program in programs))
-    return [
-        verdict_table(verdicts, decays),
-        *(line for program in programs for line in advice_lines(program, machine)),
-        *verdict_notes(verdicts, machine),
-        *remark_lines([*remarks, *(remark for remark in about if remark.code not in LINE_REMARK_CODES)]),
-    ]
+    texts: Texts = [verdict_table(verdicts, margins)]
+    for program in programs:
+        if items := advice_items(program, machine):
+            texts += [f"{program.verdict.program.name}:", *wrap_lines(items)]
+    shown = [*remarks, *(remark for remark in about if remark.code not in LINE_REMARK_CODES)]
+    return [*texts, *wrap_lines(verdict_notes(verdicts, machine), ""), *wrap_lines(remark_lines(shown), "")]
 
 
 def frequency_margin_text(advice: Advice) -> str:
@@ -115,59 +117,70 @@ def check_summary_text(programs: Sequence[ProgramAdvice], others: int) -> str:
 
 
 def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
-    """Return what is wrong with a program and what to do, a line for each."""
-    verdict = program.verdict
-    name = verdict.program.name
+    """Return the advice on a program as one line of sentences; none for a stable one."""
+    if items := advice_items(program, machine):
+        yield f"{program.verdict.program.name}: {join_sentences(*items)}"
+
+
+def advice_items(program: ProgramAdvice, machine: Machine) -> list[str]:
+    """Return the advice on a program as a list, what to do first; empty for a stable one."""
+    verdict, items = program.verdict, list[str]()
     if worded := [remark for remark in verdict.remarks if remark.code in NO_LIMIT_CODES]:
-        yield from map(str, worded)
+        items = [capitalize(text) for remark in worded for text in (remark.cure, remark.text) if text]
     elif verdict.stability is Stability.NOT_STABLE:
-        yield f"{name}: {_chatter_text(program)}; {_alternative_text(program, machine)}"
+        items = [*_alternative_items(program, machine), *_chatter_items(program)]
     elif verdict.stability is Stability.DOUBTFUL:
         settles = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
-        texts = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
+        items = [capitalize(text) for remark in settles for text in (remark.cure, remark.text) if text]
         if verdict.assembly is not None and is_compliance_known(verdict.program, verdict.assembly):
-            texts.append(f"until then {_alternative_text(program, machine)}")  # open measurements come first
-        yield f"{name}: {'; '.join(texts)}"
+            first, *others = _alternative_items(program, machine)  # open measurements come first
+            items += [f"Until then {first[:1].lower()}{first[1:]}", *others]
     if verdict.is_beyond_drive:
-        yield f"{name}: [drive] allows no more than {math.floor(verdict.drive_limit * 1e5) / 100:.2f} mm at this speed"
+        deepest = math.floor(verdict.drive_limit * 1e5) / 100
+        items.append(f"Cut no deeper than {deepest:.2f} mm at this speed, or change [drive] in machine.toml")
+    return items
 
 
-def _chatter_text(program: ProgramAdvice) -> str:
+def _chatter_items(program: ProgramAdvice) -> Iterator[str]:
     verdict = program.verdict
-    word = "period-two chatter" if verdict.kind == "flip" else "chatter"
-    where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    was = "stable at first, no longer: " if program.first_verdict and program.first_verdict.is_stable else ""
-    return f"{was}{word}{where}{worst_feed_text(verdict)}"
+    word = "Period-two chatter" if verdict.kind == "flip" else "Chatter"
+    place = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
+    yield f"{word}{place}{worst_feed_text(verdict)}"
+    if program.first_verdict and program.first_verdict.is_stable:
+        yield "Stable at the first tap tests"
 
 
 def worst_feed_text(verdict: Verdict) -> str:
-    """Return the feed direction with the lowest limit where it matters."""
+    """Return the feed direction with the lowest limit if it matters."""
     limits = np.ones(1) if verdict.samples is None else verdict.samples.limits
     if np.max(limits) <= MIN_FEED_RATIO * np.min(limits):
         return ""
     degrees = round(math.degrees(verdict.feed_angle))
-    return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
+    return f", lowest limit with feed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _alternative_text(advice: ProgramAdvice, machine: Machine) -> str:
+def _alternative_items(advice: ProgramAdvice, machine: Machine) -> list[str]:
+    """Return the settings to use instead of a program, or the reason why there are none."""
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.deepest_here
     gap = None if verdict.assembly is None else find_open_question(verdict.program, verdict.assembly)
     if gap is not None:
-        return f"{gap[1]}: only then can a safe speed be named"
+        return [capitalize(gap[1]), f"No recommended setting yet: {gap[0]}"]
     cut_range = CutRange.of(machine, verdict.program)
-    reach = f"in {format_rpm(cut_range.low_rpm)} to {format_rpm(cut_range.high_rpm)} rpm"
-    reach = "that the tool bears" if cut_range.is_empty else reach
+    reach = f"from {format_rpm(cut_range.low_rpm)} to {format_rpm(cut_range.high_rpm)} rpm"
+    reach = "within the tool limits" if cut_range.is_empty else reach
     if best is None:
-        return f"no safe speed {reach}; choose another tool"
+        return ["Choose another tool", f"No stable speed {reach}"]
     if best.depth_mm == verdict.program.depth_mm:
-        return f"run this depth at {format_rpm(best.speed_rpm)} rpm {robustness_text(best)}"
-    texts = [f"no safe speed for this depth {reach}"]
+        return [f"Run this depth at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}", margins_text(best)]
+    items = list[str]()
     if shallower is None or (best.speed_rpm, best.depth_mm) != (shallower.speed_rpm, shallower.depth_mm):
-        texts.append(f"most chips: {best.depth_mm:g} mm at {format_rpm(best.speed_rpm)} rpm {robustness_text(best)}")
+        items.append(f"Run {best.depth_mm:g} mm at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}")
+        items.append(f"Highest removal rate, {margins_text(best).lower()}")
     if shallower is not None:
-        depth, speed = f"{shallower.depth_mm:g}", format_rpm(shallower.speed_rpm)
-        texts.append(f"at {speed} rpm no deeper than {depth} mm {robustness_text(shallower)}")
-    return "; ".join(texts)
+        cut = "Or cut" if items else "Cut"
+        items.append(f"{cut} at most {shallower.depth_mm:g} mm at this speed, {window_text(shallower)}")
+        items.append(margins_text(shallower))
+    return [*items, f"No stable speed for this depth {reach}"]
 
 
 def format_rpm(speed: float) -> str:
@@ -175,13 +188,18 @@ def format_rpm(speed: float) -> str:
     return f"{speed:,.10g}".replace(",", " ")
 
 
-def robustness_text(setting: Setting) -> str:
-    """Return the margins of a setting in speed, depth and frequency, rounded down."""
-    low, high = map(format_rpm, setting.window_rpm)
-    margin = f"{math.floor(100 * setting.depth_margin + 1e-6)} % of depth to spare"
-    fall, more = setting.drop_margin, " or more" if setting.drop_margin >= CHECKED_DROPS[-1] else ""
-    drop = f"less than {100 * CHECKED_DROPS[1]:g} %" if fall <= 0 else f"{100 * fall:.3g} %{more}"
-    return f"({low} to {high} rpm is safe; {margin}; the frequency may fall by {drop})"
+def window_text(setting: Setting) -> str:
+    """Return the stable speeds around a setting."""
+    return "stable from {} to {} rpm".format(*map(format_rpm, setting.window_rpm))
+
+
+def margins_text(setting: Setting) -> str:
+    """Return the margins of a setting in depth and frequency, rounded down."""
+    margin = f"Depth margin {math.floor(100 * setting.depth_margin + 1e-6)} %"
+    if setting.drop_margin <= 0:
+        return f"{margin}, not stable if f1 drops another {100 * CHECKED_DROPS[1]:g} %"
+    more = " or more" if setting.drop_margin >= CHECKED_DROPS[-1] else ""
+    return f"{margin}, still stable if f1 drops another {100 * setting.drop_margin:.3g} %{more}"
 
 
 def lobes_json(name: str, lobes: StabilityLobes) -> JsonObject:
@@ -223,27 +241,30 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
     texts: Texts = [
-        f"{now.name}: {now.lobes.method_text}, from the {now.source} of {now.assembly.tap_id}",
+        f"{now.name}: {now.lobes.method_text}",
+        f"from the {now.source} of {now.assembly.tap_id}",
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
         else f"no limit in this speed range ({now.lobes.method_text})",
         *shift_lines(comparison.shifts),
     ]
     if comparison.pockets:
-        heading = "safe now and until the next tap tests, the largest removal rate first:"
+        heading = "Settings that stay stable until the next tap tests, highest removal rate first:"
         texts += [heading, pocket_table(comparison.pockets)]
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
     if verdicts:
-        texts += [verdict_table(verdicts), f"verdicts by {verdicts[0].method}, as lobewatch check"]
+        texts.append(verdict_table(verdicts))
+        methods = dict.fromkeys(verdict.method for verdict in verdicts if verdict.method)
+        texts += [f"Verdicts by {method}, as in lobewatch check" for method in methods]
     if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
-        still = "the diagram and its pockets are" if now.name == REFERENCE_CUT else "the diagram is"
-        texts.append(f"{at_speed_text(taught)}; {still} of the spindle at rest")
+        shown = "The diagram and its pockets are" if now.name == REFERENCE_CUT else "The diagram is"
+        texts.append(join_sentences(at_speed_text(taught), f"{shown} for the spindle not rotating"))
     return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET_CODE])]
 
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Return a table with a line for each recommended pocket."""
-    table = new_table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "fall left")
+    table = new_table("speed (rpm)", "stable (rpm)", "ap (mm)", "depth margin", "f1 margin")
     for pocket in pockets:
         window = "{:.0f}..{:.0f}".format(*pocket.window_rpm)
         margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
@@ -257,7 +278,7 @@ def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
     for shift in sorted(shifts, key=lambda shift: shift.before.speed_rpm, reverse=True)[:3]:
         before, after = shift.before, shift.after
         yield (
-            f"pocket of the diagram moved from {before.speed_rpm:.0f} to {after.speed_rpm:.0f} rpm "
-            f"({100 * shift.speed_change:+.1f} %), its tip from {before.depth * 1e3:.2f} to "
-            f"{after.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
+            f"pocket moved from {before.speed_rpm:.0f} to {after.speed_rpm:.0f} rpm ({100 * shift.speed_change:+.1f} %)"
+            f", its depth from {before.depth * 1e3:.2f} to {after.depth * 1e3:.2f} mm "
+            f"({100 * shift.depth_change:+.1f} %)"
         )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from rich.markup import escape
 from rich.table import Table
 
+from acquisition.errors import join_sentences
 from lobes import Cut, CuttingCoefficients
 from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
 from lobewatch.machine.settings.drive_power import CutPower
@@ -16,7 +17,7 @@ MAX_MATERIALS_IN_FULL = 5
 
 
 def material_json(material: CuttingCoefficients) -> JsonObject:
-    """Return one material; a range is [lowest, highest], or None where no spread is published."""
+    """Return one material; a range is [lowest, highest], or None without a published spread."""
     spread = material.tangential_range
     forces = [
         {"kc1_1_n_per_mm2": kc.at_1_mm / 1e6, "mc": kc.exponent, "source": kc.source} for kc in material.specific_forces
@@ -38,22 +39,22 @@ def material_json(material: CuttingCoefficients) -> JsonObject:
 
 
 def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
-    """Return a table of materials, what its numbers are, and the sources where there are few."""
+    """Return a table of materials with a note on its numbers, and the sources of a few materials."""
     is_short = len(materials) > MAX_MATERIALS_IN_FULL
-    headings = "~material", "<ISO", "Kt\n(N/mm²)", "low..high", "Kr/Kt", "low..high", "Kte\n(N/mm)", "~also"
+    headings = "~material", "<ISO", "Kt\n(N/mm²)", "low..high", "Kr/Kt", "low..high", "Kte\n(N/mm)", "~other names"
     n_columns = 5 if is_short else len(headings)
     yield new_table(*headings[:n_columns], rows=(_material_cells(material)[:n_columns] for material in materials))
     if is_short:
-        yield "range of Kr/Kt, force at the edge, other names, sources: lobewatch materials NAME, or --json"
+        yield "Range of Kr/Kt, Kte, other names and sources: lobewatch materials NAME, or --json"
     else:
-        yield from (f"{one.material}: {'; '.join(filter(None, (one.note, one.source)))}" for one in materials)
+        yield from (f"{one.material}: {join_sentences(one.note, one.source)}" for one in materials)
     if any(material.specific_forces for material in materials):
         thin, thick = (f"{chip * 1e3:g}" for chip in CHIP_THICKNESS_RANGE)
         yield (
-            f"from kc1.1 and mc: Kt = (1 - mc) kc1.1 h^-mc and Kte = mc kc1.1 h^(1 - mc) at h = "
-            f"{REFERENCE_CHIP_THICKNESS * 1e3:g} mm, the range over all publications and h = {thin} to {thick} mm "
-            "(docs/lobes.md)"
+            "Values from kc1.1 and mc: Kt = (1 - mc) kc1.1 h^-mc and Kte = mc kc1.1 h^(1 - mc) "
+            f"at h = {REFERENCE_CHIP_THICKNESS * 1e3:g} mm."
         )
+        yield f"Ranges cover all publications and h = {thin} to {thick} mm (docs/lobes.md)."
 
 
 def _material_cells(material: CuttingCoefficients) -> list[str]:
@@ -71,10 +72,10 @@ def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) ->
 def power_text(power: CutPower, cut: Cut) -> str:
     """Return the power of a cut, its Kt, and that of machine.toml."""
     by_power, known = power.tangential / 1e6, cut.tangential / 1e6
-    return f"{power.watts / 1e3:.4g} kW say Kt {by_power:.0f} N/mm2, machine.toml {known:.0f}"
+    return f"from {power.watts / 1e3:.4g} kW: Kt {by_power:.0f} N/mm2 (machine.toml: {known:.0f})"
 
 
 def power_json(power: CutPower | None) -> JsonObject:
-    """Return the power of a cut and its Kt, None where no power was read."""
+    """Return the power of a cut and its Kt, None without a power."""
     kilowatts, tangential = (None, None) if power is None else (power.watts / 1e3, power.tangential / 1e6)
     return {"power_kw": kilowatts, "tangential_by_power_n_per_mm2": tangential}

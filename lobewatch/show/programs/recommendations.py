@@ -7,11 +7,28 @@ from itertools import zip_longest
 from pathlib import Path
 
 from acquisition import Remark
+from acquisition.errors import join_sentences
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
-from lobewatch.show.programs.advice import LINE_REMARK_CODES, format_rpm, robustness_text, setting_json, worst_feed_text
-from lobewatch.show.terminal.output import MIN_COLUMN_WIDTH, JsonObject, Texts, new_table, pick, remark_lines
+from lobewatch.show.programs.advice import (
+    LINE_REMARK_CODES,
+    format_rpm,
+    margins_text,
+    setting_json,
+    window_text,
+    worst_feed_text,
+)
+from lobewatch.show.sentences import capitalize, wrap_lines
+from lobewatch.show.terminal.output import (
+    MIN_COLUMN_WIDTH,
+    JsonObject,
+    Texts,
+    count_noun,
+    new_table,
+    pick,
+    remark_lines,
+)
 from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation
@@ -21,7 +38,7 @@ UNIT_FEED_MM = 0.1
 
 
 def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> JsonObject:
-    """Return the recommended setting or the reason why there is none; remarks: on the files."""
+    """Return the recommended setting or the reason for none; remarks: on the files."""
     others = [{"what": label, **_setting_with_feed_json(setting, answer)} for label, setting in answer.alternatives]
     return {
         **pick(answer.program, "name", "tool", "material", "teeth", "tool_diameter_mm", "radial_depth_mm"),
@@ -68,50 +85,57 @@ def removal_rate(setting: Setting, program: ProgramTable, feed_mm: float) -> flo
 
 
 def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
-    """Return the recommendation first, then what it rests on; remarks: on the files."""
+    """Return the recommendation first, then its margins and alternatives; remarks: on the files."""
     lines = [*_recommended_lines(answer)]
     for label, setting in answer.alternatives:
-        margins = f"{robustness_text(setting)}; {_removal_rate_text(setting, answer)}"
-        lines.append(f"{label}: {_setting_text(setting, answer)} {margins}")
-    return [*lines, *remark_lines([*remarks, *_other_remarks(answer)])]
+        lines += wrap_lines([f"{label}: {_setting_text(setting, answer)}"], "")
+        lines += wrap_lines(_margin_items(setting, answer))
+    return [*lines, *wrap_lines(remark_lines([*remarks, *_other_remarks(answer)]), "")]
 
 
 def saved_lines(folder: Path, name: str) -> list[str]:
-    """Return where the setting was saved as a program, and the next step."""
-    return [f"saved in {folder / 'machine.toml'} as program {name!r}", f"next: {format_command('check', folder)}"]
+    """Return the file and the program in which the setting was saved, and the next step."""
+    return [f"saved in {folder / 'machine.toml'} as program {name!r}", f"Next: {format_command('check', folder)}"]
 
 
 def _recommended_lines(answer: Recommendation) -> Iterator[str]:
     setting, verdict = answer.setting, answer.verdict
     if setting is None or verdict is None:
-        yield f"{answer.program.name}: none; {answer.reason}"
+        yield from wrap_lines(
+            [join_sentences(f"{answer.program.name}: no recommendation", capitalize(answer.reason))], ""
+        )
         if answer.remedies:
-            yield f"what would change it: {'; '.join(answer.remedies)}"
+            yield "Possible remedies:"
+            yield from wrap_lines(answer.remedies)
         return
-    way = "up or down" if answer.any_direction and answer.program.immersion < 1 else ""
-    predicted = "" if verdict.is_measured else ", predicted: doubtful until the tool is tapped"
-    yield f"{answer.program.name}: {_setting_text(setting, answer)}{f', milled {way}' if way else ''}{predicted}"
-    yield f"  {robustness_text(setting).strip('()')}"
-    yield f"  {_removal_rate_text(setting, answer)}{worst_feed_text(verdict)}"
-    if verdict.n_cuts:
-        has = "s have" if verdict.n_cuts > 1 else " has"
-        yield f"  as {verdict.n_cuts} test cut{has} taught of the turning spindle"
+    yield from wrap_lines([f"{answer.program.name}: {_setting_text(setting, answer)}"], "")
+    items = ["Up or down milling"] if answer.any_direction and answer.program.immersion < 1 else []
+    items += [] if verdict.is_measured else ["Predicted, doubtful until the tool is tapped"]
+    cuts = f"Valid for the rotating spindle, learned from {count_noun(verdict.n_cuts, 'test cut')}"
+    yield from wrap_lines(
+        [*items, *_margin_items(setting, answer, worst_feed_text(verdict)), *[cuts][: verdict.n_cuts]]
+    )
 
 
 def _setting_text(setting: Setting, answer: Recommendation) -> str:
     edge = cutting_speed(setting, answer.program)
-    return f"{format_rpm(setting.speed_rpm)} rpm ({edge:.0f} m/min), {setting.depth_mm:g} mm deep"
+    return f"{format_rpm(setting.speed_rpm)} rpm, ap {setting.depth_mm:g} mm, cutting speed {edge:.0f} m/min"
+
+
+def _margin_items(setting: Setting, answer: Recommendation, feed: str = "") -> list[str]:
+    return [capitalize(window_text(setting)) + feed, margins_text(setting), _removal_rate_text(setting, answer)]
 
 
 def _removal_rate_text(setting: Setting, answer: Recommendation) -> str:
     program = answer.program
     if answer.feed_mm is None:
         rate = removal_rate(setting, program, UNIT_FEED_MM)
-        return f"{rate:.3g} cm3/min for each {UNIT_FEED_MM:g} mm of feed a tooth"
+        return f"Removal rate {rate:.3g} cm3/min per {UNIT_FEED_MM:g} mm feed per tooth"
     feeds = list(dict.fromkeys(answer.feed_mm))
     rates = " to ".join(f"{removal_rate(setting, program, feed):.3g}" for feed in feeds)
     speeds = " to ".join(format_rpm(round(feed * (program.teeth * setting.speed_rpm))) for feed in feeds)
-    return f"{rates} cm3/min at {' to '.join(f'{feed:.3g}' for feed in feeds)} mm a tooth ({speeds} mm/min)"
+    per_tooth = " to ".join(f"{feed:.3g}" for feed in feeds)
+    return f"Removal rate {rates} cm3/min at {per_tooth} mm feed per tooth ({speeds} mm/min)"
 
 
 def _other_remarks(answer: Recommendation) -> list[Remark]:
@@ -119,7 +143,7 @@ def _other_remarks(answer: Recommendation) -> list[Remark]:
 
 
 def pitches_json(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> JsonObject:
-    """Return equal pitch, the unequal patterns, and which of them is proposed; remarks: on the files."""
+    """Return equal pitch, the unequal patterns, and the proposed one; remarks: on the files."""
     proposed, verdict = proposal.proposed, proposal.verdict
     return {
         **pick(verdict.program, "tool", "teeth", "speed_rpm"),
@@ -151,14 +175,14 @@ def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
 
 
 def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:
-    """Return a table of the patterns, and which to have ground; depth_mm: requested depth of cut, None for any."""
-    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
-    table = new_table(*headings, *([] if depth_mm is None else [f"<at {depth_mm:g} mm"]))
-    for pitch in (proposal.equal, *proposal.unequal):  # as many lines as its angles need, two at least
+    """Return a table of the patterns, and the proposed one; depth_mm: requested depth of cut, None for any."""
+    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\n98 % interval", "gain", "largest\nchip", "off-\ncentre"
+    table = new_table(*headings, *([] if depth_mm is None else [f"<verdict at\n{depth_mm:g} mm"]))
+    for pitch in (proposal.equal, *proposal.unequal):  # one line for each part of its angles, at least two
         verdict = [] if depth_mm is None else [[pitch.stability.value]]
         for cells in zip_longest(*_pitch_columns(pitch, pitch is proposal.equal), *verdict, fillvalue=""):
             table.add_row(*cells)
-    return [table, *_proposal_lines(proposal), *remark_lines(_pitch_remarks(proposal, remarks))]
+    return [table, *_proposal_lines(proposal), *wrap_lines(remark_lines(_pitch_remarks(proposal, remarks)), "")]
 
 
 def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[Remark]:
@@ -166,7 +190,7 @@ def _pitch_remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[R
 
 
 def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]]:
-    """Return the lines of each column but that of the verdict."""
+    """Return the lines of each column except the verdict."""
     gain, low, high = (f"{100 * share:+.0f}" for share in (pitch.gain, pitch.gain_low, pitch.gain_high))
     depths = pitch.limit, pitch.low, pitch.high
     limit, least, most = (f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none" for depth in depths)
@@ -179,33 +203,30 @@ def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]
 
 
 def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
-    """Return the proposed pitches, the uneven chips that they make, and where they hold."""
+    """Return the proposed pitches, their uneven chips, and the speed that they are valid for."""
     proposed, program = proposal.proposed, proposal.verdict.program
     at = f"at {format_rpm(program.speed_rpm)} rpm"
     if proposed is None:
-        yield f"equal pitch is as good {at}: {_equal_pitch_reason(proposal)}"
+        yield f"Equal pitch is as good {at}: {_equal_pitch_reason(proposal)}"
         return
     angles = ", ".join(f"{angle:g}" for angle in proposed.pattern.pitch_deg)
-    gain, low, high = (round(100 * share) for share in (proposed.gain, proposed.gain_low, proposed.gain_high))
     share = math.ceil(100 * proposed.share_worse)
-    worse = f"below it in {share} % of that" if share else "never below it"
-    yield (
-        f"pitch_deg = [{angles}]: the limit {at} is {gain} % above that of equal pitch, {low} to {high} % over what is "
-        f"not known, {worse}"
-    )
     largest, fed = proposed.pattern.feed_ratio_range[1], program.feed_per_tooth_mm
-    chip = "" if fed is None else f", {fed * largest:.3g} mm where {fed:g} mm is fed per tooth"
-    more = round(100 * (largest - 1))
-    yield f"its teeth cut uneven chips: the one after the widest gap {more} % more than the mean{chip}"
-    yield (
-        "it holds for this speed: at others the same pitches may have a lower limit than equal ones; ask again there, "
-        "and see lobewatch lobes for speeds that need no other cutter"
+    chip = "" if fed is None else f", {fed * largest:.3g} mm at {fed:g} mm feed per tooth"
+    yield f"Best {at}: pitch_deg = [{angles}]"
+    yield from wrap_lines(
+        [
+            f"Lower than with equal pitch in {share} % of the Monte Carlo samples",
+            f"Uneven chips: {round(100 * (largest - 1))} % thicker than the mean after the widest gap{chip}",
+            "Valid for this speed only. Run lobewatch pitch again for another speed.",
+            "lobewatch lobes shows speeds that need no other cutter.",
+        ]
     )
 
 
 def _equal_pitch_reason(proposal: PitchProposal) -> str:
     if not math.isfinite(proposal.equal.limit):
-        return f"it has no limit up to {MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm:g} mm"
+        return f"no limit up to {MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm:g} mm"
     if not proposal.unequal:
-        return "no unequal pitch stays within what chips and balance allow"
-    return f"no pattern raises the low end of its limit by {100 * (MIN_PITCH_GAIN - 1):.0f} %"
+        return "no unequal pitch keeps chip load and balance within limits"
+    return f"no unequal pitch raises the lower end of the limit by {100 * (MIN_PITCH_GAIN - 1):.0f} %"

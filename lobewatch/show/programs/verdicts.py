@@ -12,6 +12,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
+from lobewatch.show.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
@@ -20,12 +21,13 @@ from lobewatch.verdicts.monte_carlo import TRIED_LIMIT_SHARES
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
-NOT_ROTATING_TEXT = (
-    "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
-    "chatter once it turns and cuts, where frequency, damping, stiffness and cutting force may differ; plausible, not "
-    "measured."
+NOT_ROTATING_TEXTS = (
+    "Verdicts and limits are for the spindle as tapped, not rotating.",
+    "The chatter risk is estimated for the rotating spindle, not measured.",
 )
-"""Note on reading a table of verdicts."""
+"""Notes on reading a table of verdicts."""
+CHECK_HINT = "Causes and stable settings: lobewatch check"
+"""Next step below a table with verdicts other than stable."""
 FROM_MACHINE_FILE = "machine.toml"
 DEGREES_PER_RADIAN = 180 / np.pi
 MIN_SHOWN_WIDTH = 5e-5
@@ -51,25 +53,26 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
 
 
 def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
-    """Return the lines below a table of verdicts: the uncertainty, and what the verdicts hold for."""
-    named, evaluated, learned = dict[str, list[str]](), 0, list[Verdict]()
+    """Return the notes below a table of verdicts: the state of the spindle, then the uncertainty, one cause each."""
+    named, evaluated, learned = dict[tuple[str, ...], list[str]](), 0, list[Verdict]()
     for verdict in verdicts:
         if verdict.samples is not None and verdict.assembly is not None:
             parts = _uncertainty_parts(verdict, verdict.samples.uncertainty, verdict.assembly, machine)
-            named.setdefault("; ".join(parts), []).append(verdict.program.name)
+            named.setdefault(tuple(parts), []).append(verdict.program.name)
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
-    about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
-    lines = [f"{about[text]}: {text} (docs/lobes.md)" for text in named]
-    lines += [NOT_ROTATING_TEXT] if len(learned) < evaluated else []
-    return [*lines, *([at_speed_text(learned)] if learned else [])]
+    lines = [*NOT_ROTATING_TEXTS] if len(learned) < evaluated else []
+    lines += [at_speed_text(learned)] if learned else []
+    for causes, names in named.items():
+        about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
+        lines += [f"{about} (docs/lobes.md):", *(f"  {cause}" for cause in causes)]
+    return lines
 
 
 def at_speed_text(verdicts: Sequence[Verdict]) -> str:
-    """Return what verdicts hold for where test cuts were used."""
+    """Return the note on verdicts with test cuts."""
     names = ", ".join(verdict.program.name for verdict in verdicts)
-    cuts = count_noun(verdicts[0].at_speed.n_cuts, "cut")
-    return f"{names}: the words hold for the spindle as it turns, from {cuts}, and low..high for 98 % of it"
+    return f"{names}: valid for the rotating spindle, learned from {count_noun(verdicts[0].n_cuts, 'test cut')}"
 
 
 def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly, machine: Machine) -> Iterator[str]:
@@ -86,18 +89,17 @@ def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly,
         elif np.any(widths > MIN_SHOWN_WIDTH):
             yield f"{_widths_text(np.max(widths, axis=0))} {label}"
     if doubt.axes is not None and doubt.axes.sign_count:
-        yield "modes askew to either side (cross not tapped)"
+        yield "modes with rotated principal directions (cross FRF not tapped)"
     source = f" ({FROM_MACHINE_FILE})" if given.speed_percent != UncertaintyTable().speed_percent else ""
     yield f"speed {_half_width_text(doubt.speed)}{source}"
     yield from _coefficient_parts(verdict, doubt, machine)
 
 
 def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
-    cuts, before, after = count_noun(at_speed.n_cuts, "cut"), at_speed.prior_ranges, at_speed.posterior_ranges
+    before, after = at_speed.prior_ranges, at_speed.posterior_ranges
     for key in ("tangential", "ratio", *(name for name in before if name.startswith("frequency"))):
         prior, posterior = (f"{factor.low:.2f}..{factor.high:.2f}" for factor in (before[key], after[key]))
-        earlier = f", {prior} before the {cuts}" if key == "tangential" else f" ({prior})"
-        yield f"{factor_text(key)} x {posterior}{earlier}"
+        yield f"{factor_text(key)} x {posterior} ({prior} before the test cuts)"
     yield f"speed {_half_width_text(speed)}"
 
 
@@ -111,7 +113,7 @@ def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: Unc
         width = widths[len(assembly.x or ()) if side == "y" else 0]
         texts[side] = f"{_widths_text(width)} {label} ({', '.join(sources)})"
     is_same = len(set(texts.values())) == 1
-    yield from [*texts.values()][:1] if is_same else (f"in {side} {text}" for side, text in texts.items())
+    yield from [*texts.values()][:1] if is_same else (f"{side}: {text}" for side, text in texts.items())
 
 
 def _coefficient_parts(verdict: Verdict, uncertainty: Uncertainty, machine: Machine) -> Iterator[str]:
@@ -161,7 +163,7 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
     Stability.UNKNOWN: VerdictStyle("?", "doubt", "bold"),
 }
 """Style of each verdict, the same everywhere."""
-VERDICT_HEADINGS = "~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning"
+VERDICT_HEADINGS = "~program", "speed\n(rpm)", "ap\n(mm)", "limit (mm)\n98 % interval", "chatter\nrisk"
 
 
 def verdict_json(verdict: Verdict) -> JsonObject:
@@ -194,8 +196,8 @@ def verdict_json(verdict: Verdict) -> JsonObject:
 
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:
-    """Return a table with a line for each program; margins: remaining frequency margin of each, shown where given."""
-    table = new_table(*VERDICT_HEADINGS, *(["fall\nleft"] if margins else []), "~verdict")
+    """Return a table with a line for each program; margins: f1 margin of each, if shown."""
+    table = new_table(*VERDICT_HEADINGS, *(["f1\nmargin"] if margins else []), "~verdict")
     for i, verdict in enumerate(verdicts):
         program = verdict.program
         numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(verdict), chatter_risk_text(verdict))
@@ -237,7 +239,7 @@ def margin_text(verdict: Verdict) -> str:
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """Return the verdict, with "beyond the drive" and "(predicted)" where they apply."""
+    """Return the verdict, with "beyond the drive" and "(predicted)" if they apply."""
     predicted = verdict.stability is not Stability.UNKNOWN and not verdict.is_measured
     words = [verdict.stability.value, *(["beyond the drive"] if verdict.is_beyond_drive else [])]
     return ", ".join(words) + (" (predicted)" if predicted else "")
@@ -263,9 +265,10 @@ def _searched_depth(verdict: Verdict) -> float:
 
 
 def program_texts(logbook: Logbook) -> Texts:
-    """Return the verdicts on all programs, where to read on, and the remarks on the files."""
+    """Return the verdicts on all programs, the next command, and the remarks on the files."""
     verdicts = logbook.verdicts()
-    texts: Texts = [verdict_table(verdicts), *verdict_notes(verdicts, logbook.machine)] if verdicts else []
+    notes = wrap_lines(verdict_notes(verdicts, logbook.machine), "")
+    texts: Texts = [verdict_table(verdicts), *notes] if verdicts else []
     if not all(map(is_safe, verdicts)):
-        texts.append("lobewatch check says what would settle it, and where to go instead")
+        texts.append(CHECK_HINT)
     return [*texts, *remark_lines(logbook.remarks)]

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,9 +78,11 @@ class Checked(Said):
         return self.out.splitlines()[-1]
 
     def line(self, name: str) -> str:
-        """Return the text on a program below the table."""
-        (found,) = (line for line in self.out.splitlines() if line.startswith(f"{name}: "))
-        return found
+        """Return the list of advice on a program below the table, in one line."""
+        lines = self.out.splitlines()
+        return " ".join(
+            line.strip() for line in takewhile(lambda line: line[:1] == " ", lines[lines.index(f"{name}:") + 1 :])
+        )
 
 
 Check = Callable[..., Checked]

@@ -103,7 +103,7 @@ def test_pictures(run: Run, folder: MachineFolder) -> None:
     assert said.code == 0, said.err
     assert Path("l.png").read_bytes().startswith(b"\x89PNG")
     assert Path("w.png").read_bytes().startswith(b"\x89PNG")
-    assert "radial depth (mm)" in Path("r.svg").read_text("utf-8")
+    assert "radial depth ae (mm)" in Path("r.svg").read_text("utf-8")
 
 
 def test_both_directions_count_from_the_frf_too(folder: MachineFolder) -> None:
@@ -142,7 +142,7 @@ def test_a_predicted_diagram_says_so_and_is_no_waterfall(run: Run, folder: Machi
     assert drawn.count("predicted, bearings of 2026-01-15</text>") == 1
     assert "zero order, predicted, bearings of 2026-01-15, from the modes" in drawn
     said = run("lobes", "m", "--tool", "long end mill", "--figure", "q.svg", "--waterfall", "w.svg")
-    assert (said.code, "--waterfall shows measured lobes" in said.err) == (2, True)
+    assert (said.code, "--waterfall: " in said.err) == (2, True)
     assert not Path("q.svg").exists()
 
 
@@ -192,7 +192,7 @@ def test_low_immersions_are_noted_once_and_where_they_concern(run: Run, folder: 
 def test_an_unknown_ending_names_those_that_are_known(run: Run, folder: MachineFolder) -> None:
     tap(folder, 1713.0)
     said = run("lobes", "m", "--figure", "l.xyz")
-    assert (said.code, "name a file that ends in .svg, .png or .pdf" in said.err) == (2, True)
+    assert (said.code, ".svg, .png or .pdf" in said.err) == (2, True)
     assert "webp" not in said.err
 
 

@@ -57,7 +57,7 @@ def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> Non
     assert np.asarray(stable.get_xydata()).tolist() == [[1200.0, 1.0]]
     assert np.asarray(chatter.get_xydata()).tolist() == [[1500.0, 4.0], [1700.0, 2.0]]
     assert stable.get_marker() != chatter.get_marker()
-    assert [line.get_label() for line in (stable, chatter)] == ["heard stable", "heard to chatter"]
+    assert [line.get_label() for line in (stable, chatter)] == [TEST_CUT_MARKS[word][0] for word in (False, True)]
     assert [text.get_text() for text in axes.texts] == ["1650 Hz"]
     assert axes.get_ylim()[1] > 4.0
 
@@ -67,9 +67,9 @@ def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
     lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
     learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
     (axes,) = plot_lobes(diagram_of(speed, {"now": 2 * depth}, learned=learnt)).axes
-    (line,) = [artist for artist in axes.lines if artist.get_label() == "at speed, learnt from 4 test cuts"]
+    (line,) = [artist for artist in axes.lines if "4 test cuts" in str(artist.get_label())]
     assert line.get_ydata() == pytest.approx(1.0)
-    (band,) = [artist for artist in axes.collections if "left open" in str(artist.get_label())]
+    (band,) = [artist for artist in axes.collections if "98 %" in str(artist.get_label())]
     edge = np.asarray(band.get_paths()[0].vertices)[:, 1]
     assert (edge.min(), edge.max()) == pytest.approx((0.5, 3.0))
 

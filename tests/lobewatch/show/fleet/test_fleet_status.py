@@ -10,6 +10,7 @@ import pytest
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.fleet.fleet_status import fleet_rows, fleet_text
 from lobewatch.show.report.report import render_fleet
+from lobewatch.show.sentences import MAX_LINE_LENGTH
 
 pytestmark = pytest.mark.quick
 
@@ -26,6 +27,17 @@ def test_days_until_the_next_tap_test_are_whole_and_never_too_many(shop: Shop, d
     shop.tap(0, 1690.0, "y")
     rows = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start + timedelta(days=days)))
     assert f"2026-01-15, {due}\n" in fleet_text(rows)
+
+
+def test_the_next_step_comes_before_a_short_list_of_reasons(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    (row,) = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start))
+    row |= {"name": "m", "next_step": "Tap again. " * 12, "reasons": [f"reason {number}" for number in range(6)]}
+    lines = fleet_text([row]).splitlines()[2:]
+    assert max(map(len, lines)) <= MAX_LINE_LENGTH
+    assert lines[0].split()[:3] == ["Next:", "Tap", "again."]
+    assert [line.strip() for line in lines if "reason" in line] == [f"reason {number}" for number in range(4)]
+    assert lines[-1].strip().startswith("2 ")
 
 
 @pytest.mark.parametrize(

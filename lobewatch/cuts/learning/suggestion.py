@@ -204,7 +204,7 @@ MAX_FIRST_CUT_RISK, FIRST_CUT_DEPTH_FACTOR = 0.2, 1.5
 FIRST_CUT_DEPTH_SHARES = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
 """Shares of a depth checked in turn for such a first cut; chosen."""
 MIN_REPEAT_PROBABILITY = 0.05
-"""Chance of a wrong label "chatter" from which a cut is repeated, unless it is the last; chosen, see docs/studies/cuts.md.
+"""Chance of a wrong label "chatter" that repeats a cut, except the last; chosen, see docs/studies/cuts.md.
 
 The last of five cuts gains 4 % of the optimum. A wrong label costs 20 %."""
 MIN_EXPECTED_GAIN = 0.005

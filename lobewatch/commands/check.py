@@ -1,15 +1,12 @@
 """Command `lobewatch check`: verdicts on cutting programs."""
 
-from time import monotonic
 from typing import Annotated
 
 from typer import Exit, Option
 
 from lobewatch.commands import shared_options as shared
-from lobewatch.show.terminal.output import Json, emit, notes
-
-PROGRESS_DELAY = 5.0
-"""Delay before progress is shown (s)."""
+from lobewatch.show.terminal.output import Json, emit, notes, show_progress
+from lobewatch.step_times import time_step
 
 
 def check(
@@ -61,13 +58,11 @@ def check(
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
-    verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
-    begin, slow, programs = monotonic(), False, list[show.ProgramAdvice]()
-    for verdict in verdicts:
-        if not slow and monotonic() - begin > PROGRESS_DELAY:
-            notes.print(f"{len(programs)} of {len(verdicts)} programs are checked; the others take a while too")
-            slow = True
-        programs.append(show.advise_program(logbook, verdict))
+    with show_progress("checking programs") as progress, time_step("verdicts"):
+        verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
+        programs = [
+            show.advise_program(logbook, verdict) for verdict in progress.track(verdicts, task_id=progress.task_ids[0])
+        ]
     remarks = logbook.remarks
     payload = {"recommendations": [recommendation_json(answer) for answer in recommendations]}
     texts = show.check_texts(programs, remarks, logbook.machine) if programs else []

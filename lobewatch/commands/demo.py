@@ -7,7 +7,8 @@ from typing import Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 
 def demo(
@@ -35,8 +36,6 @@ def demo(
       lobewatch demo
       lobewatch demo --out trial --taps 12 --story step --bad-clampings 5
     """
-    from rich.progress import Progress
-
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder, make_machine_folder
     from lobewatch.notify.publish_status import publish_on_change
@@ -50,15 +49,16 @@ def demo(
     path = out or _find_free_name()
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
-    with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
+    with show_progress("tap tests") as progress:
         wear = SpindleWear.of(folder, taps, WearScenario(story))
         tests = age_spindle(folder, wear, seed, mounting, tcp=tcp)
-        taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
-        progress.add_task("history", total=None)
+        with time_step("tap tests"):
+            taken = list(progress.track(tests, total=2 * taps, task_id=progress.task_ids[0]))
+        progress.add_task("history and report", total=None)
         logbook = Logbook(folder)
         compared = compare_with_truth(logbook, taken)
         forecasts = forecast_levels(logbook, wear)
-        with publish_on_change(logbook):
+        with publish_on_change(logbook), time_step("report"):
             report = write_report(logbook)
     emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))
 

@@ -7,7 +7,7 @@ from typer import Argument, Exit, Option
 
 from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, print_always
 
 
 def export(
@@ -53,7 +53,7 @@ def export(
     else:
         outcome = upsert_table(tables, str(to))
     for key, reason in damaged.items():
-        notes.print(f"left out {key}: {reason}", markup=False)
+        print_always(f"left out {key}: {reason}")
     n_machines, (place, *_) = len(machines) - len(damaged), outcome.fields.values()
     payload = {"machines": n_machines, "tap_tests": outcome.tap_tests, "left_out": damaged}
     text = f"{outcome.tap_tests} tap tests of {n_machines} machines in {place}"

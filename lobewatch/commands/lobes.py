@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from typer import Option
 
 from lobewatch.commands.shared_options import TappedMachine
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
@@ -48,12 +49,12 @@ def lobes(
         remarks = [*logbook.remarks, *assembly.remarks]
         emit(speed_pockets_json(cut, pockets, remarks), as_json, *speed_pockets_texts(cut, pockets, remarks))
         return
-    if notes.is_terminal:
-        notes.print("looking for speeds and depths that are safe; this takes some seconds")
-    comparison = compare_lobes(logbook, tool, cut, DynamicsSource(source), LobeMethod(method))
+    with show_progress("searching stable pockets"), time_step("lobes"):
+        comparison = compare_lobes(logbook, tool, cut, DynamicsSource(source), LobeMethod(method))
     remarks = [*logbook.remarks, *comparison.remarks]
     if drawn:
         from lobewatch.show.figures.lobe_figures import save_lobe_figures  # brings matplotlib
 
-        remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
+        with time_step("figures"):
+            remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))

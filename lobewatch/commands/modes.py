@@ -9,6 +9,7 @@ from typer import Argument, Option
 
 from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit
+from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
     from modal import ModeEdits
@@ -116,8 +117,9 @@ def modes(
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
         )
-        file_modes = how(file, description=said, by_hand=edits)
-        measured = [how(path, description=known) for path, known in list_comparison_files(beside or (), file, said)]
+        with time_step("fitting"):
+            file_modes = how(file, description=said, by_hand=edits)
+            measured = [how(path, description=known) for path, known in list_comparison_files(beside or (), file, said)]
     if beside:
         file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:

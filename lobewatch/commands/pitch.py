@@ -5,7 +5,8 @@ from typing import Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import Flutes, Material, MillingDirection, TappedMachine, cut_fields
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 
 def pitch(
@@ -37,8 +38,7 @@ def pitch(
 
     cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     logbook = Logbook.open(machine)
-    if notes.is_terminal:
-        notes.print("judging pitches over all that is not known; this takes some seconds")
-    proposal = propose_requested_pitch(logbook, cut)
+    with show_progress("comparing pitches"), time_step("lobes"):
+        proposal = propose_requested_pitch(logbook, cut)
     remarks = logbook.remarks
     emit(pitches_json(proposal, remarks, depth), as_json, *pitches_texts(proposal, remarks, depth))

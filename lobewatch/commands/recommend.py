@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
-from lobewatch.show.terminal.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 
 def recommend(
@@ -45,7 +46,8 @@ def recommend(
     logbook = Logbook.open(machine)
     if save is not None:
         check_program_name(logbook.machine, save)
-    answer = recommend_requested(logbook, cut, save)
+    with show_progress("searching stable speeds and depths"), time_step("lobes"):
+        answer = recommend_requested(logbook, cut, save)
     saved = None if answer.setting is None else save
     if saved is not None:
         save_program(logbook.folder, answer.program)

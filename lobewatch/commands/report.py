@@ -9,6 +9,7 @@ from typer import Option
 from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, print_remarks
+from lobewatch.step_times import time_step
 
 
 def report(
@@ -36,7 +37,8 @@ def report(
         path = _write_for_fleet(machine, out)
     else:
         logbook = Logbook.open(machine)
-        path = write_report(logbook, out, tool, direction)
+        with time_step("report"):
+            path = write_report(logbook, out, tool, direction)
         print_remarks(logbook.remarks)
     emit({"report": str(path)}, as_json, f"report: {path}")
 

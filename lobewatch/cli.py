@@ -83,7 +83,8 @@ class _RootGroup(HelpGroup):
 
 app = typer.Typer(
     cls=_RootGroup,
-    help="Tap test in, stability lobes out: which cuts stop being safe as a spindle ages.",
+    help="Tap tests and stability lobes: find cuts that become unstable as a spindle ages.\n\n"
+    "lobewatch help COMMAND shows the options of a command.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -29,7 +29,7 @@ from lobewatch.show.terminal.option_names import with_option_names, with_option_
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON on stdout instead of text.")]
 
 JsonObject = dict[str, Any]
 """Object of the JSON output."""
@@ -195,19 +195,18 @@ def blank_nonfinite(value: Any) -> Any:
     return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
-Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
-KNOWN = "What a browser must know"
-Token = Annotated[str | None, typer.Option(help=f"{KNOWN} to see and alter anything; a new one where not given.")]
-WatchToken = Annotated[str | None, typer.Option(help=f"{KNOWN} only to see anything; a new one where not given.")]
+Listen = Annotated[str, typer.Option(help="IP address to listen on. 0.0.0.0: all addresses.")]
+Token = Annotated[str | None, typer.Option(help="Full-access token. Default: random.")]
+WatchToken = Annotated[str | None, typer.Option(help="Read-only access token. Default: random.")]
 
 
 def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
-    """Print the address and that for those who may only watch; open the first where somebody sits at a screen."""
+    """Print the full-access and the read-only address. On a desktop, open the first in a browser."""
     if as_json:
         results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
         results.file.flush()
     else:
-        print_always(f"screen: {url}\nonly to watch: {watch_url}")
+        print_always(f"screen: {url}\nread-only: {watch_url}")
     display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.stdout.isatty() and display:
         webbrowser.open(url)

@@ -10,6 +10,11 @@ STATUS_LABELS = {
 }
 
 
+def status_name(status: StatusLevel) -> str:
+    """Return the status as a word."""
+    return "warning" if status is StatusLevel.WARN else status.value
+
+
 def status_label(light: StatusLevel, is_early: bool = False) -> str:
     """Return the status with its symbol."""
     return "✗ EARLY ALARM" if is_early else STATUS_LABELS[light]

@@ -29,21 +29,21 @@ class EmulateOptions:
 
     machine: Annotated[Path, FolderArgument(help="Machine folder. Without [spindle], the example spindle is emulated.")]
     """Machine folder."""
-    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port instead of a pseudo-terminal.")] = False
+    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
-    fast: Annotated[bool, Option("--fast", help="Send as fast as the host reads, not in real time.")] = False
+    fast: Annotated[bool, Option("--fast", help="Send as fast as the host reads.")] = False
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    story: Annotated[WearScenarioName, Option(help="Bearing wear scenario over 24 months.")] = "none"
+    story: Annotated[WearScenarioName, Option(help="Bearing wear scenario (24 months).")] = "none"
     """Wear scenario of the bearings."""
     month: Annotated[int, Option(min=0, max=60, help="Month of the wear scenario.")] = 0
     """Month of the wear scenario."""
     scatter: ReclampingScatter = 0.0
     """Reclamping repeatability of f1: standard deviation (%)."""
-    bad_clampings: Annotated[float, Option(help="Probability of a bad clamping (%), f1 2 % low: 0 to 50.")] = 0.0
+    bad_clampings: Annotated[float, Option(help="Probability of a bad clamping (%), 0 to 50.")] = 0.0
     """Chance of a bad clamping (%)."""
-    temperature: Annotated[float | None, Option(help="Yearly temperature swing (K), 0 to 30, which moves f1.")] = None
+    temperature: Annotated[float | None, Option(help="Yearly temperature swing (K), 0 to 30.")] = None
     """Swing of the temperature over the year (K)."""
     direction: Annotated[
         Literal["x", "y", "xy"], Option(help="Direction of hammer and sensor. xy: hit in x, sensor in y.")
@@ -51,19 +51,17 @@ class EmulateOptions:
     """Direction of hammer and sensor."""
     askew: Annotated[
         float | None,
-        Option(help="Angle of the principal directions from x (deg), 0 to 90. Perpendicular modes are 5 % higher."),
+        Option(help="Angle of the principal directions from x (deg), 0 to 90."),
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
     cut: Annotated[
         str | None,
-        Option(metavar="PROGRAM", help="Program to cut, with the sensor on the housing. Default: tap tests."),
+        Option(metavar="PROGRAM", help="Program to cut. Default: tap tests."),
     ] = None
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[
-        float | None, Option(help="Commanded spindle speed of the cut (rpm). Default: from the program.")
-    ] = None
+    speed: Annotated[float | None, Option(help="Spindle speed of the cut (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, Option(help="Axial depth of the cut ap (mm). Default: from the program.")] = None
+    depth: Annotated[float | None, Option(help="Axial depth of the cut ap (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""

@@ -30,9 +30,7 @@ def modes(
     ] = None,
     window_start: Annotated[float, Option(help="Start of the window (s).")] = 0.0,
     hit_at: Annotated[float | None, Option(help="Time of the hit (s). Needed for an FRF with --window.")] = None,
-    averages: Annotated[
-        int | None, Option(help="Number of averaged hits of an FRF. Default: from its coherence.")
-    ] = None,
+    averages: Annotated[int | None, Option(help="Averaged hits of an FRF. Default: from its coherence.")] = None,
     hammer: Annotated[
         Literal["none"] | None, Option(help="No force was measured. Gives natural frequencies and damping only.")
     ] = None,
@@ -47,10 +45,7 @@ def modes(
     ] = None,
     beside: Annotated[
         list[str] | None,
-        Option(
-            help="Other measurement of the same structure, to confirm modes: file, response number or tap test. "
-            "Give at least two."
-        ),
+        Option(help="Another measurement (file, response number or tap test) to confirm modes. Give at least two."),
     ] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,

@@ -33,7 +33,7 @@ TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at leas
 SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with [spindle] in machine.toml.")]
 FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
 ExcludableEntry = Annotated[str, Argument(help="Tap test (ID, file or a unique part), or test cut (c1).")]
-AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout instead of text.")]
+AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
 CutDepth = Annotated[float | None, Option(help="Axial depth of cut ap (mm). Default: from the program.")]
@@ -57,32 +57,28 @@ class FileOptions:
 
     columns: Annotated[
         str,
-        Option(
-            help='Column headings: "frequency,real,imag", "time [s],force [N],acceleration [g]", "frequency=F,frf=H:2".'
-        ),
+        Option(help='Column headings: "frequency,real,imag", "time [s],force [N]", "frequency=F,frf=H:2".'),
     ] = ""
     """Headings of the columns, separated by commas."""
-    quantity: Annotated[str, Option(help="Response quantity: displacement, velocity or acceleration.")] = ""
+    quantity: Annotated[str, Option(help="Response: displacement, velocity or acceleration.")] = ""
     """Quantity of the response."""
-    unit: Annotated[str, Option(help="Unit of the response (m/s^2, g) or FRF (m/N, um/N, g/N).")] = ""
+    unit: Annotated[str, Option(help="Unit of response (m/s^2, g) or FRF (m/N, g/N).")] = ""
     """Unit of the response or of the FRF."""
-    force_unit: Annotated[str, Option(help="Unit of the force (N, lbf).")] = ""
+    force_unit: Annotated[str, Option(help="Force unit (N, lbf).")] = ""
     """Unit of the force."""
-    skip: Annotated[int | None, Option(min=1, help="Number of text lines above the rows.")] = None
+    skip: Annotated[int | None, Option(min=1, help="Text lines above the rows.")] = None
     """Number of lines above the rows."""
-    decimal: Annotated[str, Option(help="Decimal sign of an ambiguous text: comma or point.")] = ""
+    decimal: Annotated[str, Option(help="Decimal sign: comma or point.")] = ""
     """Decimal sign."""
     spacing: Annotated[float | None, Option(help="Line spacing (Hz) of an FRF without frequencies.")] = None
     """Spacing of the lines (Hz)."""
-    start: Annotated[float | None, Option(help="First frequency (Hz) of an FRF without frequencies. Default: 0.")] = (
-        None
-    )
+    start: Annotated[float | None, Option(help="First frequency (Hz) of such an FRF. Default: 0.")] = None
     """Frequency of the first line (Hz)."""
-    force: Annotated[Path | None, Option(help="File with the force if FILE has only the response.")] = None
+    force: Annotated[Path | None, Option(help="File with the force.")] = None
     """File of the force."""
-    rate: Annotated[float | None, Option(help="Sample rate (Hz). Default: from the file.")] = None
+    rate: Annotated[float | None, Option(help="Sample rate (Hz).")] = None
     """Sample rate (Hz)."""
-    averages: Annotated[int | None, Option(help="Number of averaged hits of an FRF. Default: 1.")] = None
+    averages: Annotated[int | None, Option(help="Averaged hits of an FRF. Default: 1.")] = None
     """Number of hits that an FRF was averaged from."""
     response: Annotated[int | None, Option(help="Number of the response, from 1.")] = None
     """Number of the response, from 1."""

@@ -14,7 +14,7 @@ def trend(
     direction: Annotated[
         str | None, Option(help="Direction of the series: x or y. Default: larger frequency drop.")
     ] = None,
-    as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout instead of text.")] = False,
+    as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout.")] = False,
     as_json: Json = False,
 ) -> None:
     """Show the frequency trend of a series.

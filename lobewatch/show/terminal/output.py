@@ -29,7 +29,7 @@ from lobewatch.show.terminal.option_names import with_option_names, with_option_
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-Json = Annotated[bool, typer.Option("--json", help="JSON on stdout instead of text.")]
+Json = Annotated[bool, typer.Option("--json", help="JSON on stdout.")]
 
 JsonObject = dict[str, Any]
 """Object of the JSON output."""

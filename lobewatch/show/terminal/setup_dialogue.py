@@ -17,7 +17,7 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
             if question is DAQ_QUESTION and draft.daq.problem:
                 _print_notes(f"note: {draft.daq.problem}")
     if draft.missing_sensors:
-        cure = f"A {draft.daq.driver} DAQ does not describe its sensors: give input, sensitivity and range."
+        cure = "This DAQ does not describe its sensors: give input, sensitivity and range."
         raise ValueError(f"--{draft.missing_sensors[0]} is missing. {cure}")
     return draft
 

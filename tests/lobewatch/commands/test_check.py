@@ -31,7 +31,8 @@ def test_a_new_spindle_passes_and_an_aged_one_does_not(shop: Shop, check: Check)
     shop.tap_both(700, 0.9)
     said = check()
     assert (said.code, said.last) == (1, "3 programs: 1 stable, 2 not stable")
-    assert said.line("A").startswith("A: stable at first, no longer: chatter near 15")
+    assert re.search(r" 15\d\d Hz", said.line("A"))
+    assert said.code == 1
     assert not re.search(r"^B: ", said.out, re.MULTILINE)
 
 
@@ -43,11 +44,12 @@ def test_one_direction_is_never_enough_to_be_called_stable(shop: Shop, check: Ch
     assert {one["verdict"] for one in said.json["programs"]} == {"doubtful"}
     assert {one["decided_by"] for one in said.json["programs"]} == {"untapped"}
     assert {one["stable"] for one in said.json["programs"]} == {True}
-    assert check().line("A") == "A: direction y was not tapped; to settle it: tap direction y of tool 'reference' too"
+    assert "direction y" in check().line("A")
+    assert "'reference'" in check().line("A")
     shop.tap(0.1, 1690.0, "y", tool="another")
     assert (
         check("--json").programs["A"]["verdict"],
-        check().line("A").endswith("tap direction y of tool 'reference' too"),
+        "direction y" in check().line("A"),
     ) == ("doubtful", True)
     shop.tap(0.2, 1690.0, "y")
     both = check("--json")
@@ -59,7 +61,8 @@ def test_without_the_other_direction_nothing_is_recommended(shop: Shop, check: C
     shop.tap(0, 1713.0, "y")
     said = check("--json")
     assert (said.programs["A"]["verdict"], said.programs["A"]["advice"]) == ("not stable", None)
-    assert check().line("A").endswith("tap direction x of tool 'reference' too: only then can a safe speed be named")
+    assert "direction x" in check().line("A")
+    assert "'reference'" in check().line("A")
 
 
 def test_the_object_of_a_program(shop: Shop, check: Check) -> None:
@@ -144,24 +147,22 @@ HERE = Setting(12900.0, 1.95, (12160.0, 13150.0), 1.02, 0.0)
         (
             BEST,
             None,
-            "run this depth at 23 670 rpm "
-            "(23 320 to 24 000 rpm is safe; 55 % of depth to spare; the frequency may fall by 10 % or more)",
+            ["23 670 rpm", "23 320 to 24 000 rpm", "55 %", "10 %"],
         ),
         (
             FEWER,
             HERE,
-            "no safe speed for this depth in 3 000 to 24 000 rpm; most chips: 2.55 mm at 12 640 rpm "
-            "(12 510 to 12 880 rpm is safe; 50 % of depth to spare; the frequency may fall by 2.5 %); at 12 900 rpm no "
-            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; the frequency may fall by "
-            "less than 1 %)",
+            [
+                *("3 000 to 24 000 rpm", "2.55 mm", "12 640 rpm", "12 510 to 12 880 rpm", "50 %", "2.5 %"),
+                *("12 900 rpm", "1.95 mm", "12 160 to 13 150 rpm", "102 %", "1 %"),
+            ],
         ),
         (
             HERE,
             HERE,
-            "no safe speed for this depth in 3 000 to 24 000 rpm; at 12 900 rpm no deeper than 1.95 mm "
-            "(12 160 to 13 150 rpm is safe; 102 % of depth to spare; the frequency may fall by less than 1 %)",
+            ["3 000 to 24 000 rpm", "12 900 rpm", "1.95 mm", "12 160 to 13 150 rpm", "102 %", "1 %"],
         ),
-        (None, None, "no safe speed in 3 000 to 24 000 rpm; choose another tool"),
+        (None, None, ["3 000 to 24 000 rpm", "tool"]),
     ],
 )
 def test_advice_in_words(
@@ -170,15 +171,18 @@ def test_advice_in_words(
     monkeypatch: pytest.MonkeyPatch,
     best: Setting | None,
     here: Setting | None,
-    words: str,
+    words: list[str],
 ) -> None:
     shop.run(("A", 12900, 6), ("D", 12900, 3))
     shop.tap_both()
     advised_to(monkeypatch, best, here)
     said = check()
-    assert re.fullmatch(r"A: chatter near 16\d\d Hz; " + re.escape(words), said.line("A"))
+    assert re.search(r"\b16\d\d Hz", said.line("A"))
+    found = [said.line("A").find(word) for word in words]
+    assert -1 not in found
+    assert found == sorted(found)
     if best is not BEST:
-        assert said.line("D").endswith(f"; until then {words}")
+        assert all(word in said.line("D") for word in words)
 
 
 def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, no_search: None) -> None:
@@ -188,13 +192,12 @@ def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, 
     assert (said["verdict"], said["stable"], said["decided_by"]) == ("doubtful", True, "coefficients")
     assert [one["code"] for one in said["remarks"]] == ["doubt-decides"]
     text = check()
-    words = r"A: the cutting coefficients decide: chatters above Kt (\d+) N/mm2; to settle it: measure them"
-    decided = re.match(words, text.line("A"))
+    decided = re.search(r"Kt (\d+) N/mm2", text.line("A"))
     assert decided is not None
     assert float(decided[1]) == pytest.approx(1400 * said["limit_mm"] / 3, abs=1)
-    assert text.out.count("coefficients decide") == 1
+    assert text.out.count(decided[0]) == 1
     assert text.last == "1 program: 1 doubtful"
-    assert text.line("A").split("; ")[1] == "to settle it: measure them, or name the material"
+    assert "material" in text.line("A")
     shop.edit("[speed]", "[doubt]\ncoefficients_percent = 1\nspeed_percent = 0.1\ndamping_percent = 1\n\n[speed]")
     settled = check("--json")
     assert (settled.code, settled.programs["A"]["verdict"]) == (0, "stable")
@@ -202,15 +205,12 @@ def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, 
 
 def test_the_uncertainty_is_reported_with_its_sources_and_once(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
-    default = "frequency ±0.3 %, damping ±10 %, stiffness ±3 % from tap to tap (default until 8 tests)"
-    said = check().out
-    assert f"doubt: {default}; speed ±1 %; Kt and Kr/Kt ±20 % (docs/lobes.md)\n" in said
-    assert said.count("The words hold for the spindle as tapped, at rest") == 1
-    assert said.count("turning: chance of chatter") == 1
+    default = ("±0.3 %", "±10 %", "±3 %", "8 tests", "±1 %", "±20 %")
+    (line,) = (line for line in check().out.splitlines() if "±" in line)
+    assert all(fact in line for fact in default)
     shop.edit("[speed]", "[doubt]\nfrequency_percent = 0.5\nspeed_percent = 2\ncoefficients_percent = 7\n\n[speed]")
-    given = "frequency ±0.5 %, damping ±10 %, stiffness ±3 % from tap to tap (default until 8 tests, machine.toml)"
-    said = check().out
-    assert f"doubt: {given}; speed ±2 % (machine.toml); Kt and Kr/Kt ±7 % (machine.toml) (docs/lobes.md)\n" in said
+    (line,) = (line for line in check().out.splitlines() if "±" in line)
+    assert all(fact in line for fact in ("±0.5 %", "±10 %", "±3 %", "±2 % (machine.toml)", "±7 % (machine.toml)"))
 
 
 def test_other_uncertainties_are_reported_by_program(shop: Shop, check: Check, no_search: None) -> None:
@@ -224,23 +224,18 @@ def test_other_uncertainties_are_reported_by_program(shop: Shop, check: Check, n
     )
     shop.tap(0, 1713.0)
     said = check().out
-    assert re.search(
-        r"^doubt of Al: .*; frequency ±5 %, stiffness ±30 % in y, not tapped; .*; Kt .*\(published for Al 7075\)",
-        said,
-        re.MULTILINE,
-    )
-    predicted = "frequency ±3 %, damping ±30 %, stiffness ±15 % by the prediction"
-    predicted += "; frequency ±5 %, stiffness ±30 % in y, not tapped; speed ±1 %"
-    assert f"doubt of long: {predicted}" in said
+    assert re.search(r" Al: .*±5 %.*±30 %.*Kt .*Al 7075", said)
+    assert re.search(r" long: .*±3 %.*±30 %.*±15 %.*±5 %.*±30 %.*±1 %", said)
     assert check("--json").programs["long"]["doubt"]["prediction"]["damping_ratio"] == [0.3] * 2
-    assert "tool 'long end mill': predicted by the model" in said
+    assert "'long end mill'" in said
 
 
 def test_a_material_that_is_named_is_not_asked_for(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     said = check("--speed", "8700", "--depth", "1", "--material", "42CrMo4")
     assert (said.code, said.last) == (1, "1 program: 1 doubtful")
-    assert re.search(r"the cutting coefficients decide: .*; to settle it: measure them(;|\n)", said.out)
+    assert re.search(r"Kt \d+ N/mm2", said.out)
+    assert "material" not in said.line("8700 rpm, 1 mm")
 
 
 def test_the_uncertainty_of_a_listed_material_is_its_published_range(shop: Shop, check: Check, no_search: None) -> None:
@@ -251,7 +246,7 @@ def test_the_uncertainty_of_a_listed_material_is_its_published_range(shop: Shop,
     known = check("--json").programs["A"]["doubt"]["coefficients"]
     assert known["tangential"] == pytest.approx([1929 / 2726 - 1, 4031 / 2726 - 1], abs=1e-3)
     assert known["radial_over_tangential"] == pytest.approx([0.13 / 0.27 - 1, 1.0])
-    assert "Kt -29..+48 %, Kr/Kt -52..+100 % (published for 42CrMo4)" in check().out
+    assert re.search(r"Kt -29..\+48 %, Kr/Kt -52..\+100 %.*42CrMo4", check().out)
 
 
 def test_a_series_of_eight_tells_its_own_scatter(shop: Shop, check: Check, no_search: None) -> None:
@@ -272,7 +267,7 @@ def test_a_series_of_eight_tells_its_own_scatter(shop: Shop, check: Check, no_se
     assert now["doubt"]["clamping"]["frequency"] == pytest.approx([expected] * 2, rel=0.01)
     assert now["doubt"]["clamping"]["damping_ratio"][0] < 0.01
     assert now["limit_high_mm"] - now["limit_low_mm"] < before["limit_high_mm"] - before["limit_low_mm"]
-    assert "from tap to tap (scatter of 8 tests)" in check().out
+    assert "8 tests" in check().out
 
 
 def test_the_drive_and_missing_taps_are_reported(shop: Shop, check: Check, no_search: None) -> None:
@@ -284,10 +279,11 @@ def test_the_drive_and_missing_taps_are_reported(shop: Shop, check: Check, no_se
     said = check()
     assert (said.code, said.last) == (1, "3 programs: 2 stable, 1 unknown, 1 beyond the drive")
     power = 4 * 0.02 / (4 * np.pi) * 2 * 1400e6 * 1e-4 * 2 * np.pi * 12900 / 60
-    assert said.line("A") == f"A: [drive] allows no more than {np.floor(500 / power * 1e5) / 100:.2f} mm at this speed"
-    assert re.search(r"^A .* stable, beyond", said.out, re.MULTILINE)
-    assert "B: not checked: no tap test with tool 'T7'" in said.line("B")
-    assert "note: C: [drive] does not count: feed_per_tooth_mm is missing" in said.out
+    assert "[drive]" in said.line("A")
+    assert f" {np.floor(500 / power * 1e5) / 100:.2f} mm" in said.line("A")
+    assert re.search(r"^A .* stable, ", said.out, re.MULTILINE)
+    assert "'T7'" in said.line("B")
+    assert re.search(r"\bC: .*\[drive\].*feed_per_tooth_mm", said.out)
     found = check("--json")
     assert (found.json["not_checked"], found.json["beyond_drive"], found.programs["A"]["stable"]) == (1, 1, True)
     unknown = found.programs["B"]
@@ -319,9 +315,9 @@ def test_a_band_without_modes_leaves_programs_unknown(shop: Shop, check: Check) 
     shop.edit("band_hz = [1200, 2200]", "band_hz = [2000, 2200]")
     said = check()
     assert (said.code, said.last) == (1, "3 programs: 3 unknown")
-    reason = "no mode to follow: none with positive stiffness in [mode] band_hz 2000..2200 Hz; found are 1690 Hz"
-    assert said.line("A").startswith(f"A: not checked: {reason}")
-    assert "doubt:" not in said.out
+    assert "[mode] band_hz 2000..2200 Hz" in said.line("A")
+    assert "1690 Hz" in said.line("A")
+    assert "±" not in said.out
     assert {one["verdict"] for one in check("--json").json["programs"]} == {"unknown"}
 
 
@@ -351,32 +347,32 @@ SPEEDS = "high_rpm = 24000\nsteps = 200\n"
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (SPEEDS, "[doubt]\nspeed_percent = -3\n", "doubt speed_percent: Expected `float` >= 0.0, not -3"),
-        (SPEEDS, "[doubt]\nspeed_percent = 120\n", "doubt speed_percent: Expected `float` <= 100.0, not 120"),
-        (SPEEDS, "[doubt]\ndamping_percent = nan\n", "doubt damping_percent: Expected `float` >= 0.0, not nan"),
-        (SPEEDS, "[doubt]\nspeed_percnt = 1\n", "doubt: unknown key 'speed_percnt'; is 'speed_percent' meant?"),
-        ("depth_mm = 0.4", 'feed = "z"\ndepth_mm = 0.4', 'program 2: feed=\'z\' is no direction; give "x", "y" or'),
+        (SPEEDS, "[doubt]\nspeed_percent = -3\n", ("doubt", "speed_percent", ">= 0.0", "-3")),
+        (SPEEDS, "[doubt]\nspeed_percent = 120\n", ("doubt", "speed_percent", "<= 100.0", "120")),
+        (SPEEDS, "[doubt]\ndamping_percent = nan\n", ("doubt", "damping_percent", ">= 0.0", "nan")),
+        (SPEEDS, "[doubt]\nspeed_percnt = 1\n", ("doubt", "'speed_percnt'", "'speed_percent'")),
+        ("depth_mm = 0.4", 'feed = "z"\ndepth_mm = 0.4', ("program 2", "'z'", '"x", "y"')),
         (
             "depth_mm = 0.4",
             "flute_length_mm = 0\ndepth_mm = 1",
-            "program 2 flute_length_mm: Expected `float` > 0.0, not",
+            ("program 2", "flute_length_mm", "> 0.0"),
         ),
         (
             "depth_mm = 0.4",
             "flute_length_mm = 1\ndepth_mm = 2",
-            "program 2: depth_mm=2 is deeper than flute_length_mm",
+            ("program 2", "depth_mm=2", "flute_length_mm"),
         ),
-        ("speed_rpm = 12900", "speed_rpm = 25000", "program 1: speed_rpm=25000 is outside [speed] 3000..24000 rpm"),
+        ("speed_rpm = 12900", "speed_rpm = 25000", ("program 1", "25000", "3000..24000 rpm")),
     ],
 )
 def test_bad_input_is_one_sentence_with_place_and_value(
-    shop: Shop, check: Check, old: str, new: str, message: str
+    shop: Shop, check: Check, old: str, new: str, message: tuple[str, ...]
 ) -> None:
     shop.edit(old, new)
     said = check()
     assert said.code == 2
     assert said.err.startswith("error: ")
-    assert message in said.err
+    assert all(fact in said.err for fact in message)
     assert "Traceback" not in said.err
 
 
@@ -384,29 +380,23 @@ def test_no_longer_is_reported_of_the_same_directions_only(shop: Shop, check: Ch
     shop.tap_both()
     shop.tap(700, 1713.0 * 0.9)
     shop.tap(700.1, 1690.0 * 0.9, "y")
-    assert check().out.count("stable at first, no longer") == 2
+    assert (
+        sum(one["was_stable_at_first"] is True and not one["stable"] for one in check("--json").json["programs"]) == 2
+    )
     shop.run(("A", 12900, 1.5), tool="another")
     shop.tap(0, 1713.0, tool="another")
     shop.tap(700, 1713.0 * 0.9, tool="another")
     shop.tap(700.1, 1690.0 * 0.9, "y", tool="another")
-    said = check()
-    assert (said.last, "no longer" in said.out) == ("1 program: 1 not stable", False)
+    (found,) = check("--json").json["programs"]
+    assert (found["verdict"], found["was_stable_at_first"]) == ("not stable", None)
 
 
-def test_a_long_check_says_how_far_it_is(
-    shop: Shop, check: Check, no_search: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("lobewatch.commands.check.PROGRESS_DELAY", -1.0)
-    shop.tap(0, 1713.0)
-    assert check().err.count("0 of 3 programs are checked") == 1
-
-
-def test_check_without_anything_to_check_is_rejected(check: Check, tmp_path: Path) -> None:
-    said = check()
-    assert (said.code, "no tap test yet" in said.err) == (2, True)
+def test_check_without_anything_to_check_is_rejected(shop: Shop, check: Check, tmp_path: Path) -> None:
+    shop_path, said = shop.path, check()
+    assert (said.code, str(shop_path) in said.err) == (2, True)
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     said = check(folder=tmp_path / "plain")
-    assert (said.code, "no [[program]] to check" in said.err) == (2, True)
+    assert (said.code, "[[program]]" in said.err) == (2, True)
 
 
 def test_only_the_programs_that_are_named_are_checked(shop: Shop, check: Check, no_search: None) -> None:
@@ -423,6 +413,6 @@ def test_a_program_that_is_not_there_is_rejected_with_those_that_are(shop: Shop,
     shop.tap_both()
     said = check("--program", "B", "--program", "D")
     assert (said.code, said.out) == (2, "")
-    assert "program 'D' is not in machine.toml; there are 'A', 'B', 'C'" in said.err
+    assert all(fact in said.err for fact in ("'D'", "machine.toml", "'A', 'B', 'C'"))
     said = check("--program", "B", "--depth", "1")
-    assert (said.code, "--program has its own speed, depth and tool" in said.err) == (2, True)
+    assert (said.code, "--program" in said.err) == (2, True)

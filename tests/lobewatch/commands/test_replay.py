@@ -60,25 +60,24 @@ def taps(shop: Shop) -> list[str]:
 
 def test_a_file_without_a_date_is_asked_for_it_with_all_else(shop: Shop, tmp_path: Path) -> None:
     path = frf(tmp_path / "x.csv", heading="Freq,Real,Imag")
-    with pytest.raises(DataError, match=r"the unit of Real \(--unit, such as .*\), when it was recorded \(--date"):
+    with pytest.raises(DataError, match=r"x\.csv.*Real.*--unit.*--date"):
         run("replay", shop.path, path)
-    with pytest.raises(
-        DataError, match=r"^[^;]*x\.csv: it does not say: when it was recorded \(--date 2024-05-01, or --da"
-    ):
+    with pytest.raises(DataError, match=r"x\.csv: .*--date 2024-05-01.*--date-pattern") as refused:
         run("replay", shop.path, path, "--unit", "um/N")
+    assert "--unit" not in str(refused.value)
     assert taps(shop) == []
 
 
 def test_a_folder_is_stored_in_order_of_date_once(shop: Shop, folder: Path) -> None:
     said = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d")
-    assert "3 of 3 file(s) stored" in said.stdout
+    assert "3 of 3" in said.stdout
     assert "direction x" in said.stdout
     assert taps(shop) == ["2024-05-01", "2024-07-01", "2024-09-01"]
     frequencies = [row.frequency.value for row in shop.logbook.history.rows]
     assert frequencies == pytest.approx([1713, 1700, 1690], rel=1e-3)
     shutil.copy(folder / "a 20240901.csv", folder / "again 20230101.csv")
     again = run("replay", shop.path, folder / "*.csv", "--date-pattern", "%Y%m%d")
-    assert "0 of 4 file(s) stored" in again.stdout
+    assert "0 of 4" in again.stdout
     assert len(taps(shop)) == 3
 
 
@@ -95,8 +94,7 @@ def test_a_dry_run_explains_and_stores_nothing(shop: Shop, folder: Path) -> None
     assert first["followed"]["frequency_hz"] == pytest.approx(1713, rel=1e-3)
     assert [one["questions"] for one in said["files"]] == [[], [], []]
     text = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run").stdout
-    assert "3 of 3 file(s) would be stored" in text
-    assert "plausible for this machine" in text
+    assert "3 of 3" in text
     assert before == sorted(path for path in shop.path.rglob("*") if path.is_file())
 
 
@@ -136,12 +134,12 @@ def test_one_bad_file_costs_only_itself_where_it_may(shop: Shop, folder: Path) -
     bad.write_text("Freq (Hz),Real (um/N),Imag (um/N)\n1,2,3\n2,x,3\n")
     (folder / "empty 20240802.txt").touch()
     options = ("--date-pattern", "%Y%m%d")
-    with pytest.raises(DataError, match="2 of 5 files cannot be used; nothing is stored; --keep-going") as refused:
+    with pytest.raises(DataError, match=r"2 of 5(.|\n)*--keep-going") as refused:
         run("replay", shop.path, folder, *options)
-    assert "Real holds 'x' in line 3, which is no number" in str(refused.value)
-    assert "the file is empty" in str(refused.value)
+    assert re.search(r"bad 20240801\.csv: .*'x'.*line 3", str(refused.value))
+    assert "empty 20240802.txt" in str(refused.value)
     assert taps(shop) == []
-    with pytest.raises(DataError, match="2 of 5 files cannot be used; the others are stored"):
+    with pytest.raises(DataError, match="2 of 5"):
         run("replay", shop.path, folder, *options, "--keep-going")
     assert len(taps(shop)) == 3
 
@@ -150,7 +148,7 @@ def test_where_no_file_can_be_used_nothing_is_kept_going_with(shop: Shop, tmp_pa
     files = [tmp_path / name for name in ("a.csv", "b.csv")]
     for file in files:
         file.write_text(f"no recording: {file.name}", "utf-8")
-    with pytest.raises(DataError, match="none of the 2 files can be used; nothing is stored"):
+    with pytest.raises(DataError, match=" 2 files"):
         run("replay", shop.path, *files, "--keep-going", "--date", "2024-05-01")
     assert shop.logbook.taps == []
 
@@ -161,8 +159,9 @@ def test_notes_next_to_recordings_are_skipped_and_rejected_by_name(shop: Shop, f
     said = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run", "--json").stdout
     assert [Path(one).name for one in json.loads(said)["passed_over"]] == [notes.name, "picture.png"]
     stored = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d")
-    assert "passed over: 2 other files, such as Notizen" in stored.stderr
-    with pytest.raises(DataError, match=r"Notizen Fräser\.txt: line 2: '24\.05\.2024' is no row of numbers"):
+    assert "2 other files" in stored.stderr
+    assert "Notizen" in stored.stderr
+    with pytest.raises(DataError, match=r"Notizen Fräser\.txt: line 2: '24\.05\.2024'"):
         run("replay", shop.path, notes, "--date", "2024-05-24")
 
 
@@ -170,14 +169,14 @@ def test_a_column_of_complex_numbers_is_no_notes(shop: Shop, tmp_path: Path) -> 
     (tmp_path / "taps").mkdir()
     for name, text in (("a.txt", "({:.3e}-{:.3e}j)\n"), ("b.txt", "{:.3e} - {:.3e}i\n")):
         (tmp_path / "taps" / name).write_text("".join(text.format(1e-6 * n, 2e-7 * n) for n in range(1, 60)))
-    with pytest.raises(DataError, match=r"a\.txt, .*b\.txt: it does not say: the unit of column 1 .*--spacing 0\.5"):
+    with pytest.raises(DataError, match=r"a\.txt, .*b\.txt: .*column 1.*--spacing 0\.5"):
         run("replay", shop.path, tmp_path / "taps")
 
 
 def test_a_directory_that_is_called_like_a_file_is_a_folder(shop: Shop, folder: Path) -> None:
     (folder / "d 20240101.csv").mkdir()
-    assert "3 of 3 file(s) stored" in run("replay", shop.path, folder, "--date-pattern", "%Y%m%d").stdout
-    with pytest.raises(DataError, match=r"d 20240101\.csv: none of the 0 files in this folder is a recording"):
+    assert "3 of 3" in run("replay", shop.path, folder, "--date-pattern", "%Y%m%d").stdout
+    with pytest.raises(DataError, match=r"d 20240101\.csv: .*0 files"):
         run("replay", shop.path, folder / "d 20240101.csv", "--date-pattern", "%Y%m%d")
 
 
@@ -194,7 +193,7 @@ def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> No
     with shop.folder.locked():
         stored = store_recordings(shop.folder, files, said, keep_going=True)
     assert (len(stored.new_tap_ids), [*stored.rejected]) == (200, [bad])
-    assert "Real holds 'x' in line 3, which is no number" in stored.rejected[bad]
+    assert re.search(r"Real .*'x'.*line 3", stored.rejected[bad])
     assert len(taps(shop)) == 200
 
 
@@ -202,7 +201,7 @@ def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> No
 def test_a_file_that_changes_while_it_is_read_is_rejected(
     shop: Shop, folder: Path, monkeypatch: pytest.MonkeyPatch, length: int
 ) -> None:
-    growing, wait = folder / "a 20240901.csv", "it changes while it is read; wait until it is written"
+    growing = folder / "a 20240901.csv"
 
     def looked(path: Path, said: Description) -> Recording:
         found = inspect_file(path, said)
@@ -212,9 +211,9 @@ def test_a_file_that_changes_while_it_is_read_is_rejected(
         return found
 
     monkeypatch.setattr("lobewatch.logbook.recordings.recorded_files.inspect_file", looked)
-    with pytest.raises(DataError, match=f"{growing.name}: {wait}"):
+    with pytest.raises(DataError, match=f"{growing.name}: "):
         run("replay", shop.path, growing, "--date-pattern", "%Y%m%d")
-    with pytest.raises(DataError, match=f"{growing.name}: {wait} .1 of 3 files; the others are stored"):
+    with pytest.raises(DataError, match=f"{growing.name}: .*1 of 3"):
         run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--keep-going")
     assert taps(shop) == ["2024-05-01", "2024-07-01"]
 
@@ -223,7 +222,7 @@ def test_a_window_is_rejected_by_a_replay_and_taken_off_by_modes(shop: Shop, tmp
     plain = frf(tmp_path / "plain.csv")
     windowed = tmp_path / "window.csv"
     windowed.write_text("# window: exponential 0.02 s\n" + plain.read_text())
-    with pytest.raises(DataError, match=r"under a window \(exponential 0.02 s\), which adds damping"):
+    with pytest.raises(DataError, match=r"exponential.*0\.02 s"):
         run("replay", shop.path, windowed, "--date", "2024-05-01")
     said, ours = ("--hit-at", "0", "--json"), ("--window", "0.02", "--hit-at", "0", "--json")
     found = [
@@ -232,12 +231,12 @@ def test_a_window_is_rejected_by_a_replay_and_taken_off_by_modes(shop: Shop, tmp
     ]
     assert found[0] == found[1]
     assert found[2] - found[0] == pytest.approx(1 / (0.02 * 2 * np.pi * 1700), rel=1e-2)
-    with pytest.raises(ValueError, match=r"--window 0\.05: the file says 0\.02 s; leave the option out"):
+    with pytest.raises(ValueError, match=r"--window 0\.05.*0\.02 s"):
         run("modes", windowed, "--window", "0.05", "--hit-at", "0")
-    with pytest.raises(ValueError, match="the file names no window; add --window"):
+    with pytest.raises(ValueError, match="--window"):
         run("modes", plain, "--hit-at", "0")
     windowed.write_text(windowed.read_text().replace(" 0.02 s", ""))
-    with pytest.raises(ValueError, match="does not say how that falls"):
+    with pytest.raises(ValueError, match="--window"):
         run("modes", windowed, "--hit-at", "0")
 
 
@@ -256,12 +255,12 @@ def test_a_second_response_of_the_same_file_is_another_test(shop: Shop, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["*.nothing"], "no file matches this pattern"),
-        (["empty"], "none of the 0 files in this folder is a recording"),
-        (["x.csv", "--date-pattern", "%Q"], "--date-pattern '%Q': give it with %Y"),
-        (["x.csv", "--date-pattern", "%Y%m%d"], "no date like --date-pattern '%Y%m%d' in 'x.csv'"),
-        (["x.csv", "--date-pattern", "x", "--date", "2024-01-01"], "give one of them"),
-        (["x.csv", "--date", "2024-01-01", "--unit", "furlong"], "--unit furlong: not known as a unit of Real"),
+        (["*.nothing"], "*.nothing"),
+        (["empty"], "0 files"),
+        (["x.csv", "--date-pattern", "%Q"], "--date-pattern '%Q'"),
+        (["x.csv", "--date-pattern", "%Y%m%d"], "--date-pattern '%Y%m%d'"),
+        (["x.csv", "--date-pattern", "x", "--date", "2024-01-01"], "--date"),
+        (["x.csv", "--date", "2024-01-01", "--unit", "furlong"], "--unit furlong"),
     ],
 )
 def test_wrong_use_is_one_sentence(
@@ -277,7 +276,8 @@ def test_wrong_use_is_one_sentence(
 def test_convert_writes_what_modes_reads(tmp_path: Path) -> None:
     source = frf(tmp_path / "x.csv")
     said = run("convert", source, tmp_path / "x.uff", "--date", "2024-05-01", "--direction", "y")
-    assert "universal file, FRF of 999 lines, 12 digits" in said.stdout
+    assert "999 lines" in said.stdout
+    assert "12 digits" in said.stdout
     found = [json.loads(run("modes", path, "--json").stdout)["modes"][0] for path in (source, tmp_path / "x.uff")]
     assert found[0]["frequency_hz"] == pytest.approx(found[1]["frequency_hz"], rel=1e-8)
     assert found[0]["stiffness_n_per_m"] == pytest.approx(found[1]["stiffness_n_per_m"], rel=1e-6)
@@ -303,14 +303,14 @@ def test_what_many_files_lack_is_asked_for_once_and_answered_once(shop: Shop, na
     with pytest.raises(DataError) as refused:
         run("replay", shop.path, narrow)
     _, line = str(refused.value).splitlines()
-    assert line.endswith("for a date in its name)")
+    assert line.count("--date-pattern") == 1
     assert "20240101.csv, " in line
-    assert "20240103.csv and 17 more: it does not say: the unit of Real (--unit" in line
+    assert re.search(r"20240103\.csv and 17 more: .*Real.*--unit", line)
     preview = CliRunner().invoke(app, ["replay", str(shop.path), str(narrow), "--dry-run"])
-    assert preview.stdout.count("cannot be used: it does not say") == 1
+    assert preview.stdout.count("--unit") == 1
     few = CliRunner().invoke(app, ["replay", str(shop.path), *map(str, sorted(narrow.iterdir())[:4]), "--dry-run"])
-    assert few.stdout.count("cannot be used: it does not say") == 1
-    assert "0 of 4 file(s) would be stored" in few.stdout
+    assert few.stdout.count("--unit") == 1
+    assert "0 of 4" in few.stdout
     (narrow / "20240104.csv").write_text("Freq,Real,Imag\n1,2,3\n2,x,3\n3,4,5\n")
     with pytest.raises(DataError) as refused:
         run("replay", shop.path, narrow)
@@ -327,15 +327,15 @@ def test_files_of_other_lengths_lack_the_same(shop: Shop, tmp_path: Path) -> Non
 
 def test_what_is_asked_of_many_tests_is_one_sentence_and_takes_one_answer(shop: Shop, narrow: Path) -> None:
     preview = run("replay", shop.path, narrow, *SAID, "--dry-run").stdout
-    assert preview.count("question (other-band)") == 1
-    assert "date 2024-01-01 00:00 to 2024-01-20 00:00" in preview
+    assert preview.count("(other-band)") == 1
+    assert "2024-01-01 00:00 to 2024-01-20 00:00" in preview
     said = run("replay", shop.path, narrow, *SAID).stdout
-    assert said.count("do not cover [mode] band_hz") == 1
+    assert said.count("[mode] band_hz") == 1
     (remark,) = (remark for remark in shop.logbook.status().remarks if remark.code == "other-band")
     first, *_, last = [entry.id for entry in shop.folder.taps()]
     assert remark.about == f"20 tap tests, {first} to {last}"
     answer = f"lobewatch replay {shop.path} {shop.path / 'taps'} --accept other-band"
-    assert with_option_names(remark.cure).endswith(f"if these tests are right, say so: {answer}")
+    assert answer in with_option_names(remark.cure)
     assert answer in said
     run(*answer.split()[1:])
     assert shop.logbook.questions == {}
@@ -348,6 +348,7 @@ def test_one_answer_is_for_those_that_ask_the_same(shop: Shop, narrow: Path) -> 
     one, other = (remark for remark in shop.logbook.status().remarks if remark.code == "other-band")
     assert one.about.startswith("2 tap tests, ")
     assert other.about.startswith("tap test ")
-    run(*with_option_names(one.cure).partition("lobewatch ")[2].split())
+    (answer,) = re.findall(r"lobewatch (replay .* --accept other-band)", with_option_names(one.cure))
+    run(*answer.split())
     (left,) = shop.logbook.questions
     assert left in other.about

@@ -10,9 +10,9 @@ STATUS_LABELS = {
 }
 
 
-def status_name(status: StatusLevel) -> str:
-    """Return the status as a word."""
-    return "warning" if status is StatusLevel.WARN else status.value
+def status_name(status: str) -> str:
+    """Return the status as people read it."""
+    return "warning" if status == StatusLevel.WARN else str(status)
 
 
 def status_label(light: StatusLevel, is_early: bool = False) -> str:

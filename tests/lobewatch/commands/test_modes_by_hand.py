@@ -134,17 +134,17 @@ def test_what_cannot_be_done_is_reported_and_nothing_is_kept(shop: Shop, file: P
     tap_id = tapped(shop)
     lines = (shop.path / "journal.jsonl").read_bytes()
     for options, words in (
-        (("--drop", "1200"), "drop 1200 Hz: no mode within 1 % of it; there are modes at: 900, 1713, 2500 Hz"),
-        (("--add", "9000"), "add 9000 Hz: lies outside the lines, 4 to 3996 Hz"),
-        (("--add", "298,5"), "--add 298,5: give the frequency in Hz, as in 298.5; write decimals with a point"),
-        (("--fix", "1500"), "--fix 1500: give the frequency in Hz and the damping ratio, as in 1500:0.03"),
-        (("--drop", "900", "--drop", "900"), "900 Hz: drop twice"),
-        (("--drop", "900", "--by-fit"), "--by-fit takes back all"),
-        (("--drop", "900", "--band", "10", "2000"), "--band: says how a file is read"),
-        (("--drop", "900", "--unit", "m/N"), "--unit: says how a file is read"),
+        (("--drop", "1200"), ["drop 1200 Hz", "1 %", "900, 1713, 2500 Hz"]),
+        (("--add", "9000"), ["add 9000 Hz", "4 to 3996 Hz"]),
+        (("--add", "298,5"), ["--add 298,5", "298.5"]),
+        (("--fix", "1500"), ["--fix 1500", "1500:0.03"]),
+        (("--drop", "900", "--drop", "900"), ["900 Hz", "drop"]),
+        (("--drop", "900", "--by-fit"), ["--by-fit", "--drop"]),
+        (("--drop", "900", "--band", "10", "2000"), ["--band"]),
+        (("--drop", "900", "--unit", "m/N"), ["--unit"]),
     ):
         said = run("modes", shop.path, tap_id, *options)
-        assert words in with_option_names(str(said.exception))
+        assert [word for word in words if word not in with_option_names(str(said.exception))] == []
     assert (shop.path / "journal.jsonl").read_bytes() == lines
     assert "zz" in str(run("modes", shop.path, "zz", "--drop", "900").exception)
     assert "lobewatch modes MACHINE TAP" in str(run("modes", shop.path).exception)

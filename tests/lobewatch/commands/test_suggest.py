@@ -47,7 +47,7 @@ def test_cuts_are_suggested_learnt_from_and_come_to_an_end(shop: Shop, run: Any)
     assert not found["learnt"]["frequency_learnt"]
     assert [remark["code"] for remark in found["remarks"]] == ["frequency-not-learnt"]
     code, text, _ = run("suggest", "--program", "A", "--cuts", "1")
-    assert (code, "2 of 5" in text) == (0, True)
+    assert (code, "--cuts" in text) == (0, True)
 
 
 def test_power_is_asked_for_where_it_can_say_a_kt(shop: Shop, run: Any) -> None:

@@ -73,9 +73,7 @@ def make_environment(extras):
     locked = ["--require-hashes", "--no-deps", "-r", os.path.join(ROOT, LOCKS[extras])]
     steps = [["--upgrade", "--no-compile", "pip"], ["--no-deps", "--editable", ROOT]]
     if subprocess.call(command + locked):
-        sys.stderr.write(
-            "The locked packages do not fit this computer (see above). Trying other versions by pyproject.toml.\n"
-        )
+        sys.stderr.write("The locked packages do not fit this computer (see above). Using pyproject.toml instead.\n")
         steps[1] = ["--editable", ROOT + extras]
     for packages in steps:
         status = subprocess.call(command + packages)

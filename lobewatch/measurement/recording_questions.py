@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Circumstances, DeviceIdentity, Frf, Remark
+from acquisition.files.tap_file import read_circumstances
 from dsm import format_rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.measurement import clock_questions as clock
@@ -221,8 +222,6 @@ def find_device_questions(folder: MachineFolder, device: Circumstances | DeviceI
     """Return the code of the question about an emulated device in a machine with real tap tests."""
     if not device.is_emulated:
         return ()
-    from acquisition.files.tap_file import read_circumstances  # imports h5py
-
     has_real = any(not read_circumstances(folder.path / tap.file).is_emulated for tap in reversed(folder.taps()))
     return (EMULATED_DEVICE.code,) if has_real else ()
 

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Start lobewatch from a checkout: the demo, its tests, or any command, in an environment of its own (.venv).
+"""Start lobewatch from a checkout: the demo, its tests, or any command, in its own environment (.venv).
 
     python3 run.py               the demo
-    python3 run.py test [...]    the tests (--long: the long ones too); the rest goes to pytest
+    python3 run.py test [...]    the tests (--long: also the long ones), with further options of pytest
     python3 run.py docs          build the documentation site in build/docs and open it
-    python3 run.py bench         the benchmarks, in an environment with their peers (.venv-bench)
+    python3 run.py bench         the benchmarks, in an environment with other packages (.venv-bench)
     python3 run.py ARGS          lobewatch ARGS
 
-Needs nothing but Python's standard library; runs far enough under an old Python (2.7 too) to say which one is needed.
+Needs only Python's standard library. Under an old Python (also 2.7) it says which version is needed.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ LOCKS = {"": "requirements.lock", "[dev]": "requirements-dev.lock", "[bench]": "
 
 
 def place(extras):
-    """Folder of the environment: what benchmarks are compared with has one of its own."""
+    """Folder of the environment. The benchmarks have their own."""
     return VENV + "-bench" if extras == "[bench]" else VENV
 
 
@@ -33,7 +33,7 @@ def python(extras):
 
 
 def stamp(extras):
-    """Digest of all that decides what the environment holds."""
+    """Digest of everything that determines the environment."""
     digest = hashlib.sha256((sys.version + sys.executable + ROOT).encode())
     for name in ("pyproject.toml", "run.py", LOCKS[extras]):
         with open(os.path.join(ROOT, name), "rb") as file:
@@ -42,7 +42,7 @@ def stamp(extras):
 
 
 def installer(extras):
-    """Command that installs into the environment: pip of this Python, else uv; None where there is neither."""
+    """Command that installs into the environment: pip of this Python, else uv. None without both."""
     pip = [sys.executable, "-m", "pip"]
     if subprocess.call(pip + ["--version"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0:
         return pip + ["--python", python(extras), "--disable-pip-version-check", "install", "--quiet"]
@@ -51,10 +51,10 @@ def installer(extras):
 
 
 def make_environment(extras):
-    """Make the environment with the locked packages and lobewatch in it, unless it is there; extras: one of LOCKS."""
+    """Make the environment with the locked packages and lobewatch, unless it exists. extras: a key of LOCKS."""
     folder = place(extras)
     if os.path.realpath(sys.prefix) == os.path.realpath(folder):
-        return  # started by the environment itself, which cannot make itself anew
+        return  # started by the environment itself, which cannot replace itself
     marker = os.path.join(folder, "lobewatch-stamp")
     if os.path.exists(marker):
         with open(marker) as file:
@@ -64,28 +64,28 @@ def make_environment(extras):
     command = installer(extras)
     if command is None:
         sys.exit(
-            "lobewatch needs pip or uv to install its packages: "
-            "install one of them (Debian: sudo apt install python3-pip) and start again."
+            "lobewatch needs pip or uv to install its packages. "
+            "Install one of them (Debian: sudo apt install python3-pip) and start again."
         )
     import venv
 
-    sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % folder)
+    sys.stderr.write("Setting up %s (once, takes a minute or two) ...\n" % folder)
     venv.create(folder, with_pip=False, clear=True)
     locked = ["--require-hashes", "--no-deps", "-r", os.path.join(ROOT, LOCKS[extras])]
     steps = [["--upgrade", "--no-compile", "pip"], ["--no-deps", "--editable", ROOT]]
     if subprocess.call(command + locked):
-        sys.stderr.write("The locked packages do not fit here (see above): taking what pyproject.toml allows.\n")
+        sys.stderr.write("The locked packages do not fit this computer (see above). Using pyproject.toml instead.\n")
         steps[1] = ["--editable", ROOT + extras]
     for packages in steps:
         status = subprocess.call(command + packages)
         if status:
-            sys.exit("lobewatch could not install its packages (see above); check the network and start again.")
+            sys.exit("lobewatch could not install its packages (see above). Check the network and start again.")
     with open(marker, "w") as file:
         file.write(stamp(extras))
 
 
 def tests(arguments):
-    """Command that runs the tests; all on all cores where none are chosen, with --long their coverage is judged."""
+    """Command that runs the tests: without a choice all of them on all cores, with --long also their coverage."""
     chosen = [argument for argument in arguments if argument != "--long"]
     whole = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
     every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []
@@ -94,9 +94,9 @@ def tests(arguments):
 
 
 def main():
-    """Run what the arguments name; the exit status is that of the first command that fails."""
+    """Run the command in the arguments. The exit status is that of the first command that fails."""
     if sys.version_info < NEEDED:
-        sys.exit("lobewatch needs Python %d.%d or newer; this is %s." % (NEEDED + (sys.version.split()[0],)))
+        sys.exit("lobewatch needs Python %d.%d or newer. This is %s." % (NEEDED + (sys.version.split()[0],)))
     arguments = sys.argv[1:] or ["demo"]
     extras = {"test": "[dev]", "docs": "[dev]", "bench": "[bench]"}.get(arguments[0], "")
     make_environment(extras)

@@ -74,6 +74,12 @@ class Source(Protocol):
         """Yield blocks as they arrive; raise DeviceError where the device goes away or falls silent."""
 
 
+EMULATED_SERIAL = "EMULATED"
+"""Serial number of an emulated device."""
+EMULATED_SERIALS = (EMULATED_SERIAL, "EMU-1")
+"""Serial numbers of emulated devices, with that of the TAPS/1 emulator."""
+
+
 @dataclass(frozen=True)
 class DeviceIdentity:
     """Identity that a device reports."""
@@ -84,6 +90,11 @@ class DeviceIdentity:
     """Serial number; empty if it has none."""
     firmware: str = ""
     """Version; empty if it has none."""
+
+    @property
+    def is_emulated(self) -> bool:
+        """True if the device says that it is emulated."""
+        return self.serial in EMULATED_SERIALS
 
 
 @dataclass(frozen=True)

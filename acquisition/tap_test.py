@@ -13,6 +13,7 @@ from acquisition.errors import DataError, check_name
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
+from acquisition.source import EMULATED_SERIALS
 
 CONDITION_RANGES = {
     "temperature_c": (-40.0, 150.0),
@@ -122,6 +123,11 @@ class Circumstances:
         parse_direction(self.direction)
         if self.created.tzinfo is None:
             raise ValueError(f"created={self.created} has no time zone. Give one, as in datetime.now(UTC).")
+
+    @property
+    def is_emulated(self) -> bool:
+        """True if the recording device is emulated."""
+        return any(f"serial number {serial}" in self.device.split(", ") for serial in EMULATED_SERIALS)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import typer
 
 from lobewatch.commands import COMMANDS, GROUPS
 from lobewatch.commands.help_page import HelpCommand, HelpGroup, get_page_width
+from lobewatch.commands.verbosity import QUIET_HELP, VERBOSE_HELP, apply_verbosity
 
 GC_THRESHOLD = 100_000
 """Number of new objects between two garbage collections. Imports make 200 000 objects that stay."""
@@ -64,6 +65,15 @@ class _RootGroup(HelpGroup):
             self.params = []
         return super().parse_args(ctx, args)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Find the command; `help COMMAND` stands for `COMMAND --help`."""
+        if args[0] != "help":
+            return super().resolve_command(ctx, args)
+        if named := [word for word in args[1:] if word not in ("help", "--help")]:
+            return super().resolve_command(ctx, [*named, "--help"])
+        typer.echo(ctx.get_help())
+        raise typer.Exit
+
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (used by shell completion)
         return list(COMMANDS)
 
@@ -73,7 +83,8 @@ class _RootGroup(HelpGroup):
 
 app = typer.Typer(
     cls=_RootGroup,
-    help="Tap test in, stability lobes out: which cuts stop being safe as a spindle ages.",
+    help="Tap tests and stability lobes: find cuts that become unstable as a spindle ages.\n\n"
+    "lobewatch help COMMAND shows the options of a command.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -91,12 +102,15 @@ def _print_version(is_requested: bool) -> None:
 
 @app.callback()
 def _root_options(
+    ctx: typer.Context,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help=QUIET_HELP)] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help=VERBOSE_HELP)] = False,
     _debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
     _show_version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    pass
+    apply_verbosity(ctx, quiet=quiet, verbose=verbose)
 
 
 def main() -> None:

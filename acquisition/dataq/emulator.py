@@ -12,6 +12,7 @@ from acquisition.dataq import protocol
 from acquisition.dataq.protocol import DEC_LIMITS, DECA_LIMITS, DIGITAL_INPUTS_CODE, SRATE_LIMITS
 from acquisition.dataq.stream import CLOCK_BIT
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
+from acquisition.source import EMULATED_SERIAL
 
 DATAQ_BUFFER_SECONDS = 1.0
 """Samples kept for a slow host before the device stops (s)."""
@@ -104,7 +105,7 @@ class DataqEmulator(EmulatorThread):
         self._signal_at, self._inputs = signal_at, {sensor.number: (i, sensor) for i, sensor in enumerate(inputs)}
         self._realtime, self._clock = realtime, clock
         self._traits, self._faults = traits or DataqTraits(), faults or DataqFaults()
-        self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: "5E0ABC12", 9: "60000000"}
+        self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: EMULATED_SERIAL, 9: "60000000"}
         self._ranges = protocol.DATAQ_RANGES[self._traits.model]
         self._scan_list = [0]
         self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}

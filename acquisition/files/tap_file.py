@@ -206,6 +206,12 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
         return hits, _read_circumstances(file), flags
 
 
+def read_circumstances(path: Path | str) -> Circumstances:
+    """Read the circumstances of a tap test without its signals. DataError for an unreadable file."""
+    with _open_tap_file(Path(path)) as file:
+        return _read_circumstances(file)
+
+
 def read_hit_name(path: Path | str) -> str:
     """Return the name that a hit file was written under; empty in the first ones."""
     with _open_tap_file(Path(path)) as file:

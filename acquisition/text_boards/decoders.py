@@ -63,6 +63,8 @@ NUMBER_SEPARATORS = bytes.maketrans(b";\t ", b",,,")
 """Separators between numbers besides a comma."""
 MAX_LINE_BYTES = 200
 """Longest line of numbers (bytes)."""
+EMULATED_LINE = b"# emulated device"
+"""Line among the numbers by which an emulated board says that it is emulated."""
 
 
 class _RowDecoder:
@@ -87,6 +89,8 @@ class LineDecoder(_RowDecoder):
         """Accept lines with these counts of numbers. The rest of the first line is not counted."""
         super().__init__()
         self._columns, self._counts = 0, counts
+        self.is_emulated = False
+        """True after the board has said that it is emulated."""
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the rows that these bytes complete."""
@@ -94,11 +98,13 @@ class LineDecoder(_RowDecoder):
         self._rest = self._rest[-MAX_LINE_BYTES:]
         if lines and not self._begun:
             self._begun, lines = True, lines[1:]
-        yield from self._split_at_broken(self._parse_line(line) for line in lines if line.strip())
+        texts = [line.strip() for line in lines]
+        self.is_emulated |= EMULATED_LINE in texts
+        yield from self._split_at_broken(self._parse_line(text) for text in texts if text not in (b"", EMULATED_LINE))
 
     def _parse_line(self, line: bytes) -> list[float]:
         """Return the finite numbers of a line, as many as in the first, none if it contains anything else."""
-        words = line.strip().translate(NUMBER_SEPARATORS).split(b",")
+        words = line.translate(NUMBER_SEPARATORS).split(b",")
         try:
             row = [float(word) for word in words if word]
         except ValueError:

@@ -13,11 +13,19 @@ from acquisition.channel import Block, Channel, SensorInput
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink, find_usb_identity
-from acquisition.source import ClosedOnExit, DeviceIdentity, Event
-from acquisition.text_boards.decoders import LineDecoder, OutputFormat, ScanCounter, SimpleFrameDecoder
+from acquisition.source import EMULATED_SERIAL, ClosedOnExit, DeviceIdentity, Event
+from acquisition.text_boards.decoders import (
+    EMULATED_LINE,
+    LineDecoder,
+    OutputFormat,
+    ScanCounter,
+    SimpleFrameDecoder,
+)
 
 BOARD_LISTEN_TIME = 1.0
 """Time to listen for lines (s)."""
+EMULATED_LISTEN_TIME = 0.3
+"""Time to listen for the line of an emulated board (s). A USB board is not emulated."""
 MIN_NUMBER_LINES = 20
 """Consecutive good lines with the same count of numbers that identify a board."""
 MAX_NUMBERS_PER_LINE = 5
@@ -48,7 +56,8 @@ def probe_text_board(link: SerialLink) -> DeviceIdentity | None:
     likeliest = max(lines, key=lambda count: lines[count])
     if lines[likeliest] < MIN_NUMBER_LINES:
         return None
-    return DeviceIdentity(f"text-output board with {likeliest} number{'s' * (likeliest > 1)} per line")
+    serial = EMULATED_SERIAL if decoders[likeliest].is_emulated else ""
+    return DeviceIdentity(f"text-output board with {likeliest} number{'s' * (likeliest > 1)} per line", serial)
 
 
 class TextBoardSource(ClosedOnExit):
@@ -96,7 +105,8 @@ class TextBoardSource(ClosedOnExit):
         self._running = False
         self._link = SerialLink(port, self._printing.baud_rate)
         usb = find_usb_identity(port)
-        self.identity = DeviceIdentity("lines", usb[1] if usb else port)
+        is_emulated = usb is None and self._printing.frame is None and _says_emulated(self._link)
+        self.identity = DeviceIdentity("lines", EMULATED_SERIAL if is_emulated else usb[1] if usb else port)
 
     def start(self) -> None:
         """Count scans from the next whole line on."""
@@ -142,6 +152,14 @@ class TextBoardSource(ClosedOnExit):
         zero = 0 if self._printing.frame else -low
         codes: Codes = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
         return codes
+
+
+def _says_emulated(link: SerialLink) -> bool:
+    """Listen for the line by which an emulated board says that it is emulated."""
+    decoder, deadline = LineDecoder(), time.monotonic() + EMULATED_LISTEN_TIME
+    while not decoder.is_emulated and (remaining := deadline - time.monotonic()) > 0:
+        list(decoder.feed(link.read(remaining)))
+    return decoder.is_emulated
 
 
 def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -> float:
@@ -235,6 +253,8 @@ class TextBoardEmulator(EmulatorThread):
             volts = self._signal(self._scan, SCANS_PER_PRINT) * self._sensitivities
             for k, row in enumerate(np.clip(volts, -self._full_scale, self._full_scale).T):
                 self._print(self._scan + k, row)
+            if self._printing.frame is None:
+                self.wire.pending += EMULATED_LINE + b"\r\n"
             self._scan += SCANS_PER_PRINT
         return True
 

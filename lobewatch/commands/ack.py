@@ -11,19 +11,16 @@ from lobewatch.show.terminal.output import Json, emit
 
 def ack(
     machine: Machine,
-    alarm: Annotated[
-        str, Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
-    ] = "",
-    until: Annotated[
-        datetime | None, Option(help="When it is to ring again, local time; never where not given.")
-    ] = None,
-    note: Annotated[str, Option(help="What is being done, for those who come next.")] = "",
-    operator: Annotated[str, Option(help="Who says so; the name of the login where not given.")] = "",
+    alarm: Annotated[str, Argument(help="Alarm ID, or a unique part of it. Default: all open alarms.")] = "",
+    until: Annotated[datetime | None, Option(help="Snooze until (local time). Default: no reminder.")] = None,
+    note: Annotated[str, Option(help="Note for your colleagues.")] = "",
+    operator: Annotated[str, Option(help="Name of the operator. Default: login name.")] = "",
     as_json: Json = False,
 ) -> None:
     """Acknowledge alarms.
 
-    An alarm is closed by the tap tests alone, or by a new baseline after a repair; one that is raised anew rings again.
+    Acknowledged alarms are not repeated, but the status stays. Only tap tests, or a new baseline after a repair, close
+    an alarm. A new alarm notifies again.
 
     Examples
     --------
@@ -37,5 +34,5 @@ def ack(
     with publish_on_change(Logbook.open(machine)) as logbook:
         alarms, now = acknowledge_alarms(logbook, alarm, until, note, operator), datetime.now(UTC)
         texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
-        closing = "the light stays as it is: tap tests close an alarm, or a new baseline after a repair"
+        closing = "The status does not change. Tap tests, or a new baseline after a repair, close an alarm."
         emit({"acknowledged": [known.to_row(now) for known in alarms]}, as_json, *texts, closing)

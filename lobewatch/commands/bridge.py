@@ -12,21 +12,19 @@ from lobewatch.show.terminal.output import Json, notes, results
 
 
 def bridge(
-    driver: Annotated[str, Argument(help="Name of the driver, as in [daq] of machine.toml.")],
+    driver: Annotated[str, Argument(help="Driver name, as in [daq] of machine.toml.")],
     machine: Annotated[
-        Path | None, FolderArgument(help="Machine folder whose [daq] sets the device up: port, sensors, rate.")
+        Path | None, FolderArgument(help="Machine folder with port, sensors and sample rate in [daq].")
     ] = None,
-    port: Annotated[str, Option(help="Port of the device; that of [daq] where not given.")] = "",
-    listen: Annotated[
-        str, Option(help="Address of this computer at which it can be reached; 0.0.0.0: at all.")
-    ] = "127.0.0.1",
-    tcp_port: Annotated[int, Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
+    port: Annotated[str, Option(help="Port of the device. Default: [daq] port.")] = "",
+    listen: Annotated[str, Option(help="IP address to listen on. 0.0.0.0: all addresses.")] = "127.0.0.1",
+    tcp_port: Annotated[int, Option(min=0, max=65535, help="TCP port. 0: any free port.")] = 0,
     as_json: Json = False,
 ) -> None:
     """Serve a device as a TAPS/1 device on TCP.
 
-    Lost scans, overloads and the button are carried through; while the device is unplugged the host waits for it.
-    There is no password: whoever reaches the address can start and stop the device.
+    Lost scans, overloads and button events are passed on. While the device is unplugged, the host waits. There is no
+    password: anyone who reaches the address can start and stop the device.
 
     Examples
     --------
@@ -42,18 +40,18 @@ def bridge(
     print_note = partial(notes.print, markup=False)
     folder, kind = None if machine is None else MachineFolder(machine), find_driver(driver)
     if folder is None and kind.sensor_data is None:
-        text = "does not know its sensors: give the machine folder whose [[daq.channel]] names them"
-        raise DataError(f"{kind.title} {text}")
+        cure = "Give a machine folder with [[daq.channel]] tables."
+        raise DataError(f"{kind.title} does not describe its sensors. {cure}")
     daq = DaqTable(driver=driver) if folder is None else folder.machine.daq
     if folder is not None and daq.driver != driver:
-        raise DataError(f'{folder.toml}: driver = "{daq.driver}", not "{driver}"; give the same one')
+        raise DataError(f'{folder.toml}: driver is "{daq.driver}", not "{driver}". Give the same driver.')
     port = port or daq.port
     if not port:
-        raise ValueError("no port: give --port, or a machine folder with port in [daq]")
+        raise ValueError("no port. Give --port, or a machine folder with port in [daq].")
     server = TapsBridge(DeviceOpener(daq, port).open, print_note, address=listen, number=tcp_port)
     identity = server.device.identity
     results.print(json.dumps({"port": server.port}) if as_json else f"port {server.port}", markup=False)
     results.file.flush()
     rate = f"{server.device.sample_rate:g} Hz"
-    print_note(f"{identity.model} on {port}, {rate}; tap with --port {server.port} (Ctrl-C ends it)")
+    print_note(f"{identity.model} on {port}, {rate}. Tap with --port {server.port} (Ctrl-C ends the bridge)")
     server.run()

@@ -12,29 +12,30 @@ from lobewatch.show.terminal.output import Json, emit
 
 def calibrate(
     machine: SpindleMachine,
-    frequency: Annotated[list[float] | None, Option(help="Measured natural frequency (Hz); may be repeated.")] = None,
-    frequency_std: Annotated[list[float] | None, Option(help="Its standard error (Hz); one for each.")] = None,
+    frequency: Annotated[list[float] | None, Option(help="Measured natural frequency (Hz), repeatable.")] = None,
+    frequency_std: Annotated[list[float] | None, Option(help="Standard error of each (Hz), repeatable.")] = None,
     mode: Annotated[
         list[int] | None,
-        Option(min=1, max=50, help="Number of the mode, for each; else [mode] model_mode, or 1, 2 ..."),
+        Option(min=1, max=50, help="Mode number of each, repeatable. Default: [mode] model_mode, or 1, 2, ..."),
     ] = None,
     group: Annotated[
-        list[str] | None, Option(help="Bearings or joints of this group; may be repeated; all if not given.")
+        list[str] | None, Option(help="Group of bearings or joints to fit, repeatable. Default: all.")
     ] = None,
     damping_ratio: Annotated[
-        float | None, Option(help="Measured damping ratio (-) of the first of these modes: finds dampers too.")
+        float | None, Option(help="Measured damping ratio (-) of the first mode. Fits dampers too.")
     ] = None,
     tool: Annotated[
-        list[str] | None, Option(help="From its newest tap test instead; two at least find joints and bearings.")
+        list[str] | None, Option(help="Tool whose newest tap tests are used instead of --frequency. Give at least two.")
     ] = None,
-    direction: Annotated[str | None, Option(help="Of these tap tests, x or y; else that of the newest.")] = None,
+    direction: Annotated[str | None, Option(help="Direction of the tap tests: x or y. Default: newest.")] = None,
     as_json: Json = False,
 ) -> None:
     """Calibrate bearings and joints to measured natural frequencies.
 
-    One frequency scales all bearings alike. Several find a factor for each group of bearings and joints. Two tools or
-    more, tapped, find the joint between tool and spindle and the bearings together; what to write into machine.toml
-    is printed. Exit code 1 where the tools do not fit one spindle.
+    One frequency gives one factor for all bearings, several give one for each group. Two or more tools also give the
+    joint between tool and spindle, with the lines for machine.toml. Nothing is stored.
+
+    Exit code 1: the tools do not fit one spindle.
 
     Examples
     --------
@@ -49,7 +50,7 @@ def calibrate(
         _calibrate_from_tools(machine, tool, direction, mode or [], as_json=as_json)
         return
     if not frequency or direction is not None:
-        raise ValueError("give the measured --frequency, or two --tool or more, with a --direction where it matters")
+        raise ValueError("Give --frequency without --direction, or at least two --tool.")
     from lobewatch.machine import MachineFolder
     from lobewatch.measurement import calibrate_model
     from lobewatch.show.models import model_calibration_json, model_calibration_texts
@@ -64,7 +65,7 @@ def calibrate(
 def _reject_with_tools(given: Mapping[str, object]) -> None:
     named = [option for option, value in given.items() if value is not None and value != []]
     if named:
-        raise ValueError(f"--tool and {', '.join(named)}: the tap tests say it; give one or the other")
+        raise ValueError(f"--tool excludes {', '.join(named)}. Give one or the other.")
 
 
 def _calibrate_from_tools(
@@ -82,4 +83,4 @@ def _calibrate_from_tools(
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:
     for option, values in (("--frequency-std", stds), ("--mode", modes)):
         if values and len(values) != frequencies:
-            raise ValueError(f"{len(values)} {option} for {frequencies} --frequency; give one for each, or none")
+            raise ValueError(f"{len(values)} {option} for {frequencies} --frequency. Give one for each, or none.")

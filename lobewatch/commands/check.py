@@ -1,46 +1,39 @@
 """Command `lobewatch check`: verdicts on cutting programs."""
 
-from time import monotonic
 from typing import Annotated
 
 from typer import Exit, Option
 
 from lobewatch.commands import shared_options as shared
-from lobewatch.show.terminal.output import Json, emit, notes
-
-PROGRESS_DELAY = 5.0
-"""Delay before progress is shown (s)."""
+from lobewatch.show.terminal.output import Json, emit, notes, show_progress
+from lobewatch.step_times import time_step
 
 
 def check(
     machine: shared.TappedMachine,
-    program: Annotated[
-        list[str] | None, Option(help="Only this program; may be repeated. All where none is named.")
-    ] = None,
+    program: Annotated[list[str] | None, Option(help="Program name, repeatable. Default: all programs.")] = None,
     speed: Annotated[
-        float | None, Option(parser=shared.number, help="Of a cut that is no program: spindle speed, rpm.")
+        float | None, Option(parser=shared.number, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
     ] = None,
-    depth: Annotated[float | None, Option(parser=shared.number, help="Its axial depth, mm.")] = None,
-    tool: Annotated[str | None, Option(help="Its tool.")] = None,
+    depth: Annotated[float | None, Option(parser=shared.number, help="Axial depth of cut ap (mm).")] = None,
+    tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: shared.Material = None,
     teeth: shared.Flutes = None,
     diameter: shared.Diameter = None,
-    radial: Annotated[float | None, Option(parser=shared.number, help="Its radial depth, mm.")] = None,
+    radial: Annotated[float | None, Option(parser=shared.number, help="Radial depth of cut ae (mm).")] = None,
     direction: shared.MillingDirection = None,
     accept: Annotated[
         list[str] | None,
-        Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
+        Option(help="Key of an implausible number in machine.toml that is correct, repeatable."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Evaluate cutting programs on the newest tap tests.
 
-    By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
-    not stable what decides and where to go. fall left: how far the frequency may fall before it chatters, in the middle
-    of what is not known; beside a setting that is recommended: how far it may fall and all of that stays stable. A cut
-    that is no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
-    A program of machine.toml without a speed or a depth is recommended what it has not.
-    A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
+    Verdicts (stable, doubtful, not stable, unknown) include all uncertainties. A program without speed or depth gets a
+    recommendation. Missing values of any other cut come from the programs of its tool if they all agree.
+
+    Exit code 1: not everything is stable.
 
     Examples
     --------
@@ -61,13 +54,11 @@ def check(
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
     logbook = Logbook.open(machine)
-    verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
-    begin, slow, programs = monotonic(), False, list[show.ProgramAdvice]()
-    for verdict in verdicts:
-        if not slow and monotonic() - begin > PROGRESS_DELAY:
-            notes.print(f"{len(programs)} of {len(verdicts)} programs are checked; the others take a while too")
-            slow = True
-        programs.append(show.advise_program(logbook, verdict))
+    with show_progress("checking programs") as progress, time_step("verdicts"):
+        verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
+        programs = [
+            show.advise_program(logbook, verdict) for verdict in progress.track(verdicts, task_id=progress.task_ids[0])
+        ]
     remarks = logbook.remarks
     payload = {"recommendations": [recommendation_json(answer) for answer in recommendations]}
     texts = show.check_texts(programs, remarks, logbook.machine) if programs else []

@@ -12,19 +12,19 @@ from lobewatch.show.terminal.output import Json, emit
 
 @add_file_options()
 def convert(
-    file: Annotated[Path, Argument(help="Recorded hits or an FRF, as for lobewatch modes.")],
-    out: Annotated[Path, Argument(help="What to write: .uff (.unv), .csv, .mat, or .json (SEP005, hits only).")],
-    hits: Annotated[bool, Option("--hits", help="The signals over time instead of the FRF.")] = False,
+    file: Annotated[Path, Argument(help="Recorded hits or FRF, as for lobewatch modes.")],
+    out: Annotated[Path, Argument(help="Output file: .uff, .unv, .csv, .mat, or .json (SEP005, hits only).")],
+    hits: Annotated[bool, Option("--hits", help="Write time signals instead of the FRF.")] = False,
     *,
     file_options: FileOptions,
-    date: Annotated[datetime | None, Option(help="When it was recorded, where the file does not say.")] = None,
-    direction: Annotated[str, Option(help="Direction at the tool tip, where the file does not say.")] = "",
+    date: Annotated[datetime | None, Option(help="Recording date. Default: from the file.")] = None,
+    direction: Annotated[str, Option(help="Direction at the tool tip. Default: from the file.")] = "",
     as_json: Json = False,
 ) -> None:
     """Convert a recorded file to another format.
 
-    With frequency lines, FRF, coherence, averages, units, direction and date, in SI units; what is written is read
-    back as the same.
+    The output has frequency lines, FRF, coherence, averages, units, direction and date, in SI units. lobewatch reads it
+    back unchanged.
 
     Examples
     --------

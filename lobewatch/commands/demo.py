@@ -7,58 +7,56 @@ from typing import Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScenarioName
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 
 def demo(
-    out: Annotated[Path | None, Option(help="A new folder; lobewatch-demo where not given.")] = None,
-    taps: Annotated[int, Option(min=2, max=120, help="How many months; each has one tap test in x and one in y.")] = 24,
+    out: Annotated[Path | None, Option(help="New folder. Default: lobewatch-demo.")] = None,
+    taps: Annotated[int, Option(min=2, max=120, help="Number of months, each with a tap test in x and in y.")] = 24,
     seed: Seed = 1,
     scatter: ReclampingScatter = 0.1,
-    story: Annotated[WearScenarioName, Option(help="What befalls the bearings.")] = "steady",
-    bad_clampings: Annotated[float, Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
+    story: Annotated[WearScenarioName, Option(help="Bearing wear scenario.")] = "steady",
+    bad_clampings: Annotated[float, Option(help="Share of bad clampings (%), f1 2 % low: 0 to 50.")] = 0.0,
     temperature: Annotated[
-        float | None, Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
+        float | None, Option(help="Yearly temperature swing (K), 0 to 30, which moves f1. Default: not recorded.")
     ] = None,
-    tcp: Annotated[bool, Option("--tcp", help="Through a TCP port of this computer.")] = False,
+    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port instead of a pseudo-terminal.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Tap a simulated aging spindle, and write a report.
+    """Tap a simulated ageing spindle, and write a report.
 
-    Every test goes through a real serial port (a pseudo-terminal; TCP where there is none), byte by byte: ten good
-    hits, FRF, HDF5, modes, bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves
-    f_1 a little. What was emulated in that very test is printed beside what was found. The months end with this one,
-    or the one before it.
+    Each test runs byte by byte through a serial port: ten good hits, FRF, modes, bearing stiffness, stability lobes.
+    The tool is reclamped before each test. Results are shown next to the true values.
 
     Examples
     --------
       lobewatch demo
       lobewatch demo --out trial --taps 12 --story step --bad-clampings 5
     """
-    from rich.progress import Progress
+    with show_progress("tap tests") as progress:
+        from lobewatch.logbook import Logbook
+        from lobewatch.machine import MachineFolder, make_machine_folder
+        from lobewatch.notify.publish_status import publish_on_change
+        from lobewatch.show.demo import demo_json, demo_texts
+        from lobewatch.show.report.report import write_report
+        from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
+        from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario
 
-    from lobewatch.logbook import Logbook
-    from lobewatch.machine import MachineFolder, make_machine_folder
-    from lobewatch.notify.publish_status import publish_on_change
-    from lobewatch.show.demo import demo_json, demo_texts
-    from lobewatch.show.report.report import write_report
-    from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
-    from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario
-
-    mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
-    mounting.check()
-    path = out or _find_free_name()
-    make_machine_folder(path, "surrogate_machine.toml")
-    folder = MachineFolder(path)
-    with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
+        mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
+        mounting.check()
+        path = out or _find_free_name()
+        make_machine_folder(path, "surrogate_machine.toml")
+        folder = MachineFolder(path)
         wear = SpindleWear.of(folder, taps, WearScenario(story))
         tests = age_spindle(folder, wear, seed, mounting, tcp=tcp)
-        taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
-        progress.add_task("history", total=None)
+        with time_step("tap tests"):
+            taken = list(progress.track(tests, total=2 * taps, task_id=progress.task_ids[0]))
+        progress.add_task("history and report", total=None)
         logbook = Logbook(folder)
         compared = compare_with_truth(logbook, taken)
         forecasts = forecast_levels(logbook, wear)
-        with publish_on_change(logbook):
+        with publish_on_change(logbook), time_step("report"):
             report = write_report(logbook)
     emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))
 

@@ -10,11 +10,12 @@ from lobewatch.show.terminal.output import Json, emit
 
 
 def doctor(
-    machine: Annotated[Path | None, FolderArgument(help="Machine folder.")] = None, as_json: Json = False
+    machine: Annotated[Path | None, FolderArgument(help="Machine folder to check too.")] = None,
+    as_json: Json = False,
 ) -> None:
     """Examine this computer for tap tests.
 
-    With a machine its port, its driver and its folder are looked at, too. Exit code 1 where something hinders.
+    Exit code 1: something prevents a tap test.
 
     Examples
     --------

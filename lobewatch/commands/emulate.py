@@ -13,10 +13,11 @@ import typer
 from typer import Option
 
 import acquisition
+from lobewatch.commands import COMMANDS
 from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName
 from lobewatch.show.terminal.output import Json, notes, results
 
-emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
+emulate = typer.Typer(help=COMMANDS["emulate"], no_args_is_help=True)
 
 SCENARIO_MONTHS = 24
 """Length of a wear scenario (months)."""
@@ -26,35 +27,41 @@ SCENARIO_MONTHS = 24
 class EmulateOptions:
     """Options of an emulator, in the order of the help page."""
 
-    machine: Annotated[Path, FolderArgument(help="Machine folder with a spindle in its machine.toml: what is hit.")]
+    machine: Annotated[Path, FolderArgument(help="Machine folder. Without [spindle], the example spindle is emulated.")]
     """Machine folder."""
-    tcp: Annotated[bool, Option("--tcp", help="On a TCP port of this computer instead.")] = False
+    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
-    fast: Annotated[bool, Option("--fast", help="As fast as the host reads, not in real time.")] = False
+    fast: Annotated[bool, Option("--fast", help="Send as fast as the host reads.")] = False
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
-    story: Annotated[WearScenarioName, Option(help="What befalls the bearings over 24 months.")] = "none"
+    story: Annotated[WearScenarioName, Option(help="Bearing wear scenario (24 months).")] = "none"
     """Wear scenario of the bearings."""
-    month: Annotated[int, Option(min=0, max=60, help="Of the story, in which it is tapped.")] = 0
+    month: Annotated[int, Option(min=0, max=60, help="Month of the wear scenario.")] = 0
     """Month of the wear scenario."""
     scatter: ReclampingScatter = 0.0
     """Reclamping repeatability of f1: standard deviation (%)."""
-    bad_clampings: Annotated[float, Option(help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0
+    bad_clampings: Annotated[float, Option(help="Probability of a bad clamping (%), 0 to 50.")] = 0.0
     """Chance of a bad clamping (%)."""
-    temperature: Annotated[float | None, Option(help="Swing over the year, 0 to 30 K; f_1 moves with it.")] = None
+    temperature: Annotated[float | None, Option(help="Yearly temperature swing (K), 0 to 30.")] = None
     """Swing of the temperature over the year (K)."""
-    direction: Annotated[Literal["x", "y", "xy"], Option(help="Of hammer and sensor; xy: hit in x, sensor in y.")] = "x"
+    direction: Annotated[
+        Literal["x", "y", "xy"], Option(help="Direction of hammer and sensor. xy: hit in x, sensor in y.")
+    ] = "x"
     """Direction of hammer and sensor."""
     askew: Annotated[
-        float | None, Option(help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it.")
+        float | None,
+        Option(help="Angle of the principal directions from x (deg), 0 to 90."),
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
-    cut: Annotated[str | None, Option(metavar="PROGRAM", help="It cuts this, and is heard on its housing.")] = None
+    cut: Annotated[
+        str | None,
+        Option(metavar="PROGRAM", help="Program to cut. Default: tap tests."),
+    ] = None
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[float | None, Option(help="Of the cut, as it is told (rpm).")] = None
+    speed: Annotated[float | None, Option(help="Spindle speed of the cut (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, Option(help="Of the cut (mm).")] = None
+    depth: Annotated[float | None, Option(help="Axial depth of the cut ap (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""
@@ -94,7 +101,7 @@ def _make_command(name: str, takes_fast: bool) -> Callable[..., None]:
 
 def _format_help(name: str, title: str) -> str:
     return (
-        f"{title[:1].upper()}{title[1:]} with somebody who taps twice a second; Ctrl-C ends it.\n\nExamples:\n\n"
+        f"Emulate {title} that is hit twice a second. Ctrl-C ends it.\n\nExamples:\n\n"
         f"  lobewatch emulate {name} trial\n  lobewatch tap trial --port /dev/pts/3  # in another window\n"
         f"  lobewatch emulate {name} trial --cut 'A: slot at 12 600 rpm' --depth 2"
     )
@@ -107,6 +114,8 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     from lobewatch.tap.emulated_spindle import MountingVariation, WearScenario, build_mounted_spindle
 
     folder = MachineFolder(options.machine)
+    if folder.machine.spindle is None:
+        notes.print(f"{folder.toml} has no [spindle]: the example spindle is emulated", markup=False)
     mounting = MountingVariation(options.scatter / 100, options.bad_clampings / 100, options.temperature)
     mounting.check()
     story, seed, spindle = WearScenario(options.story), options.seed, None
@@ -121,12 +130,12 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
 def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
     """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
-        raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
+        raise ValueError("--speed and --depth need a cut. Add --cut PROGRAM.")
     from lobewatch.tap.emulated_spindle import emulate_machine
 
     emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
-    text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
+    text = f"f1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
     words = f" --direction {options.direction}" * (options.direction != "x")
     return emulated.device, truth, text, "tap", words
 
@@ -134,7 +143,7 @@ def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulatio
 def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
-        raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
+        raise ValueError("--cut excludes --direction and --askew. Leave them out.")
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 
@@ -143,7 +152,7 @@ def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
     truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
     stable = "any depth" if limit is None else f"{limit:.3g} mm"
-    text = f"{emulated.speed_rpm:.1f} rpm, stable up to {stable} there ({1e3 * setting.depth:g} mm is cut)"
+    text = f"{emulated.speed_rpm:.1f} rpm, stable up to ap {stable}, cut with ap {1e3 * setting.depth:g} mm"
     words = f" --program {shlex.quote(program)} --speed {setting.speed_rpm:g} --depth {1e3 * setting.depth:g}"
     return emulated.device, truth, text, "listen", words
 
@@ -155,9 +164,9 @@ def _serve(emulation: Emulation, options: EmulateOptions) -> None:
         line = json.dumps({"port": device.port, **truth}) if options.as_json else f"port {device.port}"
         results.print(line, markup=False)
         results.file.flush()
-        notes.print(f"the truth: {truth_text}", markup=False)
+        notes.print(f"true values: {truth_text}", markup=False)
         command = f"lobewatch {next_command} {shlex.quote(str(options.machine))} --port {device.port}"
-        notes.print(f"{next_command} with: {command}{next_options}   (Ctrl-C ends the emulator)", markup=False)
+        notes.print(f"Next: {command}{next_options}   (Ctrl-C ends the emulator)", markup=False)
         device.wait()
 
 

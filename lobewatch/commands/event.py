@@ -11,17 +11,17 @@ from lobewatch.show.terminal.output import Json, emit
 
 def event(
     machine: Machine,
-    text: Annotated[str, Argument(help="What was done; with --withdraw not needed.")] = "",
-    date: Annotated[datetime | None, Option(help="When it was done, local time; now where not given.")] = None,
+    text: Annotated[str, Argument(help="Description of the work. Not needed with --withdraw.")] = "",
+    date: Annotated[datetime | None, Option(help="Date of the work (local time). Default: now.")] = None,
     new_baseline: Annotated[
-        bool, Option("--new-baseline", help="Compare tap tests from then on with none before it.")
+        bool, Option("--new-baseline", help="Compare later tap tests with the first one after this date.")
     ] = False,
-    withdraw: Annotated[str, Option(help="Take back the event of this name; lobewatch history lists them.")] = "",
+    withdraw: Annotated[str, Option(help="ID of an event to withdraw, such as e2.")] = "",
     as_json: Json = False,
 ) -> None:
     """Store or withdraw a maintenance event.
 
-    It is a line of the journal and stays there; --withdraw adds one that takes it back.
+    The journal keeps every event, and a line for each withdrawal. lobewatch history lists them.
 
     Examples
     --------
@@ -37,12 +37,12 @@ def event(
 
     folder = MachineFolder(machine)
     if withdraw and (text or date or new_baseline):
-        raise ValueError(f"--withdraw {withdraw}: takes neither TEXT nor --date nor --new-baseline; leave them out")
+        raise ValueError(f"--withdraw {withdraw} excludes TEXT, --date and --new-baseline. Leave them out.")
     with publish_on_change(Logbook(folder)):
         if withdraw:
             gone = withdraw_event(folder, withdraw)
             emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
             return
         done = add_event(folder, text, date, new_baseline)
-        next_step = ["tap next: all tests after it are compared with the first of them"] if new_baseline else []
+        next_step = ["Next: run a tap test. All later tests are compared with it."] if new_baseline else []
         emit({"event": event_json(done)}, as_json, f"saved {event_text(done)}", *next_step)

@@ -11,12 +11,12 @@ from lobewatch.show.terminal.output import Json, emit
 def exclude(
     machine: Machine,
     tap: ExcludableEntry,
-    reason: Annotated[str, Option(help="Why it does not count.")],
+    reason: Annotated[str, Option(help="Reason for the exclusion.")],
     as_json: Json = False,
 ) -> None:
     """Exclude a tap test or test cut from all results.
 
-    Its file stays; lobewatch include takes it back.
+    The file stays. Undo it with lobewatch include.
 
     Examples
     --------
@@ -29,4 +29,4 @@ def exclude(
     with publish_on_change(Logbook.open(machine)) as logbook:
         entry = take_out(logbook.folder, tap, reason)
         payload = {"excluded": entry.id, "reason": reason}
-        emit(payload, as_json, f"excluded {entry.id}", f"back with: lobewatch include {machine} {entry.id}")
+        emit(payload, as_json, f"excluded {entry.id}", f"Undo: lobewatch include {machine} {entry.id}")

@@ -7,29 +7,28 @@ from typer import Argument, Exit, Option
 
 from lobewatch.commands.shared_options import FleetFolder
 from lobewatch.show.terminal.option_names import with_option_names
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, print_always
 
 
 def export(
     folder: FleetFolder,
-    file: Annotated[
-        Path | None, Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
-    ] = None,
+    file: Annotated[Path | None, Argument(help="Output file: .sqlite, .csv, .csv.gz or .parquet.")] = None,
     append: Annotated[
         Path | None,
-        Option(help="In place of FILE: a folder of Parquet files by month, to which is added what is not there."),
+        Option(help="Folder of monthly Parquet files, which gets new rows."),
     ] = None,
     to: Annotated[
         str | None,
-        Option(help="In place of FILE: a database, postgresql://HOST/NAME, whose table is kept as the tap tests are."),
+        Option(help="Database whose table is updated: postgresql://HOST/NAME."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Export the tap tests of all machines as one table.
 
-    The same again gives the same bytes. Excluded tap tests are left out. One that cannot be read is named, and the
-    exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]"), PostgreSQL by psycopg (pip install
-    "lobewatch[postgres]"), with its password from PGPASSWORD or ~/.pgpass.
+    Excluded tap tests are left out. Parquet needs pip install "lobewatch[fleet]". PostgreSQL needs pip install
+    "lobewatch[postgres]", and a password in PGPASSWORD or ~/.pgpass.
+
+    Exit code 2: a machine is unreadable and left out.
 
     Examples
     --------
@@ -43,7 +42,7 @@ def export(
     from lobewatch.show.fleet.export_postgres import upsert_table
 
     if [file, append, to].count(None) != 2:
-        raise ValueError("give one of FILE, --append FOLDER and --to ADDRESS")
+        raise ValueError("Give exactly one of FILE, --append FOLDER and --to ADDRESS.")
     machines, damaged = find_machines(folder), dict[str, str]()
     tables = read_all_tables(machines, damaged, with_option_names)
     if file is not None:
@@ -53,7 +52,7 @@ def export(
     else:
         outcome = upsert_table(tables, str(to))
     for key, reason in damaged.items():
-        notes.print(f"left out {key}: {reason}", markup=False)
+        print_always(f"left out {key}: {reason}")
     n_machines, (place, *_) = len(machines) - len(damaged), outcome.fields.values()
     payload = {"machines": n_machines, "tap_tests": outcome.tap_tests, "left_out": damaged}
     text = f"{outcome.tap_tests} tap tests of {n_machines} machines in {place}"

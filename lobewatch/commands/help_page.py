@@ -7,6 +7,8 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
 
+from lobewatch.commands.verbosity import apply_verbosity, make_verbosity_options
+
 MAX_PAGE_WIDTH = 100
 """Characters in a line at most; longer lines are hard to read."""
 MAX_NAME_COLUMN_WIDTH = 30
@@ -14,7 +16,14 @@ MAX_NAME_COLUMN_WIDTH = 30
 
 
 class HelpCommand(TyperCommand):
-    """Command with a plain help page."""
+    """Command with a plain help page, --quiet and --verbose."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments, and apply --quiet and --verbose."""
+        self.params = [*self.params, *make_verbosity_options()]
+        rest = super().parse_args(ctx, args)
+        apply_verbosity(ctx, **{name: ctx.params.pop(name) for name in ("quiet", "verbose")})
+        return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help page."""

@@ -12,14 +12,12 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 def history(
     machine: Machine,
     as_csv: AsCsv = False,
-    hdf5: Annotated[
-        Path | None, Option(help="Write all values and the diagrams of every test to this file (HDF5).")
-    ] = None,
+    hdf5: Annotated[Path | None, Option(help="HDF5 file for all values and diagrams of every test.")] = None,
     as_json: Json = False,
 ) -> None:
     """Show the history of a machine.
 
-    Verdicts are those of the time after each test, where they were asked for; times are UTC in --csv and --json.
+    Verdicts are those stored after each test. Times are UTC in --csv and --json.
 
     Examples
     --------
@@ -31,7 +29,7 @@ def history(
     from lobewatch.show.history import history_csv, history_json, history_lines
 
     if as_csv and as_json:
-        raise ValueError("--csv and --json: give one of them")
+        raise ValueError("--csv excludes --json. Give one of them.")
     logbook = Logbook.open(machine)
     if hdf5 is not None:
         from lobes import write_history

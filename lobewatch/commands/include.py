@@ -17,4 +17,4 @@ def include(machine: Machine, tap: ExcludableEntry, as_json: Json = False) -> No
 
     with publish_on_change(Logbook.open(machine)) as logbook:
         entry = take_back(logbook.folder, tap)
-        emit({"included": entry.id}, as_json, f"included {entry.id}: it counts again")
+        emit({"included": entry.id}, as_json, f"included {entry.id}")

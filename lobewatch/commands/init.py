@@ -18,29 +18,31 @@ Answer = str | None
 
 
 def init(
-    machine: Annotated[Path, FolderArgument(help="The folder to make.")],
-    example: Annotated[bool, Option("--example", help="With the surrogate spindle and three programs.")] = False,
-    yes: Annotated[bool, Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
-    edit: Annotated[str, Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",
-    name: Annotated[Answer, Option(help="Name of the machine.")] = None,
-    speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
-    drive: Annotated[Answer, Option(help='Power in kW and torque in N m: "15 40".')] = None,
+    machine: Annotated[Path, FolderArgument(help="New machine folder.")],
+    example: Annotated[bool, Option("--example", help="Start from the example spindle with three programs.")] = False,
+    yes: Annotated[bool, Option("--yes", help="Ask nothing. Settings without an option stay unchanged.")] = False,
+    edit: Annotated[str, Option(help="Ask one question again, by option name: --edit drive.")] = "",
+    name: Annotated[Answer, Option(help="Machine name.")] = None,
+    speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed (rpm): "1000 18000".')] = None,
+    drive: Annotated[Answer, Option(help='Spindle power (kW) and torque (N m): "15 40".')] = None,
     daq: Annotated[
-        Answer, Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
+        Answer, Option(help='DAQ port, driver, sample rate (Hz): "COM3", "COM3 dataq", "COM3 lines 3200".')
     ] = None,
-    hammer: Annotated[Answer, Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')] = None,
-    accelerometer: Annotated[Answer, Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
-    fixing: Annotated[Answer, Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
+    hammer: Annotated[Answer, Option(help='Hammer input, mV/N, range (V): "0 2.25 5", or none (not TAPS/1).')] = None,
+    accelerometer: Annotated[Answer, Option(help='Accelerometer input, mV/g, range (V): "1 10 5".')] = None,
+    fixing: Annotated[Answer, Option(help='Accelerometer mass (g) and mounting: "4 wax".')] = None,
     tool: Annotated[
-        Answer, Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".')
+        Answer, Option(help='Flutes, diameter (mm), helix (deg), stick-out (mm), material: "4 20 30 80 carbide".')
     ] = None,
-    material: Annotated[Answer, Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')] = None,
-    program: Annotated[Answer, Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')] = None,
+    material: Annotated[Answer, Option(help='Workpiece material: 42CrMo4, or Kt and Kr (N/mm2): "1400 500".')] = None,
+    program: Annotated[
+        Answer, Option(help='Spindle speed (rpm), ap (mm), ae (mm), feed per tooth (mm): "8000 2 20".')
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Make a machine folder with a commented machine.toml.
 
-    At a terminal it asks; with --yes, and where nobody sits, it takes what options say and leaves the rest to fill in.
+    At a terminal it asks ten questions. With --yes, or without a terminal, only options set values.
 
     Examples
     --------
@@ -67,10 +69,10 @@ def init(
         draft = _answer_settings(text, answers, edit, asks)
         text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
     else:
-        change = "change what is not as in your shop" if example else "fill it in"
-        next_step = f"{change}, then tap with: {next_step} --port PORT"
+        change = "adapt machine.toml to your machine" if example else "fill in machine.toml"
+        next_step = f"{change}, then run: {next_step} --port PORT"
     write_machine_file(machine, text)
-    payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'altered' if edit else 'made'} {toml}"
+    payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'changed' if edit else 'created'} {toml}"
     emit(payload, as_json, text, f"next: {next_step}")
 
 
@@ -83,11 +85,11 @@ def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: boo
     draft = MachineDraft(text, {})
     chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
     if edit and not asks and edit not in answers:
-        raise ValueError(f"--edit {edit}: nobody is at the terminal to ask; give the answer with --{edit}")
+        raise ValueError(f"--edit {edit} needs a terminal. Give the answer with --{edit}.")
     if not asks:
         return answer_questions(draft, answers)
     try:
         return ask_questions(draft, chosen, answers)
     except (EOFError, KeyboardInterrupt):
-        notes.print("\nnothing is written")
+        notes.print("\nnothing was written")
         raise KeyboardInterrupt from None

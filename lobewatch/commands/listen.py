@@ -23,27 +23,23 @@ if TYPE_CHECKING:
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
     machine: Machine,
-    program: Annotated[str, Option(help="Cutting program that is cut.")] = "",
-    cut: Annotated[str, Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
-    speed: Annotated[
-        float | None, Option(help="Spindle speed as set, rpm; that of the program where not given.")
-    ] = None,
+    program: Annotated[str, Option(help="Program name.")] = "",
+    cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
+    speed: Annotated[float | None, Option(help="Commanded spindle speed (rpm). Default: from the program.")] = None,
     depth: CutDepth = None,
     power: CutPower = None,
-    file: Annotated[Path | None, Option(help="A recording of the cut in place of the device.")] = None,
+    file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,
     date: CutDate = None,
-    sensor: Annotated[str, Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
-        "accelerometer"
-    ),
+    sensor: Annotated[str, Option(help="Sensor of --file: accelerometer or microphone (no unit).")] = ("accelerometer"),
     tacho: Annotated[
-        str, Option(help="Of a --file: column of the spindle's speed, in rpm or Hz, or of a tachometer's pulses.")
+        str, Option(help="Column of --file with the spindle speed (rpm or Hz) or tachometer pulses.")
     ] = "",
-    pulses: Annotated[int | None, Option(min=1, help="Of the tachometer in a turn; 1 where not given.")] = None,
-    port: Annotated[str, Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
-    seconds: Annotated[float, Option(min=2, help="How long a cut is waited for.")] = 120.0,
-    dry_run: Annotated[bool, Option("--dry-run", help="Say what is heard; store nothing.")] = False,
-    out: Annotated[Path | None, Option(help="Draw the spectrum to this file (.svg, .png, .pdf).")] = None,
-    screen: Annotated[bool, Option("--screen", help="Show it in a browser too, with the word in large.")] = False,
+    pulses: Annotated[int | None, Option(min=1, help="Tachometer pulses per revolution. Default: 1.")] = None,
+    port: Annotated[str, Option(help="Serial port of the DAQ. Default: [daq] port.")] = "",
+    seconds: Annotated[float, Option(min=2, help="Longest wait for a cut (s).")] = 120.0,
+    dry_run: Annotated[bool, Option("--dry-run", help="Show the result without storing it.")] = False,
+    out: Annotated[Path | None, Option(help="Spectrum figure (.svg, .png, .pdf).")] = None,
+    screen: Annotated[bool, Option("--screen", help="Show the result in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
@@ -53,9 +49,8 @@ def listen(
 ) -> None:
     """Record a cut and detect chatter.
 
-    Begin with the spindle turning in air, then cut for a second or longer; no key is needed. The recording is kept
-    beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again. --screen
-    --listen 0.0.0.0 can be watched on a tablet; the page keeps the word when the command has ended.
+    Start with the spindle running in air, then cut for at least one second. The recording and its result are stored.
+    lobewatch exclude takes them out of all results.
 
     Examples
     --------
@@ -76,7 +71,7 @@ def listen(
     if not dry_run:
         logbook.folder.refuse_damage()
     if screen and file is not None:
-        raise ValueError("--screen follows a device; what a --file says stands here")
+        raise ValueError("--screen needs a device. Leave out --screen or --file.")
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:

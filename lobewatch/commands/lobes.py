@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from typer import Option
 
 from lobewatch.commands.shared_options import TappedMachine
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
@@ -14,20 +15,19 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 def lobes(
     machine: TappedMachine,
-    cut: Annotated[str, Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
-    tool: Annotated[str | None, Option(help="If not given: that of the program, else that was tapped last.")] = None,
-    source: Annotated[DynamicsName, Option(help="From the modes found, or straight from the FRF.")] = "modes",
-    method: Annotated[MethodName, Option(help="How the limits of the chart are found.")] = "zero-order",
-    figure: Annotated[Path | None, Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
-    radial: Annotated[Path | None, Option(help="Draw the limit over speed and radial depth.")] = None,
-    waterfall: Annotated[Path | None, Option(help="Draw the limit over speed and time.")] = None,
+    cut: Annotated[str, Option(help="Name of a program, or the reference cut.")] = "reference cut",
+    tool: Annotated[str | None, Option(help="Tool name. Default: from the program, or tapped last.")] = None,
+    source: Annotated[DynamicsName, Option(help="Dynamics: fitted modes or measured FRF.")] = "modes",
+    method: Annotated[MethodName, Option(help="Method of the chart, not of verdicts.")] = "zero-order",
+    figure: Annotated[Path | None, Option(help="Lobe diagram (.svg, .png, .pdf).")] = None,
+    radial: Annotated[Path | None, Option(help="Figure of the limit over speed and radial depth ae.")] = None,
+    waterfall: Annotated[Path | None, Option(help="Figure of the limit over speed and time.")] = None,
     as_json: Json = False,
 ) -> None:
     """Show stability lobes and stable pockets.
 
-    A --tool that was never tapped is predicted by the model with the bearings of the newest tap test. Whatever the
-    method of the chart, verdicts on programs are those of lobewatch check, and it would call each pocket stable.
-    Of taps without a force sensor it lists the speeds of the pockets alone: no depth is known.
+    lobewatch check calls each stable pocket stable. A tool without a tap test is predicted by the spindle model. Tap
+    tests without a force sensor give pocket speeds, but no depths.
 
     Examples
     --------
@@ -48,12 +48,12 @@ def lobes(
         remarks = [*logbook.remarks, *assembly.remarks]
         emit(speed_pockets_json(cut, pockets, remarks), as_json, *speed_pockets_texts(cut, pockets, remarks))
         return
-    if notes.is_terminal:
-        notes.print("looking for speeds and depths that are safe; this takes some seconds")
-    comparison = compare_lobes(logbook, tool, cut, DynamicsSource(source), LobeMethod(method))
+    with show_progress("searching stable pockets"), time_step("lobes"):
+        comparison = compare_lobes(logbook, tool, cut, DynamicsSource(source), LobeMethod(method))
     remarks = [*logbook.remarks, *comparison.remarks]
     if drawn:
         from lobewatch.show.figures.lobe_figures import save_lobe_figures  # brings matplotlib
 
-        remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
+        with time_step("figures"):
+            remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))

@@ -13,7 +13,7 @@ def materials(
 ) -> None:
     """List materials with their cutting coefficients.
 
-    Each goes by any of its names: material = "42CrMo4", "1.7225" or "AISI 4140", case and blanks as you like.
+    Use any of the names in machine.toml, such as material = "42CrMo4" or "AISI 4140". Case and blanks do not matter.
 
     Examples
     --------

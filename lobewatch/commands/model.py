@@ -11,14 +11,14 @@ from lobewatch.show.terminal.output import Json, emit
 
 def model(
     machine: SpindleMachine,
-    tool: Annotated[str | None, Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
-    modes: Annotated[int, Option(min=1, max=20, help="How many modes.")] = 4,
-    figure: Annotated[Path | None, Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
+    tool: Annotated[str | None, Option(help="Name of a [[tool]]. Default: the tapped tool.")] = None,
+    modes: Annotated[int, Option(min=1, max=20, help="Number of modes.")] = 4,
+    figure: Annotated[Path | None, Option(help="Figure of the model (.svg, .png, .pdf).")] = None,
     as_json: Json = False,
 ) -> None:
     """Show the spindle model.
 
-    The bearings are those of the newest tap test, of machine.toml where there is none yet.
+    Bearing stiffness comes from the newest tap test, or from machine.toml if there is none.
 
     Examples
     --------

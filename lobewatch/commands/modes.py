@@ -9,6 +9,7 @@ from typer import Argument, Option
 
 from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit
+from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
     from modal import ModeEdits
@@ -17,65 +18,46 @@ if TYPE_CHECKING:
 @shared.add_file_options(without=["averages"])
 def modes(
     file: Annotated[
-        Path, Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005.")
+        Path,
+        Argument(help="Machine folder, or recorded hits or FRF: UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
     ],
-    tap: Annotated[
-        str, Argument(help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has.")
-    ] = "",
-    band: Annotated[tuple[float, float] | None, Option(help="Only between these frequencies (Hz).")] = None,
-    figure: Annotated[Path | None, Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")] = None,
+    tap: Annotated[str, Argument(help="Tap test of a machine folder: ID, or a unique part of it.")] = "",
+    band: Annotated[tuple[float, float] | None, Option(help="Frequency band (Hz).")] = None,
+    figure: Annotated[Path | None, Option(help="Figure of FRF, fit and poles (.svg, .png, .pdf).")] = None,
     window: Annotated[
         float | None,
-        Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
+        Option(help="Time constant (s) of an exponential window on the response. Default: from the file."),
     ] = None,
-    window_start: Annotated[float, Option(help="When that window begins (s from the record's start).")] = 0.0,
-    hit_at: Annotated[
-        float | None, Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it.")
-    ] = None,
-    averages: Annotated[
-        int | None, Option(help="Hits that an FRF was averaged from; else inferred from its coherence.")
-    ] = None,
+    window_start: Annotated[float, Option(help="Start of the window (s).")] = 0.0,
+    hit_at: Annotated[float | None, Option(help="Time of the hit (s). Needed for an FRF with --window.")] = None,
+    averages: Annotated[int | None, Option(help="Averaged hits of an FRF. Default: from its coherence.")] = None,
     hammer: Annotated[
-        Literal["none"] | None, Option(help="No force was measured: f_n and zeta alone, from the response.")
+        Literal["none"] | None, Option(help="No force was measured. Gives natural frequencies and damping only.")
     ] = None,
     *,
     file_options: shared.FileOptions,
-    accept: Annotated[
-        list[str] | None, Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
-    ] = None,
+    accept: Annotated[list[str] | None, Option(help="Accept hits with this verdict (not-decayed), repeatable.")] = None,
     conjugate: Annotated[
-        bool, Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+        bool, Option("--conjugate", help="The file has the complex conjugate of response over force.")
     ] = False,
     sensor_mass: Annotated[
-        float | None, Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
+        float | None, Option(help="Accelerometer mass (g) at the hit point. Its effect is removed.")
     ] = None,
     beside: Annotated[
         list[str] | None,
-        Option(
-            help="Another measurement of the same structure: a file, the number of another response of FILE, or where "
-            "FILE is a machine folder another tap test; given twice or more. What most of them have, too, is less in "
-            "doubt."
-        ),
+        Option(help="Another measurement (file, response number or tap test) to confirm modes. Give at least two."),
     ] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
-    by_fit: Annotated[
-        bool, Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
-    ] = False,
-    everything: Annotated[
-        bool, Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
-    ] = False,
+    by_fit: Annotated[bool, Option("--by-fit", help="Withdraw --add, --drop and --fix of TAP.")] = False,
+    everything: Annotated[bool, Option("--all", help="Show rejected modes and all remarks too.")] = False,
     as_json: Json = False,
 ) -> None:
     """Fit the modes of a recorded file or a stored tap test.
 
-    Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
-    by the peak picking of Gaber & Hashemi (2015). Trusted modes come first, then doubtful ones with the reason; the
-    rejected ones are counted. Hits that still ring when their record ends get an exponential window, and its damping
-    is taken off again. Modes can be added, left out and held; the picture names poles that may be modes. What is said
-    so of a file is only shown; of a tap test of a machine it is kept, in place of what was said of it before, and all
-    that follows from it is worked out anew.
+    The least-squares fit gives standard errors. Peak picking after Gaber & Hashemi (2015) is shown for comparison. With
+    TAP, --add, --drop and --fix are stored, and all results of the machine are updated.
 
     Examples
     --------
@@ -97,7 +79,7 @@ def modes(
     from modal import parse_mode_edits
 
     if beside is not None and len(beside) == 1:
-        raise ValueError(f"--beside {beside[0]}: one other tells nothing, its modes may be near by chance; name two")
+        raise ValueError(f"--beside {beside[0]} alone proves nothing: modes may agree by chance. Give at least two.")
     edits = parse_mode_edits(add, drop, fix)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
@@ -108,16 +90,17 @@ def modes(
         with nullcontext() if choice is None else publish_on_change(logbook):
             file_modes = read_tap_modes(logbook, tap, choice)
     elif by_fit or file.is_dir():
-        text = "--by-fit takes back what is kept of a tap test" if by_fit else f"{file} is a folder"
-        raise ValueError(f"{text}; name a tap test: lobewatch modes MACHINE TAP (lobewatch history lists them)")
+        text = "--by-fit needs a stored tap test" if by_fit else f"{file} is a folder"
+        raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
     else:
         said = file_options.description(averages=averages, without_force=hammer == "none")
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
         )
-        file_modes = how(file, description=said, by_hand=edits)
-        measured = [how(path, description=known) for path, known in list_comparison_files(beside or (), file, said)]
+        with time_step("fitting"):
+            file_modes = how(file, description=said, by_hand=edits)
+            measured = [how(path, description=known) for path, known in list_comparison_files(beside or (), file, said)]
     if beside:
         file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:
@@ -131,5 +114,5 @@ def modes(
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":
     """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
     if edits and by_fit:
-        raise ValueError("--by-fit takes back all that is said by hand; leave --add, --drop and --fix out")
+        raise ValueError("--by-fit excludes --add, --drop and --fix. Leave them out.")
     return edits if edits or by_fit else None

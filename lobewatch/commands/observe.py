@@ -10,19 +10,19 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 def observe(
     machine: Machine,
-    program: Annotated[str, Option(help='Cutting program that was cut, or "reference cut".')],
-    speed: Annotated[float | None, Option(help="Spindle speed, rpm; that of the program where not given.")] = None,
+    program: Annotated[str, Option(help='Program name, or "reference cut".')],
+    speed: Annotated[float | None, Option(help="Spindle speed (rpm). Default: from the program.")] = None,
     depth: CutDepth = None,
-    stable: Annotated[bool, Option("--stable", help="It ran quietly.")] = False,
-    chatter: Annotated[bool, Option("--chatter", help="It chattered.")] = False,
-    frequency: Annotated[float | None, Option(help="What it chattered at, Hz, where somebody knows.")] = None,
+    stable: Annotated[bool, Option("--stable", help="The cut was stable.")] = False,
+    chatter: Annotated[bool, Option("--chatter", help="The cut chattered.")] = False,
+    frequency: Annotated[float | None, Option(help="Chatter frequency (Hz), if known.")] = None,
     power: CutPower = None,
     date: CutDate = None,
     as_json: Json = False,
 ) -> None:
     """Store whether a test cut was stable by ear.
 
-    It is a line of the journal; lobewatch exclude takes it out again.
+    The result is stored in the journal. lobewatch exclude takes it out of all results.
 
     Examples
     --------
@@ -37,7 +37,7 @@ def observe(
     from lobewatch.show.history import contradiction_remark, cut_json, cut_text, untapped_remarks
 
     if stable == chatter:
-        raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
+        raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter. Give exactly one.")
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)

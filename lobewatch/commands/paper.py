@@ -9,15 +9,12 @@ from lobewatch.show.terminal.output import Json, emit
 
 
 def paper(
-    out: Annotated[
-        Path | None, Option(help="A folder for a page (paper.md) and its figures, made where it is not there.")
-    ] = None,
+    out: Annotated[Path | None, Option(help="Folder for a page (paper.md) with figures.")] = None,
     as_json: Json = False,
 ) -> None:
     """Compare lobewatch with Gaber & Hashemi.
 
-    Computed in this run on a surrogate of their spindle: the spinning element as printed, finite elements, bearings,
-    critical speeds, peak picking, tip stiffness, stability lobes new and old; then which of their claims hold.
+    All figures are computed on a surrogate of their spindle. The comparison gives a reason for each difference.
 
     Examples
     --------

@@ -8,12 +8,12 @@ from lobewatch.show.terminal.output import Json, emit
 
 
 def ports(
-    port: Annotated[str, Option(help="Ask only here; also a pseudo-terminal or socket://HOST:PORT.")] = "",
+    port: Annotated[str, Option(help="Only this port, pseudo-terminal or socket://HOST:PORT.")] = "",
     as_json: Json = False,
 ) -> None:
     """List serial ports and the devices that answer.
 
-    Only USB ports are asked, each question once, and only those that fit the vendor number.
+    Only USB ports are queried, and only by drivers that fit the vendor number.
 
     Examples
     --------

@@ -15,17 +15,14 @@ if TYPE_CHECKING:
 
 def rebuild(
     machine: FleetFolder,
-    jobs: Annotated[int, Option(min=1, max=64, help="Processes that work at once; what they find is the same.")] = 1,
-    scheduler: Annotated[
-        str, Option(help="Address of a Dask scheduler whose workers work, such as tls://10.0.0.5:8786.")
-    ] = "",
+    jobs: Annotated[int, Option(min=1, max=64, help="Number of parallel processes.")] = 1,
+    scheduler: Annotated[str, Option(help="Address of a Dask scheduler, such as tls://10.0.0.5:8786.")] = "",
     as_json: Json = False,
 ) -> None:
     """Rebuild the history, and a damaged journal.
 
-    What is damaged is put into a folder named damaged. Tap files that were renamed or swapped get their names back,
-    whole ones that are in no journal are entered. A tap test whose file is lost is gone on without; put back from a
-    backup, it counts again. Of a folder of machines each is rebuilt; one that cannot be costs only itself.
+    Damaged files are moved to a folder named damaged. Renamed tap files get their names back, and intact ones are added
+    to the journal. A lost tap file counts again after you restore it from a backup.
 
     Examples
     --------

@@ -5,29 +5,30 @@ from typing import Annotated, Literal
 from typer import Exit, Option
 
 from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
-from lobewatch.show.terminal.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit, show_progress
+from lobewatch.step_times import time_step
 
 
 def recommend(
     machine: TappedMachine,
-    tool: Annotated[str | None, Option(help="The tool.")] = None,
+    tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: Material = None,
-    radial: Annotated[float | None, Option(parser=number, help="Radial depth, mm; a slot where none is given.")] = None,
-    direction: Annotated[
-        Literal["up", "down"] | None, Option(help="Up or down milling; the worse where none is given.")
-    ] = None,
-    depth: Annotated[float | None, Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
-    speed: Annotated[float | None, Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
+    radial: Annotated[float | None, Option(parser=number, help="Radial depth of cut ae (mm). Default: a slot.")] = None,
+    direction: Annotated[Literal["up", "down"] | None, Option(help="Up or down milling. Default: the worse.")] = None,
+    depth: Annotated[float | None, Option(parser=number, help="Required axial depth of cut ap (mm).")] = None,
+    speed: Annotated[float | None, Option(parser=number, help="Present spindle speed (rpm).")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
-    feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth, mm.")] = None,
-    save: Annotated[str | None, Option(help="Write it into machine.toml as a program of this name.")] = None,
+    feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth (mm).")] = None,
+    save: Annotated[str | None, Option(help="Name of a new program in machine.toml.")] = None,
     as_json: Json = False,
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
 
-    The most chips a minute of all that lobewatch check would call stable, with room on all sides; at --depth where
-    that is given. Tool, material and teeth that are not given are those of the tool's programs where they agree.
+    Returns the highest material removal rate that is stable with margin on all sides. Missing values come from the
+    programs of the tool if they all agree.
+
+    Exit code 1: no stable setting.
 
     Examples
     --------
@@ -45,7 +46,8 @@ def recommend(
     logbook = Logbook.open(machine)
     if save is not None:
         check_program_name(logbook.machine, save)
-    answer = recommend_requested(logbook, cut, save)
+    with show_progress("searching stable speeds and depths"), time_step("lobes"):
+        answer = recommend_requested(logbook, cut, save)
     saved = None if answer.setting is None else save
     if saved is not None:
         save_program(logbook.folder, answer.program)

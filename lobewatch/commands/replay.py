@@ -14,47 +14,35 @@ from lobewatch.show.terminal.output import Json, print_remarks
 def replay(
     machine: shared.Machine,
     files: Annotated[list[Path], Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')],
-    tool: Annotated[str, Option(help="What was in the spindle; from the file, or [tap] tool, where not given.")] = "",
-    direction: Annotated[
-        str, Option(help="Direction at the tool tip, x or y; from the file, or x, where not given.")
-    ] = "",
-    date: Annotated[
-        datetime | None, Option(help="When it was recorded, local time; from the file where not given.")
-    ] = None,
-    date_pattern: Annotated[
-        str, Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
-    ] = "",
+    tool: Annotated[str, Option(help="Tool in the spindle. Default: from the file, or [tap] tool.")] = "",
+    direction: Annotated[str, Option(help="Direction at the tool tip: x or y. Default: from the file, or x.")] = "",
+    date: Annotated[datetime | None, Option(help="Recording date (local time). Default: from the file.")] = None,
+    date_pattern: Annotated[str, Option(help='Date format in file names: "%Y%m%d". With "/" in paths.')] = "",
     *,
     file_options: shared.FileOptions,
-    dry_run: Annotated[bool, Option("--dry-run", help="Say what would become of each file; store nothing.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help="Preview the result without storing it.")] = False,
     keep_going: Annotated[
-        bool, Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
+        bool, Option("--keep-going", help="Store usable files even if others fail (exit code 2).")
     ] = False,
-    jobs: Annotated[
-        int, Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
-    ] = 1,
-    scheduler: Annotated[
-        str, Option(help="Address of a Dask scheduler whose workers read and fit, such as tls://10.0.0.5:8786.")
-    ] = "",
+    jobs: Annotated[int, Option(min=1, max=64, help="Number of parallel processes.")] = 1,
+    scheduler: Annotated[str, Option(help="Address of a Dask scheduler, such as tls://10.0.0.5:8786.")] = "",
     accept: Annotated[
         list[str] | None,
-        Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
+        Option(help="Accept this warning code (repeatable)."),
     ] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
-    temperature: Annotated[float | None, Option(help="Of the spindle then, degC.")] = None,
-    hours: Annotated[float | None, Option(help="Running hours of the spindle then, h.")] = None,
-    note: Annotated[str, Option(help="What else is to be remembered of these tests.")] = "",
-    reclamped: Annotated[bool, Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
+    temperature: Annotated[float | None, Option(help="Spindle temperature (degC).")] = None,
+    hours: Annotated[float | None, Option(help="Running hours of the spindle (h).")] = None,
+    note: Annotated[str, Option(help="Note on these tests.")] = "",
+    reclamped: Annotated[bool, Option("--reclamped", help="The tool was reclamped before these tests.")] = False,
     as_json: Json = False,
 ) -> None:
     """Store recorded files as tap tests.
 
-    All files are read and judged before the first one is stored, in order of their dates. What a file does not say is
-    asked for by the name of an option, never guessed. A recording that is implausible for the machine is stored too,
-    and asked about; --accept answers, at once or later: then with the file of the tap test. --add, --drop and --fix
-    are kept with each test (lobewatch modes MACHINE TAP shows and changes them).
+    All files are checked before the first one is stored, in order of date. If data is missing, an error names the
+    option. An implausible recording is stored with a question. Answer it with --accept, now or later.
 
     Examples
     --------
@@ -83,8 +71,7 @@ def replay(
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
-            text = "with --dry-run nothing is kept; lobewatch modes FILE shows what becomes of it"
-            raise ValueError(f"{edits}: {text}")
+            raise ValueError(f"{edits}: --dry-run stores nothing. Preview the edits with lobewatch modes FILE.")
         with ReplayProgress() as bar:
             previews = preview_replay(logbook, recordings, description, bar, workers)
         emit_preview(previews, passed, as_json=as_json)

@@ -9,18 +9,19 @@ from typer import Option
 from lobewatch.commands.shared_options import FolderArgument
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, print_remarks
+from lobewatch.step_times import time_step
 
 
 def report(
-    machine: Annotated[Path, FolderArgument(help="Machine folder with a tap test, or a folder of machine folders.")],
-    out: Annotated[Path | None, Option(help="The HTML file; report.html in the folder where not given.")] = None,
-    tool: Annotated[str, Option(help="The series of this tool; that of the newest test where not given.")] = "",
-    direction: Annotated[str, Option(help="x or y; that of the newest test where not given.")] = "",
+    machine: Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")],
+    out: Annotated[Path | None, Option(help="HTML file. Default: report.html in the folder.")] = None,
+    tool: Annotated[str, Option(help="Tool of the series. Default: from the newest test.")] = "",
+    direction: Annotated[str, Option(help="Direction of the series: x or y. Default: from the newest test.")] = "",
     as_json: Json = False,
 ) -> None:
     """Write the report of a machine or of a folder of machines.
 
-    Of a folder of machine folders: a line for each of them, worst first.
+    The report of a folder of machines has one line per machine, worst first.
 
     Examples
     --------
@@ -32,11 +33,12 @@ def report(
 
     if not (machine / "machine.toml").is_file() and any(machine.glob("*/machine.toml")):
         if tool or direction:
-            raise ValueError(f"--tool and --direction: name one of the machines in {machine} with them")
+            raise ValueError(f"--tool and --direction need one machine. Name one in {machine}.")
         path = _write_for_fleet(machine, out)
     else:
         logbook = Logbook.open(machine)
-        path = write_report(logbook, out, tool, direction)
+        with time_step("report"):
+            path = write_report(logbook, out, tool, direction)
         print_remarks(logbook.remarks)
     emit({"report": str(path)}, as_json, f"report: {path}")
 

@@ -11,16 +11,14 @@ from lobewatch.show.terminal.output import Json, emit, notes
 
 def sensors(
     machine: Machine,
-    port: Annotated[str, Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
-    mass_kg: Annotated[
-        float | None, Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
-    ] = None,
-    skew: Annotated[bool, Option("--skew", help="Measure the skew: both inputs joined, one signal.")] = False,
+    port: Annotated[str, Option(help="Serial port of the DAQ, or socket://HOST:PORT. Default: [daq] port.")] = "",
+    mass_kg: Annotated[float | None, Option(help="Suspended mass with accelerometer (kg), to check F = m a.")] = None,
+    skew: Annotated[bool, Option("--skew", help="Measure the skew of two inputs joined to one signal.")] = False,
     as_json: Json = False,
 ) -> None:
     """Check hammer, accelerometer and DAQ.
 
-    Without an option: channels, dates, what is not plausible, and the sample rate against this computer's clock.
+    Without options: channels, calibration dates, implausible values, and the sample rate against the clock.
 
     Examples
     --------
@@ -36,9 +34,9 @@ def sensors(
     folder, print_note = MachineFolder(machine), partial(notes.print, markup=False)
     port = port or folder.machine.daq.port
     if not port:
-        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
+        raise ValueError(f"no port. Give --port, or port in [daq] of {folder.toml}.")
     if mass_kg is not None and skew:
-        raise ValueError("--mass-kg and --skew need different cabling; give one of them")
+        raise ValueError("--mass-kg and --skew need different cabling. Give one of them.")
     with folder.locked(), open_device(folder.machine.daq, port) as device:
         if mass_kg is not None:
             mass_check = check_mass(folder, port, device, mass_kg, print_note)

@@ -12,12 +12,14 @@ from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show
 def serve(
     folder: FleetFolder,
     listen: Listen = "127.0.0.1",
-    http_port: Annotated[int, Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
+    http_port: Annotated[int, Option(min=0, max=65535, help="HTTP port. 0: any free port.")] = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
     """Serve the dashboard of machines.
+
+    START begins a tap test on the port in machine.toml. Ctrl-C ends the server.
 
     Examples
     --------

@@ -21,8 +21,8 @@ def number(text: str | float) -> float:
         return float(text)
     except ValueError:
         comma = re.fullmatch(r"\s*([+-]?\d+),(\d+)\s*", str(text))
-        hint = f"; write {comma[1]}.{comma[2]} with a point" if comma else ""
-        raise BadParameter(f"{text!r} is no number{hint}") from None
+        hint = f". Write {comma[1]}.{comma[2]} with a decimal point." if comma else ""
+        raise BadParameter(f"{text!r} is not a number{hint}") from None
 
 
 Command = Callable[..., None]
@@ -30,27 +30,25 @@ FolderArgument = functools.partial(Argument, parser=to_folder_path)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 Machine = Annotated[Path, FolderArgument(help="Machine folder.")]
 TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at least one tap test.")]
-SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with a [spindle] in its machine.toml.")]
+SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with [spindle] in machine.toml.")]
 FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
-ExcludableEntry = Annotated[
-    str, Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1.")
-]
-AsCsv = Annotated[bool, Option("--csv", help="A table with commas on stdout instead of text.")]
-Diameter = Annotated[float | None, Option(parser=number, help="Diameter of the tool, mm.")]
+ExcludableEntry = Annotated[str, Argument(help="Tap test (ID, file or a unique part), or test cut (c1).")]
+AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
+Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
-CutDepth = Annotated[float | None, Option(help="Axial depth, mm; that of the program where not given.")]
-CutDate = Annotated[datetime | None, Option(help="When it was cut, local time; now where not given.")]
-Seed = Annotated[int, Option(help="Of the random numbers.")]
-ReclampingScatter = Annotated[float, Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")]
-Material = Annotated[str | None, Option(help="A [[material]], or one of lobewatch materials.")]
-Flutes = Annotated[int | None, Option(help="Teeth of the tool.")]
+CutDepth = Annotated[float | None, Option(help="Axial depth of cut ap (mm). Default: from the program.")]
+CutDate = Annotated[datetime | None, Option(help="Date of the cut (local time). Default: now.")]
+Seed = Annotated[int, Option(help="Seed of the random numbers.")]
+ReclampingScatter = Annotated[float, Option(help="Reclamping repeatability of f1: standard deviation (%), 0 to 5.")]
+Material = Annotated[str | None, Option(help="Material in machine.toml or lobewatch materials.")]
+Flutes = Annotated[int | None, Option(help="Number of flutes.")]
 CutPower = Annotated[
     float | None,
-    Option(help="Power of the cut, kW: what the drive shows, less what it shows in air at the same speed."),
+    Option(help="Cutting power (kW): drive display minus its value in air at the same speed."),
 ]
-AddedModes = Annotated[list[str] | None, Option(help="Fit a further mode near this frequency (Hz); may be repeated.")]
-DroppedModes = Annotated[list[str] | None, Option(help="Leave out the mode at this frequency (Hz); may be repeated.")]
-FixedModes = Annotated[list[str] | None, Option(help="Hold a mode at Hz:zeta, as in 1500:0.03, and fit its K alone.")]
+AddedModes = Annotated[list[str] | None, Option(help="Fit another mode near this frequency (Hz), repeatable.")]
+DroppedModes = Annotated[list[str] | None, Option(help="Leave out the mode at this frequency (Hz), repeatable.")]
+FixedModes = Annotated[list[str] | None, Option(help="Hold a mode at Hz:zeta, such as 1500:0.03, and fit only K.")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,40 +57,34 @@ class FileOptions:
 
     columns: Annotated[
         str,
-        Option(
-            help='Of its columns: "frequency,real,imag", "time [s],force [N],acceleration [g]", "frequency=F,frf=H:2".'
-        ),
+        Option(help='Column headings: "frequency,real,imag", "time [s],force [N]", "frequency=F,frf=H:2".'),
     ] = ""
     """Headings of the columns, separated by commas."""
-    quantity: Annotated[str, Option(help="Of the response: displacement, velocity or acceleration.")] = ""
+    quantity: Annotated[str, Option(help="Response: displacement, velocity or acceleration.")] = ""
     """Quantity of the response."""
-    unit: Annotated[str, Option(help="Of the response (m/s^2, g), or of an FRF (m/N, um/N, g/N).")] = ""
+    unit: Annotated[str, Option(help="Unit of response (m/s^2, g) or FRF (m/N, g/N).")] = ""
     """Unit of the response or of the FRF."""
-    force_unit: Annotated[str, Option(help="Of the force (N, lbf).")] = ""
+    force_unit: Annotated[str, Option(help="Force unit (N, lbf).")] = ""
     """Unit of the force."""
-    skip: Annotated[int | None, Option(min=1, help="Lines of a text that are passed over above its rows.")] = None
+    skip: Annotated[int | None, Option(min=1, help="Text lines above the rows.")] = None
     """Number of lines above the rows."""
-    decimal: Annotated[
-        str, Option(help="Decimal sign of a text where its numbers leave that in doubt: comma or point.")
-    ] = ""
+    decimal: Annotated[str, Option(help="Decimal sign: comma or point.")] = ""
     """Decimal sign."""
-    spacing: Annotated[
-        float | None, Option(help="Hz from line to line of an FRF that the file holds without its frequencies.")
-    ] = None
+    spacing: Annotated[float | None, Option(help="Line spacing (Hz) of an FRF without frequencies.")] = None
     """Spacing of the lines (Hz)."""
-    start: Annotated[float | None, Option(help="Hz of the first of these lines; 0 where not given.")] = None
+    start: Annotated[float | None, Option(help="First frequency (Hz) of such an FRF. Default: 0.")] = None
     """Frequency of the first line (Hz)."""
-    force: Annotated[Path | None, Option(help="File that holds the force, where FILE holds only the response.")] = None
+    force: Annotated[Path | None, Option(help="File with the force.")] = None
     """File of the force."""
-    rate: Annotated[float | None, Option(help="Samples a second (Hz).")] = None
+    rate: Annotated[float | None, Option(help="Sample rate (Hz).")] = None
     """Sample rate (Hz)."""
-    averages: Annotated[int | None, Option(help="Hits that an FRF was averaged from; 1 where nobody says.")] = None
+    averages: Annotated[int | None, Option(help="Averaged hits of an FRF. Default: 1.")] = None
     """Number of hits that an FRF was averaged from."""
-    response: Annotated[int | None, Option(help="Which of several responses, from 1.")] = None
+    response: Annotated[int | None, Option(help="Number of the response, from 1.")] = None
     """Number of the response, from 1."""
-    full_scale: Annotated[str, Option(help='Of each channel of a sound file, in its unit: "500,50".')] = ""
+    full_scale: Annotated[str, Option(help='Full scale of each channel of a sound file: "500,50".')] = ""
     """Full scales of the channels, separated by commas."""
-    sensitivity: Annotated[str, Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')] = ""
+    sensitivity: Annotated[str, Option(help='Sensitivity of each channel: "2.25 mV/N,10.2 mV/g".')] = ""
     """Sensitivities of the channels, separated by commas."""
 
     def description(self, **fields: Any) -> "acquisition.Description":
@@ -100,7 +92,7 @@ class FileOptions:
         try:
             scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()
         except ValueError as error:
-            text = f'--full-scale {self.full_scale}: give a number for each channel, as in "500,50"'
+            text = f'--full-scale {self.full_scale} is not a list of numbers. Give one per channel, such as "500,50".'
             raise ValueError(text) from error
         lists = {"columns": _split_words(self.columns), "sensitivity": _split_words(self.sensitivity)}
         return acquisition.Description(**vars(self) | lists | {"full_scale": scales} | fields)
@@ -130,7 +122,7 @@ def reject_file_options(options: FileOptions, **others: Any) -> None:
     """Raise ValueError for any option on a file, because a stored tap test needs none."""
     for name, value in (vars(options) | others).items():
         if value is not None and value not in ("", False):
-            raise ValueError(f"--{name.replace('_', '-')}: says how a file is read; a stored tap test says it itself")
+            raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave it out.")
 
 
 def _split_words(text: str) -> tuple[str, ...]:

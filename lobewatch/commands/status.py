@@ -20,27 +20,18 @@ def status(
     folder: FleetFolder,
     due: Annotated[bool, Option("--due", help="Only machines whose tap test is due.")] = False,
     to_notify: Annotated[
-        bool, Option("--notify", help="Send all of it by MQTT to the brokers that [notify] of machine.toml names.")
+        bool, Option("--notify", help="Publish the status by MQTT to the brokers in [notify] of machine.toml.")
     ] = False,
-    forget: Annotated[
-        str, Option(help="With --notify: take the messages on a machine that is gone out of its broker.")
-    ] = "",
-    prometheus: Annotated[
-        Path | None, Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
-    ] = None,
-    jobs: Annotated[
-        int, Option(min=1, max=64, help="Processes that make what is missing of standings; the same comes out.")
-    ] = 1,
-    scheduler: Annotated[
-        str, Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
-    ] = "",
+    forget: Annotated[str, Option(help="Machine whose messages --notify removes from its broker.")] = "",
+    prometheus: Annotated[Path | None, Option(help="File for the textfile collector of Prometheus.")] = None,
+    jobs: Annotated[int, Option(min=1, max=64, help="Number of parallel processes.")] = 1,
+    scheduler: Annotated[str, Option(help="Address of a Dask scheduler whose workers can read FOLDER.")] = "",
     as_csv: AsCsv = False,
     as_json: Json = False,
 ) -> None:
     """Show the status of all machines in a folder.
 
-    Exit code 1 where one of them is on alarm or cannot be judged, so that a scheduler can tell; else 2 where --notify
-    could not tell a broker.
+    Exit code 1: a machine is on alarm or cannot be evaluated. Exit code 2: --notify could not reach a broker.
 
     Examples
     --------
@@ -50,11 +41,12 @@ def status(
     from lobewatch.fleet.fleet import Fleet, find_machines
     from lobewatch.monitoring.status_rules import StatusLevel
     from lobewatch.show.fleet.fleet_status import fleet_csv, fleet_rows, fleet_text
+    from lobewatch.show.terminal.status_labels import status_name
 
     if as_csv and as_json:
-        raise ValueError("--csv and --json: give one of them")
+        raise ValueError("--csv excludes --json. Give one of them.")
     if forget and not to_notify:
-        raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
+        raise ValueError(f"--forget {forget} needs --notify. Add it.")
     fleet = Fleet(find_machines(folder), with_option_names)
     if jobs > 1 or scheduler:
         _make_missing_summaries(fleet, jobs, scheduler)
@@ -65,7 +57,7 @@ def status(
         results.out(fleet_csv(shown), end="", highlight=False)
     else:
         levels = [row["light"] for row in rows]
-        counted = ", ".join(f"{levels.count(level)} {level.value}" for level in StatusLevel if level in levels)
+        counted = ", ".join(f"{levels.count(level)} {status_name(level)}" for level in StatusLevel if level in levels)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
         machine_rows = [{key: row[key] for key in row if key not in DASHBOARD_ONLY_KEYS} for row in shown]
         emit({"machines": machine_rows}, as_json, "" if as_json else fleet_text(shown), count)

@@ -10,14 +10,14 @@ from lobewatch.show.terminal.output import Json, emit
 
 def suggest(
     machine: TappedMachine,
-    program: Annotated[str, Option(help="Cutting program to find the limits of.")],
-    cuts: Annotated[int, Option(min=1, help="Test cuts that shall be made in all.")] = 5,
+    program: Annotated[str, Option(help="Program name.")],
+    cuts: Annotated[int, Option(min=1, help="Total number of test cuts.")] = 5,
     as_json: Json = False,
 ) -> None:
     """Suggest the next test cut of a program.
 
-    Cuts that were heard (lobewatch observe) say what the spindle is like when it turns, and how hard the material is
-    to cut. Says what was learnt of both, beside what was known before.
+    Earlier test cuts (lobewatch observe, lobewatch listen) update the rotating spindle and the cutting force. The
+    result shows their values before and after.
 
     Examples
     --------

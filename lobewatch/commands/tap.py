@@ -12,39 +12,39 @@ from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, note
 
 def tap(
     machine: Machine,
-    port: Annotated[str, Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
-    tool: Annotated[str, Option(help="What is in the spindle; [tap] tool where not given.")] = "",
+    port: Annotated[
+        str, Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING. Default: [daq] port.")
+    ] = "",
+    tool: Annotated[str, Option(help="Tool in the spindle. Default: [tap] tool.")] = "",
     direction: Annotated[
         str,
         Option(
-            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y; a sensor with two axes does "
-            "it with x); without it x, then y at a terminal."
+            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y). Default: x, at a terminal "
+            "then y."
         ),
     ] = "",
-    operator: Annotated[str, Option(help="Who holds the hammer.")] = "",
-    new: Annotated[bool, Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
+    operator: Annotated[str, Option(help="Name of the operator.")] = "",
+    new: Annotated[bool, Option("--new", help="Start a new test instead of resuming an interrupted one.")] = False,
     accept: Annotated[
         list[str] | None,
-        Option(help="Take the recording though it raises this question, by its code; as often as needed."),
+        Option(help="Accept this warning code and store the recording (repeatable)."),
     ] = None,
-    temperature: Annotated[float | None, Option(help="Of the spindle, degC.")] = None,
-    hours: Annotated[float | None, Option(help="Running hours of the spindle, h.")] = None,
-    note: Annotated[str, Option(help="What else is to be remembered of this test.")] = "",
-    reclamped: Annotated[bool, Option("--reclamped", help="The tool was clamped anew for this test.")] = False,
+    temperature: Annotated[float | None, Option(help="Spindle temperature (degC).")] = None,
+    hours: Annotated[float | None, Option(help="Running hours of the spindle (h).")] = None,
+    note: Annotated[str, Option(help="Note on this test.")] = "",
+    reclamped: Annotated[bool, Option("--reclamped", help="The tool was reclamped before this test.")] = False,
     screen: Annotated[bool, Option("--screen", help="Show the test in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
-    details: Annotated[bool, Option("--details", help="All modes, the model and the doubt, too.")] = False,
+    details: Annotated[bool, Option("--details", help="Show all modes, the model and uncertainties too.")] = False,
     as_json: Json = False,
 ) -> None:
     """Run a live tap test.
 
-    At a terminal, or with --screen, x is tapped, then y; then you say what comes next: another test, the next tool, or
-    that you are done. With --direction, --json, or where nobody sits, it is one test. Keys: u or Page Up takes the last
-    good hit back, q stops, m mutes. Every hit is on the disk before it is counted. After a crash the same command goes
-    on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0 can be watched on a tablet; --port
-    file:RECORDING takes recorded hits as if they were made now.
+    At a terminal, or with --screen, you tap x, then y, then choose the next step. Each hit is stored at once: after a
+    crash or an unplugged cable, the same command continues. Keys: u or Page Up undoes the last good hit, q stops, m
+    mutes.
 
     Examples
     --------
@@ -91,6 +91,6 @@ def tap(
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
         if not visit.is_waiting:
-            notes.print(f"stopped with {visit.state.good} good hits; the same command goes on with them")
+            notes.print(f"stopped with {visit.state.good} good hits. Run the same command to continue.")
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)

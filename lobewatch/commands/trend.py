@@ -10,14 +10,16 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 def trend(
     machine: Machine,
-    tool: Annotated[str | None, Option(help="Of this tool; else that of the series that fell most.")] = None,
-    direction: Annotated[str | None, Option(help="x or y; else the one that fell more.")] = None,
-    as_csv: Annotated[bool, Option("--csv", help="The points with commas on stdout instead of text.")] = False,
+    tool: Annotated[str | None, Option(help="Tool of the series. Default: largest frequency drop.")] = None,
+    direction: Annotated[
+        str | None, Option(help="Direction of the series: x or y. Default: larger frequency drop.")
+    ] = None,
+    as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout.")] = False,
     as_json: Json = False,
 ) -> None:
     """Show the frequency trend of a series.
 
-    Exit code 1 where the machine's light is alarm.
+    Exit code 1: the machine is on alarm.
 
     Examples
     --------
@@ -31,7 +33,7 @@ def trend(
     from lobewatch.show.trend import trend_csv, trend_json, trend_remarks, trend_texts
 
     if as_csv and as_json:
-        raise ValueError("--csv and --json: give one of them")
+        raise ValueError("--csv excludes --json. Give one of them.")
     logbook = Logbook.open(machine)
     machine_outlook = forecast_machine(logbook)
     series = machine_outlook.series(tool, direction)

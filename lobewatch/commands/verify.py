@@ -9,9 +9,10 @@ from lobewatch.show.terminal.output import Json, emit
 def verify(machine: Machine, as_json: Json = False) -> None:
     """Verify every byte of a machine folder.
 
-    Names every file that is altered, missing, extra, swapped, renamed or cut short, and what to do. A machine.toml that
-    was edited is told, and is no damage. Nothing is changed, but that a tap test which an ended program had stored and
-    not yet entered in the journal is entered.
+    Lists each altered, missing, extra, swapped, renamed or truncated file with its remedy. An edited machine.toml is
+    only noted. A complete tap test of an interrupted program is added to the journal.
+
+    Exit code 1: something is damaged.
 
     Examples
     --------
@@ -25,7 +26,7 @@ def verify(machine: Machine, as_json: Json = False) -> None:
     damage, n_taps = list(verification.damage), verification.n_taps
     payload = {"damage": damage, "remarks": notes, "adopted": verification.entered, "sound_taps": n_taps}
     texts = [*(f"damaged: {remark}" for remark in damage), *(f"note: {remark}" for remark in notes)]
-    texts += [f"entered in the journal: {name}" for name in verification.entered]
-    last = f"{len(damage)} damaged" if damage else "nothing is damaged"
-    emit(payload, as_json, *texts, f"{n_taps} tap test(s) as they were committed, {last}")
+    texts += [f"added to the journal: {name}" for name in verification.entered]
+    last = f"{len(damage)} damaged" if damage else "no damage"
+    emit(payload, as_json, *texts, f"{n_taps} intact tap test(s), {last}")
     raise typer.Exit(int(bool(damage)))

@@ -18,7 +18,7 @@ from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
 from lobewatch.machine.folder_updates import store_mode_edits
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.verify_files import enter_orphaned_taps
-from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions
+from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions, find_device_questions
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap
 from modal import ModeEdits
 
@@ -223,6 +223,7 @@ class Logbook:
         if not self.is_current:
             self._invalidate()
         codes = find_clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
+        codes += find_device_questions(self.folder, tap.circumstances)
         is_newest, analysis = self.files.add(self.folder.commit(tap, codes)), self._current_analysis
         self._current_analysis = self._make_analysis(analysis.measurements) if is_newest and analysis else None
         self._mark = self.folder.change_mark

@@ -27,6 +27,7 @@ from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
 from lobewatch.machine.settings.toml import read_toml_text
+from lobewatch.step_times import time_step
 
 MAX_HASHED_BYTES, MAX_HASHED_FILES = 10_000_000, 50
 """Limits of the newest tap files whose SHA-256 is checked at every reading; lobewatch verify checks all."""
@@ -263,6 +264,7 @@ class MachineFolder:
         """
         return self._lock.hold(patience)
 
+    @time_step("reading")
     def contents(self) -> FolderContents:
         """Read the committed tap tests and the state of their files."""
         return read_folder_contents(self.path, self.journal.read())
@@ -285,6 +287,7 @@ class MachineFolder:
             self.journal.refuse_damage(replace(reading, damage=(missing,)))
         return reading
 
+    @time_step("reading")
     def read(self, entry: TapEntry) -> TapTest:
         """Read a tap test, after its file is checked against the journal.
 
@@ -316,7 +319,7 @@ class MachineFolder:
         tap
             Tap test.
         asked
-            Codes of the questions about its time.
+            Codes of the questions about its time and device.
 
         Raises
         ------

@@ -17,6 +17,7 @@ from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
+from lobewatch.step_times import time_step
 from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
 
 ACCEPTABLE_FLAGS = HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD
@@ -42,6 +43,7 @@ class FileFrf:
     """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
 
 
+@time_step("reading")
 def read_file_frf(
     path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
 ) -> FileFrf:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Frf, Remark
+from acquisition import Circumstances, DeviceIdentity, Frf, Remark
+from acquisition.files.tap_file import read_circumstances
 from dsm import format_rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.measurement import clock_questions as clock
@@ -69,8 +70,12 @@ STIFFNESS_OFF_MODEL = RecordingQuestion(
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
 A real spindle is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
+EMULATED_DEVICE = RecordingQuestion(
+    "emulated-device", sentence="recorded from an emulated device, but other tap tests of this machine are real"
+)
+"""Asked of an emulated tap test in a machine with real ones."""
 MODE_QUESTIONS = (FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW, STIFFNESS_JUMP, STIFFNESS_OFF_MODEL)
-RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS)
+RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
 
@@ -129,10 +134,14 @@ def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:
 
 def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
     """Return the remarks on a test and its time, with accepted questions replaced by remarks on the answers."""
-    remarks = (*remarks, *(clock.clock_question(code, tap.time) for code in tap.asked))
+    remarks = (*remarks, *(_question_at_commit(code, tap) for code in tap.asked))
     texts = {remark.code: str(remark) for remark in remarks}
     answers = [Remark(ACCEPTED_CODE, code, texts.get(code, "no longer asked")) for code in tap.accepted]
     return (*(remark for remark in remarks if remark.code not in tap.accepted), *answers)
+
+
+def _question_at_commit(code: str, tap: TapEntry) -> Remark:
+    return EMULATED_DEVICE.ask() if code == EMULATED_DEVICE.code else clock.clock_question(code, tap.time)
 
 
 def find_open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
@@ -201,6 +210,14 @@ def question_remarks(
         answer += f" accept_questions.codes {question.code}"
         cure = f"Tap again, or run {answer} to confirm"
         yield Remark(question.code, about, f"{question.text} ({answer} confirms it)", cure)
+
+
+def find_device_questions(folder: MachineFolder, device: Circumstances | DeviceIdentity) -> tuple[str, ...]:
+    """Return the code of the question about an emulated device in a machine with real tap tests."""
+    if not device.is_emulated:
+        return ()
+    has_real = any(not read_circumstances(folder.path / tap.file).is_emulated for tap in reversed(folder.taps()))
+    return (EMULATED_DEVICE.code,) if has_real else ()
 
 
 def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
@@ -92,6 +93,7 @@ def measure(
     return interpret_fit(fit_tap(tap, machine, by_hand), machine, last)
 
 
+@time_step("fitting")
 def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) -> TapFit:
     """Fit the modes of one tap test, the largest part of the work, which needs no other test.
 

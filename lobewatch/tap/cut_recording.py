@@ -21,7 +21,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, open_device
+from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, label_device, open_device
 from lobewatch.tap.live_curves import find_extremes
 from lobewatch.tap.state import LiveState, StatePublisher
 
@@ -253,7 +253,7 @@ def acquire_cut(
     with open_device(folder.machine.daq, port) as device:
         with folder.locked():
             check_device_rate(folder, device)
-        publish(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        publish(device=label_device(device))
         device.start()
         return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
 

@@ -68,6 +68,12 @@ def describe_device(device: Device) -> str:
     return ", ".join([identity.model, *(name + value for name, value in details if value)])
 
 
+def label_device(device: Device) -> str:
+    """Return model and sample rate of a device, and whether it is emulated."""
+    note = ", emulated device" * device.identity.is_emulated
+    return f"{device.identity.model}, {device.sample_rate:g} Hz{note}"
+
+
 def get_newest_codes(pieces: Sequence[Codes], rate: float) -> Codes:
     """Return the newest codes of at least one piece, at most LEVEL_WINDOW, at a sample rate (Hz)."""
     wanted, newest = round(LEVEL_WINDOW * rate), [pieces[-1]]

@@ -104,8 +104,8 @@ def emulate_cut(
     """Emulate a cut that repeats, with the accelerometer on the housing and an idle hammer.
 
     Truth, run-out and housing depend on the seed only, not on the cut. A program fed along both axes is fed along x.
-    spindle: replaces the model of the tool. serving: as of `emulate_device`. DataError if machine.toml has no model of
-    it, or lacks the sensors of a device that does not describe them itself.
+    spindle: replaces the model of the tool. serving: as of `emulate_device`. DataError if machine.toml lacks the
+    sensors of a device that does not describe them itself.
     """
     truth, random, noise = draw_hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = draw_runout(setting.cut, random)
@@ -124,7 +124,9 @@ def emulate_cut(
 
 def _select_tip_modes(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
     """Return the modes of the tip that a cut moves."""
-    structure = build_structure(spindle or folder.machine.model(setting.tool), get_spindle_table(folder).damping_ratio)
+    table = get_spindle_table(folder)
+    model = spindle or (folder.machine.model(setting.tool) if folder.machine.spindle else table.build())
+    structure = build_structure(model, table.damping_ratio)
     softest = int(np.argmin(structure.stiffness))
     is_moved = structure.stiffness < MAX_MODE_STIFFNESS_RATIO * structure.stiffness[softest]
     is_moved &= structure.frequency < MAX_EMULATED_MODE_FREQUENCY

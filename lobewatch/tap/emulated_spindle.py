@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property, partial
+from importlib import resources
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ from acquisition.errors import join_sentences
 from dsm import Spindle, calibrate, modes_at, natural_frequencies, static_stiffness
 from lobewatch.arrays import Floats
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.spindle_tables import SpindleTable
 from lobewatch.monitoring.level_model import STEEL_FREQUENCY_PER_KELVIN
 
@@ -130,7 +132,7 @@ def emulate_machine(
 
     spindle: replaces that of machine.toml, with the same damping. axes_angle: angle from x (deg) of its principal
     directions as in `rotate_structure`, None for a round spindle, the same in x and y. serving: as of `emulate_device`.
-    DataError if machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
+    DataError if machine.toml lacks the sensors of a device that does not describe them itself.
     """
     table, random = get_spindle_table(folder), np.random.default_rng(seed)
     built = build_structure(spindle or table.build(), table.damping_ratio, folder.machine.tap.position_mm / 1e3)
@@ -166,11 +168,12 @@ def emulate_device(
 
 
 def get_spindle_table(folder: MachineFolder) -> SpindleTable:
-    """Return [spindle] of machine.toml. DataError if there is none."""
-    if folder.machine.spindle is None:
-        cure = "Add a [spindle] table, or use folder_files.make_machine_folder.template"
-        raise acquisition.DataError(join_sentences(f"{folder.toml}: there is no spindle model to emulate", cure))
-    return folder.machine.spindle
+    """Return [spindle] of machine.toml, or that of the example machine if there is none."""
+    if folder.machine.spindle is not None:
+        return folder.machine.spindle
+    example = parse_machine_file(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8"))
+    assert example.spindle is not None
+    return example.spindle
 
 
 def _select_direction(built: Structure, axes_angle: float | None, direction: TapDirection) -> Structure:
@@ -263,7 +266,7 @@ class SpindleWear:
 
     @classmethod
     def of(cls, folder: MachineFolder, months: int, story: WearScenario) -> Self:
-        """Return the wear of the spindle of a machine. DataError if machine.toml has none."""
+        """Return the wear of the spindle of a machine."""
         table = get_spindle_table(folder)
         return cls(table.build(), table.bearing_stiffness_n_per_um * 1e6, months, story)
 
@@ -372,9 +375,6 @@ def remount_spindle(spindle: Spindle, shift: float) -> Spindle:
 def build_mounted_spindle(
     folder: MachineFolder, story: WearScenario, months: int, month: int, mounting: MountingVariation, seed: int
 ) -> Spindle:
-    """Build the spindle as mounted in one month of a scenario, the same for the same seed.
-
-    DataError if machine.toml has no spindle.
-    """
+    """Build the spindle as mounted in one month of a scenario, the same for the same seed."""
     shifts = mounting.shifts(month + 1, 1, np.random.default_rng([seed, month]))
     return remount_spindle(SpindleWear.of(folder, months, story).spindle(month), float(shifts[month, 0]))

@@ -11,7 +11,13 @@ from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, Hi
 from acquisition.errors import join_sentences
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import LEVEL_WINDOW, DeviceConnection, describe_device, estimate_resting_rms
+from lobewatch.tap.device_connection import (
+    LEVEL_WINDOW,
+    DeviceConnection,
+    describe_device,
+    estimate_resting_rms,
+    label_device,
+)
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
@@ -94,7 +100,7 @@ class TapPhases:
         except BaseException:
             device.close()
             raise
-        self._publisher.show(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
+        self._publisher.show(device=label_device(device))
         return connection
 
     def _reconnect(self, error: DeviceError) -> DeviceConnection:

@@ -13,7 +13,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.measurement import Measurement
-from lobewatch.measurement.recording_questions import check_question_codes, find_open_questions
+from lobewatch.measurement.recording_questions import check_question_codes, find_device_questions, find_open_questions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceOpener
@@ -69,7 +69,7 @@ class TapSession:
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
         self._publisher = StatePublisher(first, clock)
-        self._phases = TapPhases(folder, open_device, self._publisher, guided=guided, sleep=sleep)
+        self._phases = TapPhases(folder, partial(self._open, open_device), self._publisher, guided=guided, sleep=sleep)
         self._measurement: Measurement | None = None
         self.wakes = self._publisher.wakes
         """Functions called after every change by the thread of the test. None may take time."""
@@ -147,6 +147,17 @@ class TapSession:
             if failure is error:
                 raise
             raise failure from error
+
+    def _open(self, open_device: Callable[[], Device]) -> Device:
+        """Open the device. DataError for an emulated one in a machine with real tap tests, unless that is accepted."""
+        device = open_device()
+        asked = find_device_questions(self._folder, device.identity)
+        if set(asked) <= set(self._accept):
+            return device
+        device.close()
+        cure = f"Tap another machine, or add accept_questions.codes {asked[0]} to store it here"
+        finding = f"this device is emulated, but {self._folder.path} has real tap tests"
+        raise DataError(join_sentences(finding, cure))
 
     def _begin(self) -> TapInProgress:
         """Return the interrupted test, or a new one."""

@@ -60,7 +60,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     conditions: Conditions = UNKNOWN_CONDITIONS
     """Conditions of the tap test; unknown in lines of older versions."""
     asked: tuple[str, ...] = ()
-    """Codes of the questions about its time at the commit; empty in lines of older versions."""
+    """Codes of the questions about its time and device at the commit; empty in lines of older versions."""
     operator: str = ""
     """Name of the operator; empty if unknown and in lines of older versions."""
     accepted: tuple[str, ...] = ()

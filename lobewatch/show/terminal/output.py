@@ -10,8 +10,9 @@ import re
 import sys
 import webbrowser
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import starmap
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.cells import cell_len
@@ -25,7 +26,10 @@ from acquisition import Remark, merge_remarks
 from acquisition.errors import CONTROL_CHARACTERS
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
-Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+Json = Annotated[bool, typer.Option("--json", help="JSON on stdout.")]
 
 JsonObject = dict[str, Any]
 """Object of the JSON output."""
@@ -35,6 +39,11 @@ Texts = list[str | Table]
 
 class SafeConsole(Console):
     """Console that texts cannot control: newline and tab are the only control characters that pass."""
+
+    @property
+    def is_terminal(self) -> bool:
+        """True for a terminal that is not quiet: with --quiet nobody is asked, and no progress is shown."""
+        return super().is_terminal and not getattr(self, "quiet", False)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
         """Render without control characters, except those that rich itself writes."""
@@ -88,6 +97,22 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
         else:
             width = text.min_table_width if isinstance(text, SafeTable) else 0
             results.print(text, width=max(Console().width, width) if width else None)
+
+
+def print_always(text: str) -> None:
+    """Print a line to stderr, also with --quiet."""
+    sys.stderr.write(f"{make_printable(text)}\n")
+    sys.stderr.flush()
+
+
+@contextmanager
+def show_progress(text: str) -> "Iterator[Progress]":
+    """Show progress on stderr if that is a terminal, beginning with a task of unknown length."""
+    from rich.progress import Progress
+
+    with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
+        progress.add_task(text, total=None)
+        yield progress
 
 
 def new_table(*headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
@@ -170,19 +195,18 @@ def blank_nonfinite(value: Any) -> Any:
     return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
-Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
-KNOWN = "What a browser must know"
-Token = Annotated[str | None, typer.Option(help=f"{KNOWN} to see and alter anything; a new one where not given.")]
-WatchToken = Annotated[str | None, typer.Option(help=f"{KNOWN} only to see anything; a new one where not given.")]
+Listen = Annotated[str, typer.Option(help="IP address to listen on. 0.0.0.0: all addresses.")]
+Token = Annotated[str | None, typer.Option(help="Full-access token. Default: random.")]
+WatchToken = Annotated[str | None, typer.Option(help="Read-only access token. Default: random.")]
 
 
 def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
-    """Print the address and that for those who may only watch; open the first where somebody sits at a screen."""
+    """Print the full-access and the read-only address. On a desktop, open the first in a browser."""
     if as_json:
         results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
         results.file.flush()
     else:
-        notes.print(f"screen: {url}\nonly to watch: {watch_url}", markup=False)
+        print_always(f"screen: {url}\nread-only: {watch_url}")
     display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.stdout.isatty() and display:
         webbrowser.open(url)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from acquisition.errors import join_sentences
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
 from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
 from lobewatch.show.terminal.output import notes
@@ -16,16 +17,15 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
             if question is DAQ_QUESTION and draft.daq.problem:
                 _print_notes(f"note: {draft.daq.problem}")
     if draft.missing_sensors:
-        cure = f"a {draft.daq.driver} DAQ does not know its sensors: give their input, sensitivity and range"
-        raise ValueError(f"--{draft.missing_sensors[0]}: missing; {cure}")
+        cure = "This DAQ does not describe its sensors: give input, sensitivity and range."
+        raise ValueError(f"--{draft.missing_sensors[0]} is missing. {cure}")
     return draft
 
 
 def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
     """Ask a person the questions that `answers` of options do not cover; raise EOFError without an answer."""
     if questions == SETUP_QUESTIONS:
-        keys = "Enter takes what stands in [brackets], - leaves something open"
-        _print_notes(f"{keys}; nothing is written before the end.")
+        _print_notes("Enter keeps the value in [brackets], - skips a question. Nothing is written before the end.")
     for question in questions:
         number = SETUP_QUESTIONS.index(question) + 1
         already = question.skip_reason(draft)
@@ -54,25 +54,25 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
         notes.print(f"    [{current}] > " if current else "    > ", end="", markup=False)
         answer = input().strip() or current
         if not answer:
-            _print_notes("    this is needed")
+            _print_notes("    An answer is required")
             continue
         try:
             answered = question.apply_answer(draft, answer).checked()
         except ValueError as error:
             _print_notes(f"    {str(error).removeprefix('machine.toml: ')}")
             continue
-        look, again = answered.daq, "; the port is kept: lobewatch ports looks again"
-        if question is DAQ_QUESTION and (text := f"{look.problem}{again}" if look.problem else look.text):
+        look, kept = answered.daq, "The port is kept. Check it with lobewatch ports"
+        if question is DAQ_QUESTION and (text := join_sentences(look.problem, kept) if look.problem else look.text):
             _print_notes(f"    {text}")
         return answered
 
 
 def _find_daqs(draft: MachineDraft) -> MachineDraft:
-    _print_notes("\nLooking for a DAQ on the ports ...")
+    _print_notes("\nSearching for a DAQ on the ports ...")
     looks = find_daqs()
     _print_notes(*(f"    {i}: {look.port}: {look.text}" for i, look in enumerate(looks, 1)))
     if not looks:
-        _print_notes("    none answers on a USB port; name its port, or - and give it later with --port")
+        _print_notes("    no DAQ answers on USB. Enter its port, or - to give it later with --port")
     return replace(draft, detected_daqs={**draft.detected_daqs, **{look.port: look for look in looks}})
 
 

@@ -10,6 +10,11 @@ STATUS_LABELS = {
 }
 
 
+def status_name(status: str) -> str:
+    """Return the status as people read it."""
+    return "warning" if status == StatusLevel.WARN else str(status)
+
+
 def status_label(light: StatusLevel, is_early: bool = False) -> str:
     """Return the status with its symbol."""
     return "✗ EARLY ALARM" if is_early else STATUS_LABELS[light]

@@ -19,10 +19,11 @@ from rich.text import Text
 from dsm import format_rounded
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import SafeConsole
+from lobewatch.show.terminal.status_labels import status_name
 from lobewatch.tap.state import ListedHit, Outcome, TapState, TapStep
 
 POLL_INTERVAL = 0.05
-"""Time between two looks at keys and test (s)."""
+"""Interval at which keys and test are polled (s)."""
 
 
 class RunningTest(Protocol):
@@ -76,7 +77,7 @@ class TapPrinter:
         if state.title != before.title:
             self._n_printed = 0
         if state.device != before.device:
-            self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
+            self._console.print(f"{state.device}. Tap the tool repeatedly.", markup=False)
         for check in state.checks:
             if (check.is_notable or not check.passed) and check not in before.checks:
                 symbol = "[bold green]✓[/]" if check.passed else "[bold yellow]![/]"
@@ -113,7 +114,7 @@ SPECIAL_KEY_CODES = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.D
 
 
 class KeyReader:
-    """Reader of single keys within its context; reads nothing where standard input is no terminal."""
+    """Reader of single keys within its context; reads nothing if standard input is not a terminal."""
 
     def __init__(self) -> None:
         self._before: list[Any] | None = None
@@ -137,7 +138,7 @@ class KeyReader:
             self._before = None
 
     def read(self) -> str:
-        """Read the waiting keys in lower case; empty where there are none."""
+        """Read the waiting keys in lower case; empty if there are none."""
         if sys.platform == "win32":
             import msvcrt
 
@@ -257,7 +258,7 @@ class TerminalScreen:
         """Read a line while the screen is paused."""
         self._live.stop()
         self._keys.__exit__()
-        self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")
+        self._console.print("\nNext tool, from machine.toml or a new name (Enter: none) > ", end="")
         try:
             return sys.stdin.readline().strip()
         finally:
@@ -306,7 +307,7 @@ def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
     for program in outcome.programs:
         yield Text(f"  {program.program}: {program.word}")
     symbol, style = STATUS_STYLES[outcome.status]
-    label = f" {symbol} {'EARLY ' if outcome.is_early else ''}{outcome.status.upper()} "
+    label = f" {symbol} {'EARLY ' if outcome.is_early else ''}{status_name(outcome.status).upper()} "
     yield Text.assemble((label, style), f"  next: {with_option_names(outcome.next_step)}")
 
 
@@ -317,6 +318,6 @@ def _level_line(state: TapState) -> str:
         force, response = (level and format_rounded(level, digits=2) for level in state.levels)
         texts.append(("" if force is None else f"force {force} N rms, ") + f"response {response} m/s^2 rms")
     if state.mean_change is not None:
-        settled = "; it has settled" if state.settled else ""
-        texts.append(f"the last good hit moved the mean by {100 * state.mean_change:.2g} %{settled}")
+        settled = " (converged)" if state.settled else ""
+        texts.append(f"last good hit changed the mean by {100 * state.mean_change:.2g} %{settled}")
     return "   ".join(texts) or " "

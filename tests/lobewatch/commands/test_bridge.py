@@ -93,14 +93,14 @@ def test_a_whole_tap_test_through_the_bridge(machines: tuple[MachineFolder, Mach
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["taps"], "no port: give --port, or a machine folder with port in [daq]"),
-        (["taps", "{pi}", "--port", "x"], 'machine.toml: driver = "dataq", not "taps"; give the same one'),
-        (["nothing", "--port", "x"], "driver='nothing' is none of taps, dataq"),
+        (["taps"], ["--port", "[daq]"]),
+        (["taps", "{pi}", "--port", "x"], ["machine.toml", '"dataq"', '"taps"']),
+        (["nothing", "--port", "x"], ["'nothing'", "taps, dataq"]),
         (
             ["dataq", "--port", "x"],
-            "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B does not know its sensors: give the",
+            ["a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B", "[[daq.channel]]"],
         ),
-        (["taps", "--port", "/dev/ttyNOT"], "check the cable and the port's name"),
+        (["taps", "--port", "/dev/ttyNOT"], ["/dev/ttyNOT"]),
     ],
 )
 def test_wrong_use(
@@ -108,11 +108,11 @@ def test_wrong_use(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     words: list[str],
-    told: str,
+    told: list[str],
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["lobewatch", "bridge", *(word.format(pi=machines[0].path) for word in words)])
     with pytest.raises(SystemExit) as end:
         main()
     err = capsys.readouterr().err
     assert (end.value.code, "Traceback" in err) == (2, False)
-    assert told in " ".join(err.split())
+    assert [fact for fact in told if fact not in " ".join(err.split())] == []

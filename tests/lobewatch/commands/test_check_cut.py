@@ -29,7 +29,7 @@ def test_a_cut_is_evaluated_without_a_program_as_one(shop: Shop, check: Check, n
 def test_a_material_and_a_geometry_may_be_given_for_a_cut(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
     cut = ("--speed", "8700", "--depth", "0.2", "--material", "1.0503")
-    assert "Kt -25..+30 %, Kr/Kt -52..+100 % (published for C45)" in check(*cut).out
+    assert re.search(r"Kt -25..\+30 %, Kr/Kt -52..\+100 %.*C45", check(*cut).out)
     geometry = ("--radial", "10", "--direction", "up", "--teeth", "3", "--diameter", "25")
     asked = check(*cut, *geometry, "--json").programs["8700 rpm, 0.2 mm"]
     shop.run(("A", 8700, 0.2))
@@ -46,39 +46,41 @@ def test_what_is_missing_of_a_cut_is_asked_for_in_one_message(shop: Shop, check:
     shop.tap_both()
     said = check("--tool", "long end mill", "--speed", "8700", "--teeth", "2")
     assert (said.code, said.out) == (2, "")
-    missing = "--depth, --material, --diameter, --radial, --direction: missing, and no program runs with tool"
-    assert f"{missing} 'long end mill'; give them" in said.err
+    assert "--depth, --material, --diameter, --radial, --direction" in said.err
+    assert "'long end mill'" in said.err
     shop.edit('name = "B"\ntool = "reference"\nteeth = 4', 'name = "B"\ntool = "reference"\nteeth = 3')
     said = check("--speed", "8700", "--depth", "1")
-    assert "--teeth: missing, and the programs of tool 'reference' do not agree on them" in said.err
+    assert "--teeth" in said.err
+    assert "'reference'" in said.err
     shop.edit('name = "B"\ntool = "reference"', 'name = "B"\ntool = "another"')
     said = check("--speed", "8700", "--depth", "1")
-    assert (
-        said.err.count("--tool, --material, --teeth, --diameter, --radial, --direction: missing, and no tool is") == 1
-    )
+    assert said.err.count("--tool, --material, --teeth, --diameter, --radial, --direction") == 1
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--speed", "0", "--depth", "1"), "--speed 0: is not above 0"),
-        (("--speed", "nan", "--depth", "1"), "--speed nan: is not above 0"),
-        (("--speed", "90000", "--depth", "1"), "--speed 90000: is outside [speed] 3000..24000 rpm"),
-        (("--speed", "9000", "--depth", "-1"), "--depth -1: is not above 0"),
-        (("--speed", "9000", "--depth", "1", "--teeth", "0"), "--teeth 0: is not above 0"),
+        (("--speed", "0", "--depth", "1"), ("--speed 0", "above 0")),
+        (("--speed", "nan", "--depth", "1"), ("--speed nan", "above 0")),
+        (("--speed", "90000", "--depth", "1"), ("--speed 90000", "3000..24000 rpm")),
+        (("--speed", "9000", "--depth", "-1"), ("--depth -1", "above 0")),
+        (("--speed", "9000", "--depth", "1", "--teeth", "0"), ("--teeth 0", "above 0")),
         (
             ("--speed", "9000", "--depth", "1", "--diameter", "10"),
-            "radial_depth_mm=20 is larger than tool_diameter_mm=10",
+            ("radial_depth_mm=20", "tool_diameter_mm=10"),
         ),
-        (("--speed", "9000", "--depth", "1", "--material", "42CrMo5"), "is '42CrMo4' meant?"),
-        (("--speed", "9000", "--depth", "0,5"), "Invalid value for '--depth'"),
+        (("--speed", "9000", "--depth", "1", "--material", "42CrMo5"), ("42CrMo5", "'42CrMo4'")),
+        (("--speed", "9000", "--depth", "0,5"), ("'--depth'", "0,5", "0.5")),
     ],
 )
-def test_bad_numbers_of_a_cut_are_rejected(shop: Shop, check: Check, options: tuple[str, ...], message: str) -> None:
+def test_bad_numbers_of_a_cut_are_rejected(
+    shop: Shop, check: Check, options: tuple[str, ...], message: tuple[str, ...]
+) -> None:
     shop.tap_both()
     said = check(*options)
     assert (said.code, said.out) == (2, "")
-    assert message in re.sub(r"[\s│]+", " ", said.err)
+    error = re.sub(r"[\s│]+", " ", said.err)
+    assert all(fact in error for fact in message)
 
 
 def test_a_machine_without_programs_evaluates_a_cut_that_is_specified_in_full(
@@ -87,7 +89,7 @@ def test_a_machine_without_programs_evaluates_a_cut_that_is_specified_in_full(
     shop.put("")
     shop.tap_both()
     said = check("--speed", "8700")
-    assert "--depth, --material, --teeth, --diameter, --radial, --direction: missing" in said.err
+    assert "--depth, --material, --teeth, --diameter, --radial, --direction" in said.err
     cut = ("--tool", "reference", "--material", "aisi 4140", "--teeth", "4", "--diameter", "20", "--radial", "20")
     said = check("--speed", "8700", "--depth", "0.05", *cut, "--direction", "up", "--json")
     assert (said.code, [one["verdict"] for one in said.json["programs"]]) == (0, ["stable"])

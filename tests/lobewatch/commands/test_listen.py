@@ -201,30 +201,30 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "neither of --program and --cut"),
-        (("--program", "A", "--cut", "B"), "both of --program and --cut"),
-        (("--cut", "A", "--depth", 2), "--speed is missing"),
-        (("--program", "A", "--depth", 0), "--depth 0: is not above 0"),
-        (("--program", "A", "--speed", -1), "--speed -1: is not above 0"),
-        (("--program", "Q"), "program 'Q' is not in machine.toml"),
-        (("--program", "A"), "no port: give --port, --file"),
-        (("--program", "A", "--port", "file:x.h5"), "with --file"),
-        (("--program", "A", "--file", "none.csv"), "no such file"),
+        ((), ["--program", "--cut"]),
+        (("--program", "A", "--cut", "B"), ["--program", "--cut"]),
+        (("--cut", "A", "--depth", 2), ["--speed"]),
+        (("--program", "A", "--depth", 0), ["--depth 0", "above 0"]),
+        (("--program", "A", "--speed", -1), ["--speed -1", "above 0"]),
+        (("--program", "Q"), ["'Q'", "machine.toml"]),
+        (("--program", "A"), ["--port", "--file"]),
+        (("--program", "A", "--port", "file:x.h5"), ["--file"]),
+        (("--program", "A", "--file", "none.csv"), ["none.csv"]),
         (
             ("--program", "A", "--file", "none.csv", "--sensor", "ear"),
-            "--sensor ear: none of accelerometer, microphone",
+            ["--sensor ear", "accelerometer, microphone"],
         ),
-        (("--program", "A", "--port", "x", "--sensor", "microphone"), "--sensor microphone is for a --file"),
-        (("--program", "A", "--port", "x", "--pulses", "2"), "--pulses 2 is for a --file; of a device only"),
-        (("--program", "A", "--file", "none.csv", "--screen"), "--screen follows a device"),
+        (("--program", "A", "--port", "x", "--sensor", "microphone"), ["--sensor microphone", "--file"]),
+        (("--program", "A", "--port", "x", "--pulses", "2"), ["--pulses 2", "--file"]),
+        (("--program", "A", "--file", "none.csv", "--screen"), ["--screen", "--file"]),
     ],
 )
 def test_what_cannot_be_listened_to_is_rejected_in_a_sentence(
-    shop: Shop, arguments: tuple[object, ...], said: str
+    shop: Shop, arguments: tuple[object, ...], said: list[str]
 ) -> None:
     result = run(shop, *arguments)
     assert result.exit_code != 0
-    assert said in str(result.exception)
+    assert [fact for fact in said if fact not in str(result.exception)] == []
 
 
 def test_what_the_tap_tests_predict_at_this_depth_stands_next_to_it(shop: Shop, tmp_path: Path) -> None:

@@ -36,8 +36,8 @@ def test_a_material_is_shown_with_range_other_names_and_sources(materials: Mater
     assert table[2].split()[:7] == ["C45", "P", "2237", "1667..2904", "0.27", "0.13..0.54", "56"]
     assert max(map(len, table)) <= 80
     assert "AISI" in out
-    assert "kc1.1 2220, mc 0.14: Kienzle & Victor 1957" in out
-    assert "h = 0.1 mm" in out
+    assert re.search("2220.*0.14.*Kienzle & Victor 1957", out)
+    assert "0.1 mm" in out
 
 
 def test_all_are_listed_without_their_sources(materials: Materials) -> None:
@@ -46,7 +46,8 @@ def test_all_are_listed_without_their_sources(materials: Materials) -> None:
     assert re.search(r"^Al 7075 \(HSS; dry\) +N +951 +600..1319 +0.28$", out, re.MULTILINE)
     assert max(len(line) for line in out.splitlines() if "  " in line) <= 80
     assert "Kienzle" not in out
-    assert "sources: lobewatch materials NAME, or --json" in out
+    assert "lobewatch materials NAME" in out
+    assert "--json" in out
 
 
 @pytest.mark.quick
@@ -71,4 +72,4 @@ def test_rows_of_json_carry_units_ranges_and_a_source(materials: Materials) -> N
 def test_a_name_that_nothing_has_is_reported_with_the_nearest(materials: Materials) -> None:
     code, out, err = materials("42CrMo5", "--json")
     assert (code, out) == (2, "")
-    assert "no material has '42CrMo5' in a name; is '42CrMo4' meant?" in err
+    assert re.search("'42CrMo5'.*'42CrMo4'", err)

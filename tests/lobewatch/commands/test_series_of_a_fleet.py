@@ -84,9 +84,9 @@ def test_hours_that_go_back_are_reported_and_do_not_count(new_shop: type[Shop], 
     by_wrong, by_days = shop_with_hours(back, wrong), shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
     assert by_wrong.forecast_level(-3.0) == by_days.forecast_level(-3.0)
     remarks = [remark for row in back.logbook.history.rows for remark in row.remarks]
-    assert [str(remark.text)[:32] for remark in remarks if remark.code == "hours-went-back"] == [
-        "running hours 200 h, 4000 h befo"
-    ]
+    (text,) = [remark.text for remark in remarks if remark.code == "hours-went-back"]
+    assert "200 h" in text
+    assert "4000 h" in text
 
 
 def test_a_spindle_that_stood_still_has_decayed_in_no_time(new_shop: type[Shop], tmp_path: Path) -> None:
@@ -107,7 +107,8 @@ def test_hours_are_taken_at_the_command_and_listed(run: Run, shop: Shop, tmp_pat
     assert "1234.5 h" in run("history", shop.path).out
     wrong = run("replay", shop.path, beam, "--hours", "-1")
     assert wrong.code == 2
-    assert "hours=-1 is outside 0 to 1e+06" in wrong.err
+    assert "-1" in wrong.err
+    assert "1e+06" in wrong.err
 
 
 def test_a_young_machine_learns_the_scatter_of_the_others(new_shop: type[Shop], tmp_path: Path) -> None:
@@ -166,5 +167,5 @@ def test_a_fall_that_has_slowed_down_is_reported_to_settle(new_shop: type[Shop],
         shop.put("")
         tap_series(shop, fall + 0.05 * random.normal(size=24))
     said = [next(r for r in shop.logbook.status().reasons if r.code == "decay").text for shop in (run_in, worn)]
-    assert "settling" in said[0]
-    assert "settling" not in said[1]
+    assert "run-in" in said[0]
+    assert "run-in" not in said[1]

@@ -105,9 +105,9 @@ def test_nothing_is_called_safe_with_one_direction(run: Run, folder: MachineFold
     said = json.loads(run("lobes", "m", "--json").out)
     (why,) = (remark for remark in said["remarks"] if remark["code"] == "no-safe-pocket")
     assert said["pockets"] == []
-    assert why["cure"] == "tap direction y of tool 'reference' too"
+    assert all(fact in why["cure"] for fact in ("direction y", "'reference'"))
     assert "one-direction" in [remark["code"] for remark in said["remarks"]]
-    assert "no speed and depth can be called safe: direction y was not tapped" in run("lobes", "m").out
+    assert "direction y" in run("lobes", "m").out
 
 
 def test_a_direction_that_was_not_tapped_is_not_rigid(run: Run, folder: MachineFolder) -> None:

@@ -1,0 +1,5 @@
+"""Run the command line with `python -m lobewatch`."""
+
+from lobewatch.cli import main
+
+main()

@@ -1,0 +1,104 @@
+"""python -m lobewatch, help COMMAND, --quiet, --verbose and progress."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lobewatch.step_times import STEP_TIMES, time_step
+from tests.lobewatch.commands.conftest import Run
+from tests.lobewatch.commands.pty_talk import Terminal
+
+Shop = Any
+"""Machine fixture of tests/lobewatch/conftest.py."""
+QUIET = ("-q", "--quiet")
+VERBOSE = ("-v", "--verbose")
+
+
+def test_python_m_lobewatch_is_the_command_line(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "lobewatch"]
+    done = subprocess.run([*command, "--version"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"lobewatch \d+\.\d+\.\d+\n", done.stdout)
+    assert subprocess.run([*command, "chek"], cwd=tmp_path, capture_output=True, check=False).returncode == 2
+
+
+@pytest.mark.parametrize("words", [(), ("check",), ("emulate",), ("emulate", "taps")])
+def test_help_of_a_command_is_its_help_page(run: Run, words: tuple[str, ...]) -> None:
+    page = run(*words, "--help")
+    assert (page.code, page.err) == (0, "")
+    assert run("help", *words) == page
+    assert run("-q", "help", *words) == page
+
+
+@pytest.mark.parametrize("words", [("chek",), ("emulate", "nothing")])
+def test_help_of_an_unknown_command_is_an_error(run: Run, words: tuple[str, ...]) -> None:
+    said = run("help", *words)
+    assert (said.code, said.out) == (2, "")
+    assert f"'{words[-1]}'" in said.err
+
+
+@pytest.mark.parametrize("option", QUIET)
+def test_quiet_leaves_result_and_errors(run: Run, shop: Shop, option: str) -> None:
+    place = (shop.path, "--program", "A", "--speed", "12900", "--depth", "1")
+    loud = run("observe", *place, "--stable")
+    assert loud.err.startswith("note: ")
+    for words in ((option, "observe", *place, "--stable"), ("observe", *place, "--stable", option)):
+        said = run(*words)
+        assert (said.code, said.err) == (0, "")
+        assert said.out.startswith("saved ")
+    assert run("observe", *place, "--stable").err == loud.err
+    failed = run("check", "nowhere", option)
+    assert (failed.code, failed.out) == (2, "")
+    assert failed.err.startswith("error: nowhere: ")
+
+
+@pytest.mark.parametrize("option", VERBOSE)
+def test_verbose_times_the_steps(run: Run, shop: Shop, no_search: None, option: str) -> None:
+    shop.tap_both()
+    (shop.path / "history.rows").unlink(missing_ok=True)
+    said = run("check", shop.path, "--json", option)
+    steps = dict(re.findall(r"(\w+) (\d+\.\d\d) s", said.err))
+    assert said.err.count("\n") == 1
+    assert steps.keys() == {"reading", "fitting", "verdicts", "other", "total"}
+    parts = [float(value) for step, value in steps.items() if step != "total"]
+    assert float(steps["total"]) == pytest.approx(sum(parts), abs=0.03)
+    plain = run("check", shop.path, "--json")
+    assert plain == said._replace(err="")
+    before = run(option, "check", shop.path, "--json")
+    assert (before.out, before.err.count("time: ")) == (plain.out, 1)
+    assert run("-q", "check", shop.path, "--json", option) == plain
+
+
+def test_a_step_does_not_count_the_steps_inside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 1.0, 3.0, 4.0, 10.0, 17.0])
+    monkeypatch.setattr("lobewatch.step_times.time.perf_counter", lambda: next(clock))
+    monkeypatch.setattr(STEP_TIMES, "seconds", {})
+    with time_step("outer"), time_step("inner"):
+        pass
+    with time_step("inner"):
+        pass
+    assert STEP_TIMES.seconds == {"outer": 2.0, "inner": 9.0}
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        (("check", "m"), "checking programs"),
+        (("recommend", "m"), "searching stable speeds"),
+        (("demo", "--taps", "2", "--out", "{}"), "tap tests"),
+    ],
+)
+def test_progress_is_shown_on_a_terminal_only(
+    run: Run, shop: Shop, tmp_path: Path, words: tuple[str, ...], shown: str
+) -> None:
+    shop.tap_both()
+    assert run(*(word.format("piped") for word in words)).err == ""
+    for name, quiet in (("loud", ()), ("quiet", ("-q",))):
+        with Terminal(tmp_path, *quiet, *(word.format(name) for word in words)) as person:
+            person.end()
+        assert (shown in person.text) is not bool(quiet)

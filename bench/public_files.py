@@ -3,7 +3,8 @@
     python bench/public_files.py FOLDER
 
 Nothing is fetched: FOLDER holds copies of the public repositories, each as FOLDER/OWNER/NAME; what is not there is
-skipped. Prints the table of docs/studies/public-files.md. The first command names the file alone, the second has the answers.
+skipped. Prints the table of docs/studies/public-files.md. The first command has
+the name of the file only, the second has the answers.
 """
 
 from __future__ import annotations

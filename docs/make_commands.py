@@ -10,8 +10,8 @@ from pathlib import Path
 
 from lobewatch.commands import GROUPS
 
-INTRODUCTION = """Every command with its options, made from `--help` by `docs/make_commands.py`. The ten commands that a shop needs
-are in the [README](../README.md#ten-commands)."""
+INTRODUCTION = """Every command with its options, made from `--help` by `docs/make_commands.py`.
+The ten commands that a shop needs are in the [README](../README.md#ten-commands)."""
 
 
 def page() -> str:

@@ -19,7 +19,7 @@ from lobewatch.show.programs.advice import (
     window_text,
     worst_feed_text,
 )
-from lobewatch.show.sentences import capitalize, wrap_lines
+from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import (
     MIN_COLUMN_WIDTH,
     JsonObject,

@@ -354,7 +354,6 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
         start = np.exp(np.polyval(np.polyfit(np.arange(12), truths, 1), 0))
         fell = 100 * (1 - newest["truth"]["frequency_hz"] / start)
         assert float(fallen[direction]) == pytest.approx(fell, abs=0.06)
-    first_row = html.index("<tr><td>A:")
     words = {
         row[1]: re.findall(r"(not stable|stable|doubtful|unknown|not checked)</td>", row[0])
         for row in re.finditer(r'<tr><th scope="row">([ABC]):.*?</tr>', html, re.DOTALL)

@@ -7,7 +7,7 @@ import json
 import math
 import re
 import urllib.request
-from collections.abc import Iterator, Set
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lobewatch.show.sentences import MAX_LINE_LENGTH, wrap_lines
+from lobewatch.show.terminal.sentences import MAX_LINE_LENGTH, wrap_lines
 
 pytestmark = pytest.mark.quick
 

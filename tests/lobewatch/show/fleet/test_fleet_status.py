@@ -10,7 +10,7 @@ import pytest
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.fleet.fleet_status import fleet_rows, fleet_text
 from lobewatch.show.report.report import render_fleet
-from lobewatch.show.sentences import MAX_LINE_LENGTH
+from lobewatch.show.terminal.sentences import MAX_LINE_LENGTH
 
 pytestmark = pytest.mark.quick
 

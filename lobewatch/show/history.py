@@ -16,8 +16,8 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.show.programs.materials import power_json, power_text
-from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
+from lobewatch.show.terminal.sentences import wrap_lines
 
 
 def cut_text(cut: CutEntry) -> str:

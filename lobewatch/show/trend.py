@@ -17,8 +17,8 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
+from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "

@@ -11,8 +11,8 @@ from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.monitoring import threshold_dates
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
-from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
+from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.status_labels import status_label
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")

@@ -17,8 +17,8 @@ from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
-from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
+from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known

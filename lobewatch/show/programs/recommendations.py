@@ -19,7 +19,6 @@ from lobewatch.show.programs.advice import (
     window_text,
     worst_feed_text,
 )
-from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.output import (
     MIN_COLUMN_WIDTH,
     JsonObject,
@@ -29,6 +28,7 @@ from lobewatch.show.terminal.output import (
     pick,
     remark_lines,
 )
+from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.verdicts import Setting, Verdict
 from lobewatch.verdicts.pitch_proposal import MIN_PITCH_GAIN, PitchEvaluation, PitchProposal
 from lobewatch.verdicts.recommendation import Recommendation

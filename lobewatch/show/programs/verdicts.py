@@ -12,8 +12,8 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
-from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
+from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.tool import Assembly
 from lobewatch.tool.tap_series import MIN_TAPS_FOR_SCATTER
 from lobewatch.verdicts import SpindleAtSpeed, Stability, Verdict

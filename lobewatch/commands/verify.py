@@ -3,7 +3,7 @@
 import typer
 
 from lobewatch.commands.shared_options import Machine
-from lobewatch.show.terminal.output import Json, emit
+from lobewatch.show.terminal.output import Json, count_noun, emit
 
 
 def verify(machine: Machine, as_json: Json = False) -> None:
@@ -28,5 +28,5 @@ def verify(machine: Machine, as_json: Json = False) -> None:
     texts = [*(f"damaged: {remark}" for remark in damage), *(f"note: {remark}" for remark in notes)]
     texts += [f"added to the journal: {name}" for name in verification.entered]
     last = f"{len(damage)} damaged" if damage else "no damage"
-    emit(payload, as_json, *texts, f"{n_taps} intact tap test(s), {last}")
+    emit(payload, as_json, *texts, f"{count_noun(n_taps, 'intact tap test')}, {last}")
     raise typer.Exit(int(bool(damage)))

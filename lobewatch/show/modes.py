@@ -9,7 +9,7 @@ from rich.table import Table
 from acquisition import Fact, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
 TRUST_SYMBOLS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
@@ -190,7 +190,8 @@ def _frf_text(file_modes: FileModes) -> str:
     frf = file_modes.frf or state.frf
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
-    what = f"{frf.n_averages} hit(s) averaged" if file_modes.frf else f"{len(state.frfs)} free decay(s) fitted together"
+    averaged = f"{count_noun(frf.n_averages, 'hit')} averaged"
+    what = averaged if file_modes.frf else f"{count_noun(len(state.frfs), 'free decay')} fitted together"
     return f"{what}, {lines}{usable}"
 
 

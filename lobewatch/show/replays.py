@@ -20,7 +20,7 @@ from lobewatch.measurement.recording_questions import find_open_questions, quest
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
-from lobewatch.show.terminal.output import JsonObject, Texts, emit, new_table, notes, remark_lines
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, emit, new_table, notes, remark_lines
 from modal import Mode
 
 REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "evaluating"}
@@ -61,7 +61,7 @@ def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, a
     payload = {"dry_run": True, "files": [*map(preview_json, previews)], "passed_over": [*map(str, passed)]}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     if refused := sum(bool(preview.rejection) for preview in previews):
-        raise DataError(f"{refused} of {len(previews)} file(s) cannot be used. See the reasons above.")
+        raise DataError(f"{refused} of {count_noun(len(previews), 'file')} cannot be used. See the reasons above.")
 
 
 def preview_json(preview: ReplayPreview) -> JsonObject:
@@ -104,7 +104,8 @@ def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
     n_known = sum(bool(preview.stored_tap_id) for preview in previews)
     refused = sum(bool(preview.rejection) for preview in previews)
     passed = f", {n_passed} other files ignored" if n_passed else ""
-    count = f"{fresh} of {len(previews)} file(s) would be stored, {n_known} stored already, {refused} cannot be used"
+    files = count_noun(len(previews), "file")
+    count = f"{fresh} of {files} would be stored, {n_known} stored already, {refused} cannot be used"
     return f"{count}{passed}. Nothing was stored (--dry-run)."
 
 
@@ -120,7 +121,9 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
     details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
     details += [f"followed: {followed}", *(questions or ["plausible for this machine, no questions"])]
     words = Counter(flags.words for flags in preview.tap.flags)
-    hits = f"{len(preview.tap.hits)} hit(s): " + ", ".join(f"{count} {word}" for word, count in words.items())
+    hits = f"{count_noun(len(preview.tap.hits), 'hit')}: " + ", ".join(
+        f"{count} {word}" for word, count in words.items()
+    )
     kind = hits if preview.tap.hits else "an FRF"
     return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
@@ -187,7 +190,12 @@ def emit_replay(
         emit(replay_json(outcome, logbook) | {"accepted": codes, "questions": logbook.questions}, as_json)
         return
     texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in codes)]
-    emit({}, as_json, *texts, f"{len(outcome.new_tap_ids)} of {n_files} file(s) stored in {logbook.folder.path}")
+    emit(
+        {},
+        as_json,
+        *texts,
+        f"{len(outcome.new_tap_ids)} of {count_noun(n_files, 'file')} stored in {logbook.folder.path}",
+    )
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
@@ -257,7 +265,7 @@ def rebuild_json(rebuild: MachineRebuild) -> JsonObject:
 
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
-    made = f"rebuilt from {rebuild.n_taps} tap test(s)"
+    made = f"rebuilt from {count_noun(rebuild.n_taps, 'tap test')}"
     missing = "not rebuilt, see above. The next command with write access rebuilds it."
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), f"history.rows: {made if rebuild.is_saved else missing}"]
 

@@ -139,12 +139,12 @@ def align_columns(rows: Sequence[Sequence[str]], numbers: Container[int] = ()) -
 
 
 def count_noun(count: int, noun: str) -> str:
-    """Return a number and its noun, in the plural above one.
+    """Return a number and its noun, in the plural except for one.
 
     >>> count_noun(1, "cut"), count_noun(3, "cut")
     ('1 cut', '3 cuts')
     """
-    return f"{count} {noun}{'s' if count > 1 else ''}"
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def make_printable(text: str, kept: str = "\n\t") -> str:

@@ -89,7 +89,7 @@ class AcmeEmulator(EmulatorThread):
     def serve_once(self):
         for line in self.wire.exchange(0.002).split(b"\n"):
             if line == b"?":
-                self.wire.pending += b"ACME-1 0042\n"
+                self.wire.pending += b"ACME-1 EMULATED\n"
             elif line == b"go":
                 self._begun, self._scan = time.monotonic(), 0
             elif line == b"halt":

@@ -68,7 +68,7 @@ def test_the_driver_taps(environment: dict[str, str], tmp_path: Path) -> None:
         assert process.stdout is not None
         port = json.loads(process.stdout.readline())["port"]
         try:
-            assert "acme: ACME-1, serial number 0042" in run(environment, "ports", "--port", port).stdout
+            assert "acme: ACME-1, serial number EMULATED" in run(environment, "ports", "--port", port).stdout
             said = run(environment, "tap", trial, "--port", port, "--json")
         finally:
             process.terminate()

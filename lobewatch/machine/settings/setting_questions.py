@@ -87,6 +87,10 @@ class ImplausibleSetting(NamedTuple):
         return Remark(self.fault.value, self.location, f"{self.key} = {self.value} {self.reason}", cure)
 
 
+HASH_SALT = b"four words over the doubt, plausible or asked".decode()
+"""First part of every hash. It never changes: stored verdicts are found by it."""
+
+
 def find_program_questions(machine: Machine, program: ProgramTable, on_model: bool) -> list[ImplausibleSetting]:
     """Return the open questions for the verdict on a program; on_model: whether the verdict uses [spindle]."""
     questions = [*_check_program(machine, program), *(_check_model(machine, program) if on_model else ())]
@@ -122,7 +126,7 @@ def hash_programs(machine: Machine) -> dict[str, str]:
         questions = [question.statement for question in find_program_questions(machine, program, on_model=True)]
         tool = machine.pitch_deg(program), machine.helix_deg(program)
         decisive = program, tool, machine.coefficients(program), machine.doubt, questions
-        content = msgspec.json.encode(("four words over the doubt, plausible or asked", *decisive))
+        content = msgspec.json.encode((HASH_SALT, *decisive))
         hashes[program.name] = hashlib.sha256(content).hexdigest()
     return hashes
 

@@ -23,7 +23,8 @@ def page() -> str:
     head = head.replace("# All commands\n", f"# All commands\n\n{INTRODUCTION}\n", 1)
     listed = "\n\n".join(f"**{group}**:\n\n{_links(commands)}" for group, commands in GROUPS.items())
     examples = re.sub(r"^  (?=lobewatch )", "    ", f"{head}{listed}\n\n{rest}", flags=re.MULTILINE)
-    return re.sub(r"^\* `(?:-h, )?--help`.*\n", "", examples, flags=re.MULTILINE).rstrip() + "\n"
+    repeated = r"^\* `(?:-h, )?--help`.*\n|^\*\*Usage\*\*:\n\n```console\n.*\n```\n\n|  \[required\]$"
+    return re.sub(repeated, "", examples, flags=re.MULTILINE).rstrip() + "\n"
 
 
 def _links(commands: Mapping[str, str]) -> str:

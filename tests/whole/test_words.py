@@ -19,7 +19,7 @@ MIN_WORDS = 3
 """Fewest words of a string that is read as a text; shorter ones are keys, units and labels."""
 WORD = re.compile(r"[A-Za-z0-9][\w'.,%/+-]*")
 CODE = re.compile(
-    r"`[^`]*`|https?://\S+|(?<![\w`])--?[a-z][\w-]*|\b\w+(?:[._/]\w+)*_\w+\b|\b[\w/]+\.(?:toml|csv|h5|md|py|html|jsonl?|rows)\b"
+    r"`[^`]*`|https?://\S+|(?<![\w`])--?[a-z][\w-]*|\b\w+(?:[._/]\w+)*_\w+(?:\.\w+)*\b|\b[\w/]+\.(?:toml|csv|h5|md|py|html|jsonl?|rows)\b"
 )
 """Code, addresses, options, keys with an underscore and names of files."""
 PHRASES = [
@@ -80,7 +80,7 @@ def string_sentences(file: Path) -> Iterator[Sentence]:
     silent = find_silent(tree, file.stem if file.parent.name == "commands" else "-")
     for node in ast.walk(tree):
         values = node.values if isinstance(node, ast.JoinedStr) else [node]
-        if id(node) in silent or not isinstance(node, (ast.JoinedStr, ast.Constant)):
+        if id(node) in silent or not (isinstance(node, ast.JoinedStr) or isinstance(getattr(node, "value", 0), str)):
             continue
         text = "".join(str(value.value) if isinstance(value, ast.Constant) else "CODE" for value in values)
         text = text.partition("\nExamples\n---")[0]

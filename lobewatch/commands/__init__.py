@@ -26,14 +26,14 @@ GROUPS = {
     },
     "Test cuts": {
         "listen": "Record a cut with the accelerometer on the housing and detect chatter.",
-        "observe": "Record whether a test cut was stable by ear.",
+        "observe": "Record whether a test cut sounded stable.",
         "suggest": "Suggest the next test cut of a program.",
     },
     "Archive": {
-        "replay": "Store recorded files as tap tests, each once.",
+        "replay": "Store recorded files as tap tests, each file once.",
         "history": "List tap tests, test cuts and events of a machine, oldest first.",
         "verify": "Verify all files of a machine folder.",
-        "rebuild": "Rebuild the history and a damaged journal. Nothing is deleted.",
+        "rebuild": "Rebuild the history and a damaged journal. No file is deleted.",
     },
     "Fleet": {
         "status": "Show the status of all machines, worst first.",
@@ -47,7 +47,7 @@ GROUPS = {
         "calibrate": "Fit bearing and joint stiffness to measured natural frequencies.",
         "paper": "Compare lobewatch with the paper of Gaber & Hashemi (2015).",
         "emulate": "Emulate a DAQ on a pseudo-terminal or a TCP port.",
-        "bridge": "Serve a device as a TAPS/1 device on TCP.",
+        "bridge": "Serve a DAQ as a TAPS/1 device on TCP.",
     },
 }
 """Commands by topic, each with the first line of its help. Listing them imports none."""

@@ -12,15 +12,15 @@ from lobewatch.show.terminal.output import Json, emit
 def ack(
     machine: Machine,
     alarm: Annotated[str, Argument(help="Alarm ID, or a unique part of it. Default: all open alarms.")] = "",
-    until: Annotated[datetime | None, Option(help="Snooze until (local time). Default: no reminder.")] = None,
+    until: Annotated[datetime | None, Option(help="Time to repeat the alarm (local time). Default: never.")] = None,
     note: Annotated[str, Option(help="Note for your colleagues.")] = "",
     operator: Annotated[str, Option(help="Name of the operator. Default: login name.")] = "",
     as_json: Json = False,
 ) -> None:
     """Acknowledge alarms.
 
-    Acknowledged alarms are not repeated, but the status stays. Only tap tests, or a new baseline after a repair, close
-    an alarm. A new alarm notifies again.
+    An acknowledged alarm is not repeated, but the status of the machine stays. Only tap tests, or a new baseline after
+    a repair, close an alarm. You are notified of each new alarm.
 
     Examples
     --------
@@ -34,5 +34,7 @@ def ack(
     with publish_on_change(Logbook.open(machine)) as logbook:
         alarms, now = acknowledge_alarms(logbook, alarm, until, note, operator), datetime.now(UTC)
         texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
-        closing = "The status does not change. Tap tests, or a new baseline after a repair, close an alarm."
+        closing = (
+            "The status of the machine does not change. Tap tests, or a new baseline after a repair, close an alarm."
+        )
         emit({"acknowledged": [known.to_row(now) for known in alarms]}, as_json, *texts, closing)

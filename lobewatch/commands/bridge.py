@@ -21,10 +21,10 @@ def bridge(
     tcp_port: Annotated[int, Option(min=0, max=65535, help="TCP port. 0: any free port.")] = 0,
     as_json: Json = False,
 ) -> None:
-    """Serve a device as a TAPS/1 device on TCP.
+    """Serve a DAQ as a TAPS/1 device on TCP.
 
-    Lost scans, overloads and button events are passed on. While the device is unplugged, the host waits. There is no
-    password: anyone who reaches the address can start and stop the device.
+    Lost samples, overloads and button events are passed on to the other computer. While the device is unplugged, the
+    other computer waits. There is no password: anyone who reaches the address can start and stop the device.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def bridge(
         raise DataError(f"{kind.title} does not describe its sensors. {cure}")
     daq = DaqTable(driver=driver) if folder is None else folder.machine.daq
     if folder is not None and daq.driver != driver:
-        raise DataError(f'{folder.toml}: driver is "{daq.driver}", not "{driver}". Give the same driver.')
+        raise DataError(f'{folder.toml}: driver is "{daq.driver}", not "{driver}". Name the driver of this file.')
     port = port or daq.port
     if not port:
         raise ValueError("no port. Give --port, or a machine folder with port in [daq].")

@@ -13,27 +13,36 @@ from lobewatch.show.terminal.output import Json, emit
 def calibrate(
     machine: SpindleMachine,
     frequency: Annotated[list[float] | None, Option(help="Measured natural frequency (Hz), repeatable.")] = None,
-    frequency_std: Annotated[list[float] | None, Option(help="Standard error of each (Hz), repeatable.")] = None,
+    frequency_std: Annotated[
+        list[float] | None, Option(help="Standard error of each --frequency (Hz), repeatable.")
+    ] = None,
     mode: Annotated[
         list[int] | None,
-        Option(min=1, max=50, help="Mode number of each, repeatable. Default: [mode] model_mode, or 1, 2, ..."),
+        Option(
+            min=1,
+            max=50,
+            help="Mode number of each --frequency or --tool, repeatable. Default: [mode] model_mode, or 1, 2, ...",
+        ),
     ] = None,
     group: Annotated[
         list[str] | None, Option(help="Group of bearings or joints to fit, repeatable. Default: all.")
     ] = None,
     damping_ratio: Annotated[
-        float | None, Option(help="Measured damping ratio (-) of the first mode. Fits dampers too.")
+        float | None, Option(help="Measured damping ratio (-) of the first mode, to fit bearing dampers too.")
     ] = None,
     tool: Annotated[
-        list[str] | None, Option(help="Tool whose newest tap tests are used instead of --frequency. Give at least two.")
+        list[str] | None,
+        Option(help="Tool whose newest tap tests are used instead of --frequency. Give --tool at least twice."),
     ] = None,
-    direction: Annotated[str | None, Option(help="Direction of the tap tests: x or y. Default: newest.")] = None,
+    direction: Annotated[
+        str | None, Option(help="Direction of the tap tests: x or y. Default: from the newest test.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Calibrate bearings and joints to measured natural frequencies.
 
-    One frequency gives one factor for all bearings, several give one for each group. Two or more tools also give the
-    joint between tool and spindle, with the lines for machine.toml. Nothing is stored.
+    One frequency gives one stiffness factor for all bearings. Several frequencies give one factor for each group. Two
+    or more tools also give the joint between tool and spindle, as lines for machine.toml. No file is changed.
 
     Exit code 1: the tools do not fit one spindle.
 
@@ -50,7 +59,7 @@ def calibrate(
         _calibrate_from_tools(machine, tool, direction, mode or [], as_json=as_json)
         return
     if not frequency or direction is not None:
-        raise ValueError("Give --frequency without --direction, or at least two --tool.")
+        raise ValueError("Give --frequency without --direction, or --tool at least twice.")
     from lobewatch.machine import MachineFolder
     from lobewatch.measurement import calibrate_model
     from lobewatch.show.models import model_calibration_json, model_calibration_texts
@@ -65,7 +74,7 @@ def calibrate(
 def _reject_with_tools(given: Mapping[str, object]) -> None:
     named = [option for option, value in given.items() if value is not None and value != []]
     if named:
-        raise ValueError(f"--tool excludes {', '.join(named)}. Give one or the other.")
+        raise ValueError(f"--tool excludes {', '.join(named)}. Leave out --tool or {' and '.join(named)}.")
 
 
 def _calibrate_from_tools(
@@ -83,4 +92,6 @@ def _calibrate_from_tools(
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:
     for option, values in (("--frequency-std", stds), ("--mode", modes)):
         if values and len(values) != frequencies:
-            raise ValueError(f"{len(values)} {option} for {frequencies} --frequency. Give one for each, or none.")
+            raise ValueError(
+                f"{len(values)} {option} for {frequencies} --frequency. Give {option} for all, or leave out {option}."
+            )

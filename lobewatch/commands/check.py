@@ -24,16 +24,17 @@ def check(
     direction: shared.MillingDirection = None,
     accept: Annotated[
         list[str] | None,
-        Option(help="Key of an implausible number in machine.toml that is correct, repeatable."),
+        Option(help="Key of a number in machine.toml that is correct although implausible, repeatable."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Evaluate cutting programs on the newest tap tests.
 
     Verdicts (stable, doubtful, not stable, unknown) include all uncertainties. A program without speed or depth gets a
-    recommendation. Missing values of any other cut come from the programs of its tool if they all agree.
+    recommendation. Missing values of a cut that is not in machine.toml come from the programs of its tool if all these
+    programs agree.
 
-    Exit code 1: not everything is stable.
+    Exit code 1: not all cuts are stable.
 
     Examples
     --------

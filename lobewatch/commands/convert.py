@@ -12,7 +12,7 @@ from lobewatch.show.terminal.output import Json, emit
 
 @add_file_options()
 def convert(
-    file: Annotated[Path, Argument(help="Recorded hits or FRF, as for lobewatch modes.")],
+    file: Annotated[Path, Argument(help="Recorded hits or FRF, in a format that lobewatch modes reads.")],
     out: Annotated[Path, Argument(help="Output file: .uff, .unv, .csv, .mat, or .json (SEP005, hits only).")],
     hits: Annotated[bool, Option("--hits", help="Write time signals instead of the FRF.")] = False,
     *,
@@ -23,8 +23,8 @@ def convert(
 ) -> None:
     """Convert a recorded file to another format.
 
-    The output has frequency lines, FRF, coherence, averages, units, direction and date, in SI units. lobewatch reads it
-    back unchanged.
+    The output contains frequency lines, FRF, coherence, number of averages, direction and date, in SI units. lobewatch
+    reads the output back unchanged.
 
     Examples
     --------

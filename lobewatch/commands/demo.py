@@ -17,9 +17,9 @@ def demo(
     seed: Seed = 1,
     scatter: ReclampingScatter = 0.1,
     story: Annotated[WearScenarioName, Option(help="Bearing wear scenario.")] = "steady",
-    bad_clampings: Annotated[float, Option(help="Share of bad clampings (%), f1 2 % low: 0 to 50.")] = 0.0,
+    bad_clampings: Annotated[float, Option(help="Share of bad clampings (%), which lower f1 by 2 %: 0 to 50.")] = 0.0,
     temperature: Annotated[
-        float | None, Option(help="Yearly temperature swing (K), 0 to 30, which moves f1. Default: not recorded.")
+        float | None, Option(help="Yearly temperature swing (K), 0 to 30, which moves f1. Default: no temperature.")
     ] = None,
     tcp: Annotated[bool, Option("--tcp", help="Use a TCP port instead of a pseudo-terminal.")] = False,
     as_json: Json = False,
@@ -27,7 +27,7 @@ def demo(
     """Tap a simulated ageing spindle, and write a report.
 
     Each test runs byte by byte through a serial port: ten good hits, FRF, modes, bearing stiffness, stability lobes.
-    The tool is reclamped before each test. Results are shown next to the true values.
+    The tool is reclamped before each test. Results are shown next to the true values of the simulated spindle.
 
     Examples
     --------

@@ -10,7 +10,7 @@ from lobewatch.show.terminal.output import Json, emit
 
 
 def doctor(
-    machine: Annotated[Path | None, FolderArgument(help="Machine folder to check too.")] = None,
+    machine: Annotated[Path | None, FolderArgument(help="Machine folder to check with the computer.")] = None,
     as_json: Json = False,
 ) -> None:
     """Examine this computer for tap tests.

@@ -29,9 +29,9 @@ class EmulateOptions:
 
     machine: Annotated[Path, FolderArgument(help="Machine folder. Without [spindle], the example spindle is emulated.")]
     """Machine folder."""
-    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port.")] = False
+    tcp: Annotated[bool, Option("--tcp", help="Use a TCP port instead of a pseudo-terminal.")] = False
     """True to use a TCP port instead of a pseudo-terminal."""
-    fast: Annotated[bool, Option("--fast", help="Send as fast as the host reads.")] = False
+    fast: Annotated[bool, Option("--fast", help="Send samples as fast as the host reads them.")] = False
     """True to run faster than real time; not every driver can."""
     seed: Seed = 1
     """Seed of the random numbers."""
@@ -56,7 +56,7 @@ class EmulateOptions:
     """Angle of the principal directions from x (deg). None for a round spindle."""
     cut: Annotated[
         str | None,
-        Option(metavar="PROGRAM", help="Program to cut. Default: tap tests."),
+        Option(metavar="PROGRAM", help="Program of an emulated cut. Default: tap tests, no cut."),
     ] = None
     """Name of the program to cut. None for tap tests."""
     speed: Annotated[float | None, Option(help="Spindle speed of the cut (rpm).")] = None
@@ -101,7 +101,7 @@ def _make_command(name: str, takes_fast: bool) -> Callable[..., None]:
 
 def _format_help(name: str, title: str) -> str:
     return (
-        f"Emulate {title} that is hit twice a second. Ctrl-C ends it.\n\nExamples:\n\n"
+        f"Emulate {title} on a spindle that is hit twice a second. Ctrl-C ends the emulator.\n\nExamples:\n\n"
         f"  lobewatch emulate {name} trial\n  lobewatch tap trial --port /dev/pts/3  # in another window\n"
         f"  lobewatch emulate {name} trial --cut 'A: slot at 12 600 rpm' --depth 2"
     )
@@ -135,7 +135,7 @@ def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulatio
 
     emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
-    text = f"f1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
+    text = f"f1 {emulated.frequency:.2f} Hz, stiffness K {emulated.stiffness / 1e6:.3f} N/um"
     words = f" --direction {options.direction}" * (options.direction != "x")
     return emulated.device, truth, text, "tap", words
 
@@ -143,7 +143,7 @@ def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulatio
 def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
-        raise ValueError("--cut excludes --direction and --askew. Leave them out.")
+        raise ValueError("--cut excludes --direction and --askew. Leave out --cut, or both others.")
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 
@@ -164,7 +164,7 @@ def _serve(emulation: Emulation, options: EmulateOptions) -> None:
         line = json.dumps({"port": device.port, **truth}) if options.as_json else f"port {device.port}"
         results.print(line, markup=False)
         results.file.flush()
-        notes.print(f"true values: {truth_text}", markup=False)
+        notes.print(f"true values of the emulated spindle: {truth_text}", markup=False)
         command = f"lobewatch {next_command} {shlex.quote(str(options.machine))} --port {device.port}"
         notes.print(f"Next: {command}{next_options}   (Ctrl-C ends the emulator)", markup=False)
         device.wait()

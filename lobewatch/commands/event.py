@@ -11,17 +11,17 @@ from lobewatch.show.terminal.output import Json, emit
 
 def event(
     machine: Machine,
-    text: Annotated[str, Argument(help="Description of the work. Not needed with --withdraw.")] = "",
+    text: Annotated[str, Argument(help="Description of the work, not needed with --withdraw.")] = "",
     date: Annotated[datetime | None, Option(help="Date of the work (local time). Default: now.")] = None,
     new_baseline: Annotated[
-        bool, Option("--new-baseline", help="Compare later tap tests with the first one after this date.")
+        bool, Option("--new-baseline", help="Compare later tap tests with the first tap test after --date.")
     ] = False,
     withdraw: Annotated[str, Option(help="ID of an event to withdraw, such as e2.")] = "",
     as_json: Json = False,
 ) -> None:
     """Store or withdraw a maintenance event.
 
-    The journal keeps every event, and a line for each withdrawal. lobewatch history lists them.
+    The journal keeps every event, and a line for each withdrawal. lobewatch history lists the events.
 
     Examples
     --------
@@ -37,12 +37,12 @@ def event(
 
     folder = MachineFolder(machine)
     if withdraw and (text or date or new_baseline):
-        raise ValueError(f"--withdraw {withdraw} excludes TEXT, --date and --new-baseline. Leave them out.")
+        raise ValueError(f"--withdraw {withdraw} excludes TEXT, --date and --new-baseline. Give only --withdraw.")
     with publish_on_change(Logbook(folder)):
         if withdraw:
             gone = withdraw_event(folder, withdraw)
             emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
             return
         done = add_event(folder, text, date, new_baseline)
-        next_step = ["Next: run a tap test. All later tests are compared with it."] if new_baseline else []
+        next_step = ["Next: run a tap test, the baseline for all later tests."] if new_baseline else []
         emit({"event": event_json(done)}, as_json, f"saved {event_text(done)}", *next_step)

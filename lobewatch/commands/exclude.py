@@ -16,7 +16,7 @@ def exclude(
 ) -> None:
     """Exclude a tap test or test cut from all results.
 
-    The file stays. Undo it with lobewatch include.
+    The file is kept. lobewatch include undoes the exclusion.
 
     Examples
     --------

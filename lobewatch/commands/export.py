@@ -15,11 +15,11 @@ def export(
     file: Annotated[Path | None, Argument(help="Output file: .sqlite, .csv, .csv.gz or .parquet.")] = None,
     append: Annotated[
         Path | None,
-        Option(help="Folder of monthly Parquet files, which gets new rows."),
+        Option(help="Folder of monthly Parquet files, to which new rows are added."),
     ] = None,
     to: Annotated[
         str | None,
-        Option(help="Database whose table is updated: postgresql://HOST/NAME."),
+        Option(help="Database to update: postgresql://HOST/NAME."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -52,7 +52,7 @@ def export(
     else:
         outcome = upsert_table(tables, str(to))
     for key, reason in damaged.items():
-        print_always(f"left out {key}: {reason}")
+        print_always(f"machine left out: {key}: {reason}")
     n_machines, (place, *_) = len(machines) - len(damaged), outcome.fields.values()
     payload = {"machines": n_machines, "tap_tests": outcome.tap_tests, "left_out": damaged}
     text = f"{outcome.tap_tests} tap tests of {n_machines} machines in {place}"

@@ -17,7 +17,7 @@ def history(
 ) -> None:
     """Show the history of a machine.
 
-    Verdicts are those stored after each test. Times are UTC in --csv and --json.
+    Each tap test is listed with its verdicts at that time. Times are UTC in --csv and --json.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def history(
     from lobewatch.show.history import history_csv, history_json, history_lines
 
     if as_csv and as_json:
-        raise ValueError("--csv excludes --json. Give one of them.")
+        raise ValueError("--csv excludes --json. Leave out one of the two options.")
     logbook = Logbook.open(machine)
     if hdf5 is not None:
         from lobes import write_history

@@ -21,15 +21,19 @@ def init(
     machine: Annotated[Path, FolderArgument(help="New machine folder.")],
     example: Annotated[bool, Option("--example", help="Start from the example spindle with three programs.")] = False,
     yes: Annotated[bool, Option("--yes", help="Ask nothing. Settings without an option stay unchanged.")] = False,
-    edit: Annotated[str, Option(help="Ask one question again, by option name: --edit drive.")] = "",
+    edit: Annotated[str, Option(help="Ask one question again, named by its option: --edit drive.")] = "",
     name: Annotated[Answer, Option(help="Machine name.")] = None,
     speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed (rpm): "1000 18000".')] = None,
     drive: Annotated[Answer, Option(help='Spindle power (kW) and torque (N m): "15 40".')] = None,
     daq: Annotated[
         Answer, Option(help='DAQ port, driver, sample rate (Hz): "COM3", "COM3 dataq", "COM3 lines 3200".')
     ] = None,
-    hammer: Annotated[Answer, Option(help='Hammer input, mV/N, range (V): "0 2.25 5", or none (not TAPS/1).')] = None,
-    accelerometer: Annotated[Answer, Option(help='Accelerometer input, mV/g, range (V): "1 10 5".')] = None,
+    hammer: Annotated[
+        Answer, Option(help='Hammer input, sensitivity (mV/N), range (V): "0 2.25 5", or none (not with TAPS/1).')
+    ] = None,
+    accelerometer: Annotated[
+        Answer, Option(help='Accelerometer input, sensitivity (mV/g), range (V): "1 10 5".')
+    ] = None,
     fixing: Annotated[Answer, Option(help='Accelerometer mass (g) and mounting: "4 wax".')] = None,
     tool: Annotated[
         Answer, Option(help='Flutes, diameter (mm), helix (deg), stick-out (mm), material: "4 20 30 80 carbide".')
@@ -42,7 +46,7 @@ def init(
 ) -> None:
     """Make a machine folder with a commented machine.toml.
 
-    At a terminal it asks ten questions. With --yes, or without a terminal, only options set values.
+    At a terminal, lobewatch init asks ten questions. With --yes, or without a terminal, only options set values.
 
     Examples
     --------
@@ -91,5 +95,5 @@ def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: boo
     try:
         return ask_questions(draft, chosen, answers)
     except (EOFError, KeyboardInterrupt):
-        notes.print("\nnothing was written")
+        notes.print("\nno file was written")
         raise KeyboardInterrupt from None

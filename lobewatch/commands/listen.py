@@ -50,7 +50,7 @@ def listen(
     """Record a cut and detect chatter.
 
     Start with the spindle running in air, then cut for at least one second. The recording and its result are stored.
-    lobewatch exclude takes them out of all results.
+    lobewatch exclude takes the cut out of all results.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def listen(
     if not dry_run:
         logbook.folder.refuse_damage()
     if screen and file is not None:
-        raise ValueError("--screen needs a device. Leave out --screen or --file.")
+        raise ValueError("--screen needs a device instead of a file. Leave out --screen or --file.")
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:

@@ -16,9 +16,11 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 def lobes(
     machine: TappedMachine,
     cut: Annotated[str, Option(help="Name of a program, or the reference cut.")] = "reference cut",
-    tool: Annotated[str | None, Option(help="Tool name. Default: from the program, or tapped last.")] = None,
+    tool: Annotated[
+        str | None, Option(help="Tool name. Default: tool of the program, or the last tapped tool.")
+    ] = None,
     source: Annotated[DynamicsName, Option(help="Dynamics: fitted modes or measured FRF.")] = "modes",
-    method: Annotated[MethodName, Option(help="Method of the chart, not of verdicts.")] = "zero-order",
+    method: Annotated[MethodName, Option(help="Method of the chart, without effect on verdicts.")] = "zero-order",
     figure: Annotated[Path | None, Option(help="Lobe diagram (.svg, .png, .pdf).")] = None,
     radial: Annotated[Path | None, Option(help="Figure of the limit over speed and radial depth ae.")] = None,
     waterfall: Annotated[Path | None, Option(help="Figure of the limit over speed and time.")] = None,
@@ -26,8 +28,8 @@ def lobes(
 ) -> None:
     """Show stability lobes and stable pockets.
 
-    lobewatch check calls each stable pocket stable. A tool without a tap test is predicted by the spindle model. Tap
-    tests without a force sensor give pocket speeds, but no depths.
+    Each stable pocket has the verdict stable in lobewatch check. A tool without a tap test is predicted by the
+    spindle model. Tap tests without a force sensor give pocket speeds, but no depths.
 
     Examples
     --------

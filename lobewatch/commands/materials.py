@@ -13,7 +13,8 @@ def materials(
 ) -> None:
     """List materials with their cutting coefficients.
 
-    Use any of the names in machine.toml, such as material = "42CrMo4" or "AISI 4140". Case and blanks do not matter.
+    Use any name of a material in machine.toml, such as material = "42CrMo4" or "AISI 4140". Case and blanks in a
+    name do not matter.
 
     Examples
     --------

@@ -18,7 +18,7 @@ def model(
 ) -> None:
     """Show the spindle model.
 
-    Bearing stiffness comes from the newest tap test, or from machine.toml if there is none.
+    Bearing stiffness comes from the newest tap test, or from machine.toml if there is no tap test.
 
     Examples
     --------

@@ -38,14 +38,16 @@ def modes(
     file_options: shared.FileOptions,
     accept: Annotated[list[str] | None, Option(help="Accept hits with this verdict (not-decayed), repeatable.")] = None,
     conjugate: Annotated[
-        bool, Option("--conjugate", help="The file has the complex conjugate of response over force.")
+        bool, Option("--conjugate", help="The FRF in the file is the complex conjugate of response over force.")
     ] = False,
     sensor_mass: Annotated[
-        float | None, Option(help="Accelerometer mass (g) at the hit point. Its effect is removed.")
+        float | None, Option(help="Accelerometer mass (g) at the hit point, whose effect is removed.")
     ] = None,
     beside: Annotated[
         list[str] | None,
-        Option(help="Another measurement (file, response number or tap test) to confirm modes. Give at least two."),
+        Option(
+            help="Another measurement (file, response number or tap test) to confirm modes. Give two or more --beside."
+        ),
     ] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
@@ -79,7 +81,9 @@ def modes(
     from modal import parse_mode_edits
 
     if beside is not None and len(beside) == 1:
-        raise ValueError(f"--beside {beside[0]} alone proves nothing: modes may agree by chance. Give at least two.")
+        raise ValueError(
+            f"--beside {beside[0]} confirms no mode, because two files may agree by chance. Give two or more --beside."
+        )
     edits = parse_mode_edits(add, drop, fix)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
@@ -114,5 +118,5 @@ def modes(
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":
     """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
     if edits and by_fit:
-        raise ValueError("--by-fit excludes --add, --drop and --fix. Leave them out.")
+        raise ValueError("--by-fit excludes --add, --drop and --fix. Leave out --by-fit, or the three others.")
     return edits if edits or by_fit else None

@@ -20,9 +20,9 @@ def observe(
     date: CutDate = None,
     as_json: Json = False,
 ) -> None:
-    """Store whether a test cut was stable by ear.
+    """Store whether a test cut sounded stable.
 
-    The result is stored in the journal. lobewatch exclude takes it out of all results.
+    The result is stored in the journal. lobewatch exclude takes the cut out of all results.
 
     Examples
     --------
@@ -37,7 +37,9 @@ def observe(
     from lobewatch.show.history import contradiction_remark, cut_json, cut_text, untapped_remarks
 
     if stable == chatter:
-        raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter. Give exactly one.")
+        raise ValueError(
+            f"{'both' if stable else 'neither'} of --stable and --chatter. Give exactly one of the two options."
+        )
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)

@@ -13,7 +13,7 @@ def pitch(
     machine: TappedMachine,
     speed: Annotated[float, Option(help="Spindle speed (rpm).")],
     tool: Annotated[str | None, Option(help="Name of the cutter.")] = None,
-    depth: Annotated[float | None, Option(help="Axial depth of cut ap (mm) to check too.")] = None,
+    depth: Annotated[float | None, Option(help="Axial depth of cut ap (mm) to give verdicts for.")] = None,
     material: Material = None,
     teeth: Flutes = None,
     diameter: Annotated[float | None, Option(help="Tool diameter (mm).")] = None,
@@ -23,8 +23,9 @@ def pitch(
 ) -> None:
     """Propose unequal pitches for a cutter at one speed.
 
-    Alternating and linear pitches are compared with equal pitch, including all uncertainties. Flutes cut at most 20 %
-    more or less than the mean. Missing values come from the programs of the tool if they all agree.
+    Alternating and linear pitches are compared with equal pitch, including all uncertainties. The chip load
+    of each flute differs by at most 20 % from the mean. Missing values come from the programs of the tool if all these
+    programs agree.
 
     Examples
     --------

@@ -13,7 +13,7 @@ def ports(
 ) -> None:
     """List serial ports and the devices that answer.
 
-    Only USB ports are queried, and only by drivers that fit the vendor number.
+    Only USB ports are queried, and only by drivers for the USB vendor number of the port.
 
     Examples
     --------

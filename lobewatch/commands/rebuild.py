@@ -21,8 +21,8 @@ def rebuild(
 ) -> None:
     """Rebuild the history, and a damaged journal.
 
-    Damaged files are moved to a folder named damaged. Renamed tap files get their names back, and intact ones are added
-    to the journal. A lost tap file counts again after you restore it from a backup.
+    Damaged files are moved to a folder named damaged. Renamed tap files get their names back, and intact tap files
+    are added to the journal. A lost tap file counts again after you restore it from a backup.
 
     Examples
     --------

@@ -13,8 +13,12 @@ def recommend(
     machine: TappedMachine,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: Material = None,
-    radial: Annotated[float | None, Option(parser=number, help="Radial depth of cut ae (mm). Default: a slot.")] = None,
-    direction: Annotated[Literal["up", "down"] | None, Option(help="Up or down milling. Default: the worse.")] = None,
+    radial: Annotated[
+        float | None, Option(parser=number, help="Radial depth of cut ae (mm). Default: full slot.")
+    ] = None,
+    direction: Annotated[
+        Literal["up", "down"] | None, Option(help="Up or down milling. Default: the direction with the lower limit.")
+    ] = None,
     depth: Annotated[float | None, Option(parser=number, help="Required axial depth of cut ap (mm).")] = None,
     speed: Annotated[float | None, Option(parser=number, help="Present spindle speed (rpm).")] = None,
     teeth: Flutes = None,
@@ -25,10 +29,10 @@ def recommend(
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
 
-    Returns the highest material removal rate that is stable with margin on all sides. Missing values come from the
-    programs of the tool if they all agree.
+    Finds the highest material removal rate that is stable with a margin in speed, depth and frequency. Missing values
+    come from the programs of the tool if all these programs agree.
 
-    Exit code 1: no stable setting.
+    Exit code 1: no stable speed and depth.
 
     Examples
     --------

@@ -22,7 +22,7 @@ def replay(
     file_options: shared.FileOptions,
     dry_run: Annotated[bool, Option("--dry-run", help="Preview the result without storing it.")] = False,
     keep_going: Annotated[
-        bool, Option("--keep-going", help="Store usable files even if others fail (exit code 2).")
+        bool, Option("--keep-going", help="Store usable files even if other files fail (exit code 2).")
     ] = False,
     jobs: Annotated[int, Option(min=1, max=64, help="Number of parallel processes.")] = 1,
     scheduler: Annotated[str, Option(help="Address of a Dask scheduler, such as tls://10.0.0.5:8786.")] = "",
@@ -42,7 +42,8 @@ def replay(
     """Store recorded files as tap tests.
 
     All files are checked before the first one is stored, in order of date. If data is missing, an error names the
-    option. An implausible recording is stored with a question. Answer it with --accept, now or later.
+    option for the data. An implausible recording is stored with a question. Answer the question with --accept, now or
+    later.
 
     Examples
     --------

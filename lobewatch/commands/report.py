@@ -33,7 +33,7 @@ def report(
 
     if not (machine / "machine.toml").is_file() and any(machine.glob("*/machine.toml")):
         if tool or direction:
-            raise ValueError(f"--tool and --direction need one machine. Name one in {machine}.")
+            raise ValueError(f"--tool and --direction need one machine. Name a machine folder in {machine}.")
         path = _write_for_fleet(machine, out)
     else:
         logbook = Logbook.open(machine)

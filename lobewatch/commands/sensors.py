@@ -36,7 +36,7 @@ def sensors(
     if not port:
         raise ValueError(f"no port. Give --port, or port in [daq] of {folder.toml}.")
     if mass_kg is not None and skew:
-        raise ValueError("--mass-kg and --skew need different cabling. Give one of them.")
+        raise ValueError("--mass-kg and --skew need different cabling. Leave out one of the two options.")
     with folder.locked(), open_device(folder.machine.daq, port) as device:
         if mass_kg is not None:
             mass_check = check_mass(folder, port, device, mass_kg, print_note)

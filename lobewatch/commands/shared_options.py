@@ -32,7 +32,9 @@ Machine = Annotated[Path, FolderArgument(help="Machine folder.")]
 TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at least one tap test.")]
 SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with [spindle] in machine.toml.")]
 FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
-ExcludableEntry = Annotated[str, Argument(help="Tap test (ID, file or a unique part), or test cut (c1).")]
+ExcludableEntry = Annotated[
+    str, Argument(help="Tap test (ID, file name or a unique part of the ID), or test cut (c1).")
+]
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
@@ -44,11 +46,13 @@ Material = Annotated[str | None, Option(help="Material in machine.toml or lobewa
 Flutes = Annotated[int | None, Option(help="Number of flutes.")]
 CutPower = Annotated[
     float | None,
-    Option(help="Cutting power (kW): drive display minus its value in air at the same speed."),
+    Option(help="Cutting power (kW): drive display in the cut minus drive display in air at the same speed."),
 ]
 AddedModes = Annotated[list[str] | None, Option(help="Fit another mode near this frequency (Hz), repeatable.")]
 DroppedModes = Annotated[list[str] | None, Option(help="Leave out the mode at this frequency (Hz), repeatable.")]
-FixedModes = Annotated[list[str] | None, Option(help="Hold a mode at Hz:zeta, such as 1500:0.03, and fit only K.")]
+FixedModes = Annotated[
+    list[str] | None, Option(help="Hold a mode at Hz:zeta, such as 1500:0.03, and fit only its stiffness K.")
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,13 +70,15 @@ class FileOptions:
     """Unit of the response or of the FRF."""
     force_unit: Annotated[str, Option(help="Force unit (N, lbf).")] = ""
     """Unit of the force."""
-    skip: Annotated[int | None, Option(min=1, help="Text lines above the rows.")] = None
+    skip: Annotated[int | None, Option(min=1, help="Number of text lines above the numbers.")] = None
     """Number of lines above the rows."""
     decimal: Annotated[str, Option(help="Decimal sign: comma or point.")] = ""
     """Decimal sign."""
     spacing: Annotated[float | None, Option(help="Line spacing (Hz) of an FRF without frequencies.")] = None
     """Spacing of the lines (Hz)."""
-    start: Annotated[float | None, Option(help="First frequency (Hz) of such an FRF. Default: 0.")] = None
+    start: Annotated[float | None, Option(help="First frequency (Hz) of an FRF without frequencies. Default: 0.")] = (
+        None
+    )
     """Frequency of the first line (Hz)."""
     force: Annotated[Path | None, Option(help="File with the force.")] = None
     """File of the force."""
@@ -80,7 +86,7 @@ class FileOptions:
     """Sample rate (Hz)."""
     averages: Annotated[int | None, Option(help="Averaged hits of an FRF. Default: 1.")] = None
     """Number of hits that an FRF was averaged from."""
-    response: Annotated[int | None, Option(help="Number of the response, from 1.")] = None
+    response: Annotated[int | None, Option(help="Number of the response in the file, counted from 1.")] = None
     """Number of the response, from 1."""
     full_scale: Annotated[str, Option(help='Full scale of each channel of a sound file: "500,50".')] = ""
     """Full scales of the channels, separated by commas."""
@@ -92,7 +98,7 @@ class FileOptions:
         try:
             scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()
         except ValueError as error:
-            text = f'--full-scale {self.full_scale} is not a list of numbers. Give one per channel, such as "500,50".'
+            text = f'--full-scale {self.full_scale} is not a list of numbers. Give a number per channel: "500,50".'
             raise ValueError(text) from error
         lists = {"columns": _split_words(self.columns), "sensitivity": _split_words(self.sensitivity)}
         return acquisition.Description(**vars(self) | lists | {"full_scale": scales} | fields)
@@ -122,7 +128,7 @@ def reject_file_options(options: FileOptions, **others: Any) -> None:
     """Raise ValueError for any option on a file, because a stored tap test needs none."""
     for name, value in (vars(options) | others).items():
         if value is not None and value not in ("", False):
-            raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave it out.")
+            raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave out this option.")
 
 
 def _split_words(text: str) -> tuple[str, ...]:

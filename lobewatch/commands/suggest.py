@@ -16,8 +16,8 @@ def suggest(
 ) -> None:
     """Suggest the next test cut of a program.
 
-    Earlier test cuts (lobewatch observe, lobewatch listen) update the rotating spindle and the cutting force. The
-    result shows their values before and after.
+    Earlier test cuts (lobewatch observe, lobewatch listen) update the values of the rotating spindle and of
+    the cutting force. The result shows the values before and after the test cuts.
 
     Examples
     --------

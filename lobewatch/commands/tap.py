@@ -43,8 +43,8 @@ def tap(
     """Run a live tap test.
 
     At a terminal, or with --screen, you tap x, then y, then choose the next step. Each hit is stored at once: after a
-    crash or an unplugged cable, the same command continues. Keys: u or Page Up undoes the last good hit, q stops, m
-    mutes.
+    crash or an unplugged cable, the same command continues the test. Keys: u or Page Up undoes the last good hit, q
+    stops, m mutes.
 
     Examples
     --------
@@ -91,6 +91,6 @@ def tap(
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
         if not visit.is_waiting:
-            notes.print(f"stopped with {visit.state.good} good hits. Run the same command to continue.")
+            notes.print(f"stopped with {visit.state.good} good hits. Run the same command again to continue the test.")
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)

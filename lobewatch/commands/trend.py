@@ -10,9 +10,11 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 def trend(
     machine: Machine,
-    tool: Annotated[str | None, Option(help="Tool of the series. Default: largest frequency drop.")] = None,
+    tool: Annotated[
+        str | None, Option(help="Tool of the series. Default: tool with the largest frequency drop.")
+    ] = None,
     direction: Annotated[
-        str | None, Option(help="Direction of the series: x or y. Default: larger frequency drop.")
+        str | None, Option(help="Direction of the series: x or y. Default: direction of the larger drop.")
     ] = None,
     as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout.")] = False,
     as_json: Json = False,
@@ -33,7 +35,7 @@ def trend(
     from lobewatch.show.trend import trend_csv, trend_json, trend_remarks, trend_texts
 
     if as_csv and as_json:
-        raise ValueError("--csv excludes --json. Give one of them.")
+        raise ValueError("--csv excludes --json. Leave out one of the two options.")
     logbook = Logbook.open(machine)
     machine_outlook = forecast_machine(logbook)
     series = machine_outlook.series(tool, direction)

@@ -12,7 +12,7 @@ def verify(machine: Machine, as_json: Json = False) -> None:
     Lists each altered, missing, extra, swapped, renamed or truncated file with its remedy. An edited machine.toml is
     only noted. A complete tap test of an interrupted program is added to the journal.
 
-    Exit code 1: something is damaged.
+    Exit code 1: a file is damaged.
 
     Examples
     --------

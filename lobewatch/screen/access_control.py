@@ -199,9 +199,11 @@ def check_tokens(full: str | None, watch: str | None) -> AccessTokens:
     """Check both tokens, or make them for None. ValueError for equal or invalid tokens."""
     tokens = [secrets.token_urlsafe(24) if token is None else token for token in (full, watch)]
     if not all(re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token) for token in tokens):
-        raise ValueError("a token has 12 to 200 characters of A-Z, a-z, 0-9, _ and -. Leave it out for a random one.")
+        raise ValueError(
+            "a token has 12 to 200 characters of A-Z, a-z, 0-9, _ and -. Leave out the token for a random token."
+        )
     if tokens[0] == tokens[1]:
-        raise ValueError("both tokens are the same. Give two different tokens, or leave one out.")
+        raise ValueError("both tokens are equal. Give two different tokens, or leave out one token.")
     return tokens[0], tokens[1]
 
 
@@ -226,7 +228,7 @@ def make_guarded_application(tokens: AccessTokens, listen: str, limiter: Connect
                 return _respond_with_error(format_error(error), 409)
             except Exception:  # noqa: BLE001 - the traceback goes to the log, not to the page
                 _log.exception("%s %s failed", request.method, request.path)
-                return _respond_with_error("lobewatch has failed. See its terminal for the error.", 500)
+                return _respond_with_error("lobewatch has failed. See the terminal of lobewatch for the error.", 500)
 
     application = web.Application(middlewares=[guard], client_max_size=4096)
     application.on_response_prepare.append(_add_headers)
@@ -269,7 +271,7 @@ def _check_request_token(request: web.Request, tokens: AccessTokens, changes: bo
     if not (request[HAS_FULL_ACCESS] or can_watch):
         raise web.HTTPUnauthorized(text="no valid token. Open the complete address that lobewatch printed.")
     if changes and not request[HAS_FULL_ACCESS]:
-        raise web.HTTPForbidden(text="this address is read-only. Open the other address that lobewatch printed.")
+        raise web.HTTPForbidden(text="this address is read-only. Open the full-access address that lobewatch printed.")
 
 
 def _matches_any(given: list[str], token: str) -> bool:

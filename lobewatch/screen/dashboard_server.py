@@ -58,7 +58,7 @@ class LiveTest(TapVisit):
     def __init__(self, folder: MachineFolder, direction: TapDirection, *, resume: bool = True) -> None:
         """Start a test, or resume an interrupted one. DataError if machine.toml names no port."""
         if not folder.machine.daq.port:
-            raise DataError(f"{folder.toml}: no port in [daq]. Set it to the value of lobewatch tap --port.")
+            raise DataError(f"{folder.toml}: no port in [daq]. Set port to the value of lobewatch tap --port.")
 
         def plan(tool: str, direction: TapDirection) -> TapSession:
             return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume)
@@ -89,7 +89,7 @@ class LiveTest(TapVisit):
             self.run()
         except TapStopped:
             state = self.state
-            reason = f"Stopped with {state.good} good hits. Press START to continue with them."
+            reason = f"Stopped with {state.good} good hits. Press START to continue with these hits."
             self._final_state = replace(state, word=TapStep.FAILED, reason=reason)
         except (OSError, RuntimeError, ValueError):
             pass  # the state shows the failure
@@ -186,7 +186,7 @@ class DashboardServer(WebServerThread):
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
-        start = await read_body(request, StartRequest, 'the body must be {"direction": "x"} (or "y", "xy")')
+        start = await read_body(request, StartRequest, 'the request body must be {"direction": "x"} (or "y", "xy")')
         test = self._tests.get(key)
         is_free = test is None or not test.is_running
         if test is not None and is_free:  # it may wait for the choice of the next step
@@ -206,7 +206,9 @@ class DashboardServer(WebServerThread):
         """Serve a report at a secret address, so that the browser can open it as a page."""
         key, html = self._reports.get(request.match_info["machine"], ("", ""))
         if not key or not secrets.compare_digest(key.encode(), request.match_info["key"].encode()):
-            raise web.HTTPNotFound(text="this report is no longer available. Open it again from the list of machines.")
+            raise web.HTTPNotFound(
+                text="this report is no longer available. Open the report again from the list of machines."
+            )
         self.limiter.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 

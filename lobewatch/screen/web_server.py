@@ -99,7 +99,7 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         return web.json_response({})
 
     async def choose(request: web.Request) -> web.Response:
-        choice = await read_body(request, ChoiceRequest, 'the body must be like {"key": "y"}')
+        choice = await read_body(request, ChoiceRequest, 'the request body must be like {"key": "y"}')
         check_name(choice.tool, "tool")
         find(request).choose(choice.key, choice.tool)
         return web.json_response({})
@@ -138,7 +138,7 @@ class WebServerThread:
     ) -> None:
         """Prepare the server. ValueError for an invalid token or an empty address."""
         if not listen:
-            raise ValueError("no address to listen at. Use 127.0.0.1 for this computer only, 0.0.0.0 for the network.")
+            raise ValueError("no address to listen at. Give 127.0.0.1 for this computer only, 0.0.0.0 for the network.")
         tokens = access_control.check_tokens(token, watch_token)
         self.token, self.watch_token = tokens
         self._listen = listen.lower()

@@ -85,14 +85,14 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
     """Return a remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
-    text = "no tap test yet, so that the test cut does not count"
-    return [Remark("tool-not-tapped", cut.tool, text, f"Tap it with lobewatch tap {logbook.folder.path}")]
+    text = "no tap test of this tool yet, so that the test cut does not count"
+    return [Remark("tool-not-tapped", cut.tool, text, f"Tap the tool with lobewatch tap {logbook.folder.path}")]
 
 
 def contradiction_remark(cut: CutEntry) -> Remark:
     """Return a remark on an earlier cut with another result at the same point."""
-    text = f"contradicts another test cut at the same point ({cut_summary_text(cut)})"
-    cure = f"Exclude the wrong one, such as with lobewatch exclude MACHINE {cut.id} --reason TEXT"
+    text = f"contradicts another test cut at the same speed and depth ({cut_summary_text(cut)})"
+    cure = f"Exclude the wrong test cut, for example with lobewatch exclude MACHINE {cut.id} --reason TEXT"
     return Remark("cuts-contradict", cut.id, text, cure)
 
 
@@ -108,7 +108,7 @@ CONDITION_FORMATS = {
     "temperature_c": "{:g} °C",
     "stick_out_mm": "stick-out {:g} mm",
     "drawbar_kn": "drawbar {:g} kN",
-    "hours": "{:g} h",
+    "hours": "{:g} h running time",
     "state": "state {}",
     "reclamped": "reclamped",
     "note": "note: {}",

@@ -48,7 +48,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
         shown = sort_modes(m.modes, rejected=False)
         texts += [mode_table(shown), *grouped_remark_lines(shown, check_modes_together(m.modes))]
     if m.followed is not None:
-        texts.append(f"followed: {m.followed.frequency:.2f} Hz")
+        texts.append(f"followed mode: {m.followed.frequency:.2f} Hz")
     if m.calibration is not None:
         texts += [str(part) for part in (m.calibration, _remaining_preload(m, logbook)) if part is not None]
     assembly = logbook.assembly(until=m.tap_id)

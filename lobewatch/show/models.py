@@ -99,7 +99,14 @@ def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
 def model_texts(model: ModelSummary) -> Texts:
     """Return a spindle model in words, with a table of its modes."""
     spindle, critical = model.state.spindle, model.critical_speed
-    table = new_table("mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)")
+    table = new_table(
+        "mode",
+        "f (Hz)",
+        "stiffness K at\nthe tip (N/um)",
+        "bearing\nenergy (%)",
+        "shaft\nenergy (%)",
+        "joint\nenergy (%)",
+    )
     for number, mode in enumerate(model.modes, 1):
         is_node = mode.tip_stiffness > NODE_STIFFNESS_RATIO * model.static_stiffness
         stiffness = "node" if is_node else format_rounded(mode.tip_stiffness, scale=1e6, digits=4)
@@ -107,11 +114,11 @@ def model_texts(model: ModelSummary) -> Texts:
         table.add_row(str(number), f"{mode.frequency:.2f}", stiffness, *shares)
     return [
         f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
-        f"bearings of {model.state.origin}",
+        f"bearing stiffness from {model.state.origin}",
         table,
         f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",
         f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
-        f"with rigid bearings          {model.rigid_frequency:.1f} Hz in mode 1",
+        f"mode 1 with rigid bearings   {model.rigid_frequency:.1f} Hz",
     ]
 
 
@@ -138,19 +145,19 @@ def tools_texts(calibration: JointCalibration) -> Texts:
     lines.append(str(calibration.fit))
     for tool, frequencies in calibration.unmatched.items():
         left_out = ", ".join(f"{frequency:.1f}" for frequency in frequencies)
-        lines.append(f"not used: {left_out} Hz of tool {tool}, no mode of the model nearby")
+        lines.append(f"not used: {left_out} Hz of tool {tool}, because the model has no mode nearby")
     lines += [f"warning: {remark}" for remark in calibration.remarks]
     if calibration.joints:
         unsure = ", ".join(sorted(calibration.fit.open_groups))
-        caution = f" (undetermined: {unsure}, use only with the others)" if unsure else ""
-        lines += [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
+        caution = f" (undetermined: {unsure}, use all lines together)" if unsure else ""
+        lines += [f"lines for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
     else:
         misfit = "The tools do not fit one spindle"
         finding = misfit if calibration.fit.has_misfit else "No measured mode depends on the joints"
-        lines.append(join_sentences(finding, "Leave machine.toml as it is"))
+        lines.append(join_sentences(finding, "Do not change [spindle] in machine.toml"))
     if not calibration.predicted or calibration.fit.has_misfit:
         return [*lines]
-    table = new_table("~tool without tap test", "softest mode (Hz)", "K at the tip (N/um)")
+    table = new_table("~tool without tap test", "softest mode (Hz)", "stiffness K at the tip (N/um)")
     for name, mode in calibration.predicted.items():
         stiffness = format_with_error(mode.stiffness, mode.stiffness_std, 1e6)
         table.add_row(name, format_with_error(mode.frequency, mode.frequency_std), stiffness)

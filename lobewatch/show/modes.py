@@ -18,7 +18,7 @@ MIN_SHOWN_PHASE = 1.0
 """Smallest phase of a modal constant that is shown (degrees)."""
 MIN_SHOWN_CORRELATION = 0.5
 """Smallest correlation of errors that is shown."""
-MATCHES_NOTE = "matches: other measurements with this mode within 0.5 %"
+MATCHES_NOTE = "matches: number of other measurements with the mode within 0.5 % in frequency"
 """Line below a table with the column "matches"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "assumed"}
 """Words for the origin of a fact on a file."""
@@ -129,7 +129,7 @@ def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
     """Return the modes without a driving point, and the rules by which modes are doubtful or rejected."""
     elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
-    lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
+    lines = [f"not at a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in (Trust.DOUBTFUL, Trust.REJECTED):
         alike = (mode for mode in modes if assess_trust(mode) is trust)
         texts = [f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})" for mode in alike]
@@ -180,7 +180,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
         *remarks(shown, file_modes.remarks),
     ]
     if file_modes.frf is not None:
-        heading = "peak picking (eqs. 28, 29), for comparison:"
+        heading = "for comparison, peak picking by eqs. (28) and (29) of Gaber & Hashemi:"
         texts += [heading, peak_picking_table(file_modes.picked, file_modes.as_recorded)]
     return texts
 

@@ -61,7 +61,9 @@ def emit_preview(previews: Sequence[ReplayPreview], passed: Sequence[Path], *, a
     payload = {"dry_run": True, "files": [*map(preview_json, previews)], "passed_over": [*map(str, passed)]}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     if refused := sum(bool(preview.rejection) for preview in previews):
-        raise DataError(f"{refused} of {count_noun(len(previews), 'file')} cannot be used. See the reasons above.")
+        raise DataError(
+            f"{refused} of {count_noun(len(previews), 'file')} cannot be used. Correct or omit the files listed above."
+        )
 
 
 def preview_json(preview: ReplayPreview) -> JsonObject:
@@ -106,7 +108,7 @@ def preview_summary(previews: Sequence[ReplayPreview], n_passed: int) -> str:
     passed = f", {n_passed} other files ignored" if n_passed else ""
     files = count_noun(len(previews), "file")
     count = f"{fresh} of {files} would be stored, {n_known} stored already, {refused} cannot be used"
-    return f"{count}{passed}. Nothing was stored (--dry-run)."
+    return f"{count}{passed}. No file was stored (--dry-run)."
 
 
 def _preview_lines(preview: ReplayPreview) -> list[str]:
@@ -119,7 +121,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
     followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
     details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
-    details += [f"followed: {followed}", *(questions or ["plausible for this machine, no questions"])]
+    details += [f"followed mode: {followed}", *(questions or ["plausible for this machine, no questions"])]
     words = Counter(flags.words for flags in preview.tap.flags)
     hits = f"{count_noun(len(preview.tap.hits), 'hit')}: " + ", ".join(
         f"{count} {word}" for word, count in words.items()
@@ -266,7 +268,7 @@ def rebuild_json(rebuild: MachineRebuild) -> JsonObject:
 def rebuild_texts(rebuild: MachineRebuild) -> list[str]:
     """Return the outcome of rebuilding one machine in words."""
     made = f"rebuilt from {count_noun(rebuild.n_taps, 'tap test')}"
-    missing = "not rebuilt, see above. The next command with write access rebuilds it."
+    missing = "not rebuilt for the reason above. The next command with write access rebuilds the history."
     return [*rebuild.repairs, *remark_lines(rebuild.remarks), f"history.rows: {made if rebuild.is_saved else missing}"]
 
 

@@ -12,7 +12,7 @@ from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 
 NO_ANSWER_TEXTS = (
-    "No DAQ answers. Wait a few seconds after plugging it in, then try again.",
+    "No DAQ answers. Plug in the DAQ, wait a few seconds, then try again.",
     "A DATAQ device must blink yellow (CDC mode).",
 )
 
@@ -58,7 +58,7 @@ def _answer_text(scanned: ScannedPort) -> str:
         return scanned.text
     serial, firmware = answer.identity.serial, answer.identity.firmware
     words = [f"{answer.driver}: {answer.identity.model}", serial and f"serial number {serial}"]
-    words += [firmware and f"firmware {firmware}", "" if answer.is_hardware_tested else "not tried on hardware"]
+    words += [firmware and f"firmware {firmware}", "" if answer.is_hardware_tested else "driver not tested on hardware"]
     return ", ".join(filter(None, words))
 
 
@@ -128,11 +128,11 @@ def sensors_texts(sensors: SensorList) -> Texts:
     """Return the device in words, a table of its channels, its sample rate, and warnings."""
     measured = sensors.measured_rate
     rate = "not measured" if measured is None else f"measured {format_with_error(measured.rate, measured.std)} Hz"
-    rate += " (used)" if sensors.replaces_nominal else ""
+    rate += " (measured rate used)" if sensors.replaces_nominal else ""
     return [
         f"{sensors.identity.model}, serial number {sensors.identity.serial or 'unknown'}",
         new_table(*CHANNEL_HEADINGS, rows=(_channel_cells(i, channel) for i, channel in enumerate(sensors.channels))),
-        f"rate: {sensors.nominal_rate:g} Hz, {rate}",
+        f"sample rate: nominal {sensors.nominal_rate:g} Hz, {rate}",
         *(f"{'error' if remark in sensors.errors else 'warning'}: {remark}" for remark in sensors.remarks),
     ]
 
@@ -166,7 +166,10 @@ def mass_check_texts(check: MassCheck) -> list[str]:
         return [str(check.calibration)]
     force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
     if check.place is not None:
-        force, acceleration = f"{check.place.sensitivity} of the force channel", "that of the acceleration channel"
+        force, acceleration = (
+            f"{check.place.sensitivity} of the force channel",
+            f"{check.place.sensitivity} of the acceleration channel",
+        )
         place = check.place.place
     change = f"In {place}, multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}"
     return [str(check.calibration), change]
@@ -175,12 +178,12 @@ def mass_check_texts(check: MassCheck) -> list[str]:
 def skew_check_texts(check: SkewCheck) -> list[str]:
     """Return the skew, and the line to enter."""
     skew, channel = check.measured, check.channel
-    entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
+    entry = f"skew_us = {skew.skew * 1e6:.3f} in the [[daq.channel]] of channel 1 in machine.toml"
     if check.place is not None:
         entry = f"{check.place.skew} = {skew.skew:.3e} in {check.place.place}"
     return [
         f"channel 1 ({channel.quantity}) is sampled {format_with_error(skew.skew, skew.std, 1e-6)} us "
-        f"({skew.skew * check.sample_rate:.4f} samples) after channel 0 (entered: {channel.skew * 1e6:.3f} us)",
+        f"({skew.skew * check.sample_rate:.4f} samples) after channel 0 (entered so far: {channel.skew * 1e6:.3f} us)",
         f"Enter {entry}, and 0 for channel 0",
     ]
 

@@ -70,7 +70,7 @@ def trend_csv(series: SeriesStatus) -> str:
 def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: RemainingPreload | None) -> Texts:
     """Return chart, facts and forecast dates of a series, the change of the other series, and the next step."""
     if series.trend is None:
-        return [f"{series.name}: no tap test to compare others with"]
+        return [f"{series.name}: no tap test yet to compare later tests with"]
     facts = [*_trend_facts(series), *([] if preload is None else [str(preload)])]
     texts: Texts = [*chart_lines(series.trend), f"{series.name}:", *wrap_lines(facts)]
     texts += [
@@ -92,7 +92,7 @@ def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     now, rows = outlook.status.time, list[tuple[str, str, str]]()
     for name, fate in outlook.programs.items():
         dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
-        rows.append((name, *(("unknown, see check",) * 2 if name in outlook.unknown_programs else dates)))
+        rows.append((name, *(("unknown, see lobewatch check",) * 2 if name in outlook.unknown_programs else dates)))
     return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
 
 
@@ -105,7 +105,7 @@ def no_dates_text(outlook: MachineForecast) -> str:
     points = max((len(series.trend.points) for series in outlook.status.series if series.trend), default=0)
     if points >= MIN_FORECAST_POINTS:
         return "No forecast: the last tap tests are too old. Tap again."
-    return f"No forecast yet: it needs {MIN_FORECAST_POINTS} points, and this series has {points}."
+    return f"No forecast yet: a forecast needs {MIN_FORECAST_POINTS} points, and the longest series has {points}."
 
 
 def trend_sentence(series: SeriesStatus) -> str:
@@ -124,13 +124,13 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
     if trend.forecast is None:
         known = trend.readings.scatter_prior.single
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
-        fits = ["± is the error of the fits, without the scatter from reclamping"] if n > 1 else []
+        fits = ["± is the standard error of the fits, without the scatter from reclamping"] if n > 1 else []
         return [change, *fits, f"alarms are possible from {least}"]
     score = f"from {MIN_MONITORED_POINTS} points on"
     if math.isfinite(trend.detection.scores[-1]):
-        score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more twice)"
+        score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more in two clampings)"
     course = ", ".join(filter(None, (trend_text(trend), rate_text(trend))))
-    return [change, course, f"scatter {trend.spread:.2f} %, change score {score}"]
+    return [change, course, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
 
 
 def rate_text(trend: Trend) -> str:
@@ -141,7 +141,7 @@ def rate_text(trend: Trend) -> str:
     digits = max(2, -math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
     inside = min(max(rate.value, rate.low), rate.high)
     value, low, high = (f"{round(percent, digits) + 0.0:+.{digits}f}" for percent in (inside, rate.low, rate.high))
-    return f"{value} % a month now ({low} to {high}, 95 %)"
+    return f"{value} % a month now (95 % interval {low} to {high})"
 
 
 def change_since_start_text(series: SeriesStatus) -> str:

@@ -73,7 +73,7 @@ def test_ports_and_a_whole_tap_test(trial: Path, monkeypatch: pytest.MonkeyPatch
         tapped = run("tap", "trial", "--port", port, "--details")
     assert tapped.returncode == 0, tapped.stderr
     assert "DUMMY-1, 25600 Hz" in tapped.stderr
-    assert re.search(r"followed: 171[234]\.", tapped.stdout)
+    assert re.search(r"followed mode: 171[234]\.", tapped.stdout)
     monkeypatch.syspath_prepend(PLUGIN)
     folder = MachineFolder("trial")
     (entry,) = folder.taps()

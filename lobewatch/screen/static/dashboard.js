@@ -72,7 +72,7 @@ function addStarts(item, machine, path) {
     const restart = made("button", { type: "button", className: "restart", textContent: `Restart ${direction}` });
     restart.addEventListener("click", () => go(restart, key, `${path}/start`, { direction, resume: false }));
     item.querySelector(`.start[data-direction=${direction}]`).after(restart);
-    item.querySelector(".port").append(` START ${direction} continues the interrupted test with ${count} hit${count === 1 ? "" : "s"}.`);
+    item.querySelector(".port").append(` START ${direction} continues the interrupted test with ${count} saved hit${count === 1 ? "" : "s"}.`);
   }
 }
 

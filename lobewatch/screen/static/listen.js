@@ -8,7 +8,7 @@ const STEPS = [
   "1. Move the sensor from the tool to the spindle housing.",
   "2. Run the spindle in air.",
   "3. Cut for a second or longer.",
-  "4. Leave the cut. The verdict appears by itself.",
+  "4. Leave the cut. The verdict then appears on this page.",
 ];
 const SOUNDS = { stable: "good", chatter: "refused", flip: "refused", again: "lost", "cannot-tell": "lost", failed: "lost" };
 
@@ -65,7 +65,7 @@ function showTexts(wanted) {
 // After a normal end of lobewatch the last state stays.
 function showLost(why, ended) {
   over ||= ended;
-  if (over && FINISHED.includes(state?.kind)) return put("device", named(state, "lobewatch has ended. This is the last state."));
+  if (over && FINISHED.includes(state?.kind)) return put("device", named(state, "lobewatch has ended. This page shows the last recorded cut."));
   showWord("no-connection", over ? "ENDED" : "NO\nCONNECTION");
   put("reason", over ? "lobewatch has ended. Repeat the command to record another cut." : why);
   put("figure", "");

@@ -69,7 +69,7 @@ function showGuide() {
 function showMean() {
   const { mean_change: change, good, settled } = state;
   const percent = change === null ? "" : `${(100 * change).toPrecision(2)} %`;
-  if (settled) put("change", percent ? `✓ Settled (change ${percent})` : "✓ Settled");
+  if (settled) put("change", percent ? `✓ Settled (last change ${percent})` : "✓ Settled");
   else if (percent) put("change", `Last change ${percent}`);
   else put("change", good ? "One good hit, no change yet" : "No good hit yet");
 }
@@ -169,10 +169,10 @@ function showLost(why, ended) {
   const finished = ["done", "failed"].includes(state?.kind);
   if (over && finished) {
     at("choices").hidden = at("tool-form").hidden = true;
-    return put("device", "lobewatch has ended. This is the last state.");
+    return put("device", "lobewatch has ended. This page shows the last state of the test.");
   }
   showWord("no-connection", over ? "ENDED" : "NO CONNECTION");
-  put("reason", over ? "lobewatch has ended. Repeat the command to continue with the saved hits." : why);
+  put("reason", over ? "lobewatch has ended. Repeat the command to continue the test with the saved hits." : why);
   document.title = at("text").textContent;
   at("choices").hidden = at("tool-form").hidden = true;
   at("undo").disabled = at("stop").disabled = true;

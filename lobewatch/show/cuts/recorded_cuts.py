@@ -35,28 +35,32 @@ class Fault(NamedTuple):
 
 
 FAULTS: Mapping[str, Fault] = {
-    "too-short": Fault("less than 0.3 s of cutting", "Record at least 1 s, with the spindle in air before it"),
-    "no-cut": Fault("the signal never gets louder", "Start recording in air, then cut"),
+    "too-short": Fault("less than 0.3 s of cutting", "Record the spindle in air, then at least 1 s of cutting"),
+    "no-cut": Fault("the signal level never rises", "Start the recording in air, then cut"),
     "no-air": Fault(
         "no usable 0.15 s of the spindle running in air before or after the cut", "Record the spindle in air, then cut"
     ),
-    "knock": Fault("a knock, such as a hammer blow, during the cut", "Cut again without it"),
+    "knock": Fault("a knock, such as a hammer blow, during the cut", "Repeat the cut without a knock"),
     "overload": Fault(
-        "the accelerometer or its input was overloaded", "Choose a larger range or another place for the sensor"
+        "the accelerometer or its input was overloaded", "Choose a larger input range or another place for the sensor"
     ),
     "lost-scans": Fault("samples were lost", "Lower the sample rate, or use another cable or port"),
     "speed-not-found": Fault(
-        "no spindle speed within 5 % of the set speed fits the lines of the spectrum", "Correct the speed"
+        "no spindle speed within 5 % of the set speed fits the lines of the spectrum", "Correct the set speed"
     ),
-    "tacho-contradicts": Fault("the tachometer contradicts the speed", "Correct --speed, or name another column"),
+    "tacho-contradicts": Fault(
+        "the tachometer contradicts the set speed", "Correct --speed, or name another column with --tacho"
+    ),
     "on-spindle-lines": Fault(
         "run-out lines are louder than tooth passing, which may hide chatter locked to the spindle",
-        "Cut at a speed 3 % away, and give pitch_deg for unevenly spaced flutes",
+        "Cut at a 3 % higher or lower speed, and give pitch_deg for unevenly spaced flutes",
     ),
-    "faint": Fault("weak lines besides those of the spindle, too faint for chatter", "Cut longer or a little deeper"),
+    "faint": Fault(
+        "the lines outside the spindle harmonics are too weak to prove chatter", "Cut longer or a little deeper"
+    ),
     "unexplained-tone": Fault(
         "is not explained by spindle, flutes or air, and has no side bands of chatter",
-        "Cut a little deeper, and listen for the tone without cutting",
+        "Cut a little deeper, and check whether the tone is there without cutting",
     ),
     "slow-sampling": Fault(
         "the sample rate covers fewer than three harmonics of tooth passing", "Use a higher sample rate"
@@ -71,10 +75,10 @@ MICROPHONE_NOTE = "microphone: other machines may be recorded too, and the vibra
 
 SUGGEST_HINT = "Run lobewatch suggest for the next test cut"
 NEXT_STEP_TEXTS: Mapping[str, str] = {
-    "stable": join_sentences(SUGGEST_HINT, "A deeper cut teaches more"),
+    "stable": join_sentences(SUGGEST_HINT, "A deeper test cut gives more information"),
     "chatter": join_sentences("Cut less deep or at another speed", SUGGEST_HINT),
     "flip": join_sentences("Cut at another speed or less deep", SUGGEST_HINT),
-    "cannot tell": "Record the cut again: this recording gives no result",
+    "cannot tell": "Record the cut again, because this recording gives no verdict",
 }
 """Next step for each verdict on a recorded cut."""
 
@@ -91,11 +95,13 @@ def _fault_text(comparison: CutComparison) -> str:
     finding, remedy = FAULTS[detected.reason]
     match detected.reason:
         case "speed-not-found" if math.isfinite(detected.distant_rpm):
-            finding = f"{finding} (they fit {detected.distant_rpm:.0f} rpm)"
+            finding = f"{finding} (the lines fit {detected.distant_rpm:.0f} rpm)"
         case "tacho-contradicts":
             finding, remedy = _speed_conflict(comparison)
         case "slow-sampling":
-            remedy = f"Use {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
+            remedy = (
+                f"Use a sample rate of {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
+            )
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
             distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz,"
@@ -107,8 +113,8 @@ def _speed_conflict(comparison: CutComparison) -> Fault:
     """Return the fault of a tachometer that contradicts the set speed or the spectrum."""
     detected, set_rpm = comparison.detected, comparison.setting.speed_rpm
     measured, lines = detected.measured_rpm or math.nan, detected.distant_rpm
-    source = "the set speed" if lines == set_rpm else "the spectrum"
-    finding = f"tachometer {measured:.1f} rpm, but {lines:.1f} rpm by {source}"
+    source = "the set speed is" if lines == set_rpm else "the spectrum shows"
+    finding = f"the tachometer shows {measured:.1f} rpm, but {source} {lines:.1f} rpm"
     if not is_pulse_multiple(measured / lines):
         return Fault(finding, FAULTS["tacho-contradicts"].remedy)
     change = "Multiply" if measured > lines else "Divide"
@@ -117,7 +123,7 @@ def _speed_conflict(comparison: CutComparison) -> Fault:
 
 def _energy_text(ratio: float) -> str:
     digits = ".2g" if ratio < 1 else ".0f"
-    return f"energy outside the spindle lines: {100 * ratio:{digits}} % of the energy in them"
+    return f"energy outside the spindle harmonics: {100 * ratio:{digits}} % of the energy in the harmonics"
 
 
 def cut_verdict_text(comparison: CutComparison) -> str:
@@ -141,19 +147,22 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
     """Return the verdict on a recorded cut, and its evidence."""
     detected, texts = comparison.detected, [cut_verdict_text(comparison)]
     if detected.spindle_speed is not None:
-        off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+        set_rpm = comparison.setting.speed_rpm
+        off = 100 * (comparison.speed_rpm / set_rpm - 1)
         duration = math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
         texts.append(
-            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
+            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % from the set {set_rpm:g} rpm), tooth passing "
             f"{comparison.tooth_passing_frequency:.1f} Hz, {duration:.2f} s evaluated"
         )
     if (measured := detected.measured_rpm) is not None:
-        texts.append(f"tachometer: {'no speed in the cut' if math.isnan(measured) else f'{measured:.1f} rpm'}")
+        texts.append(f"tachometer: {'no speed during the cut' if math.isnan(measured) else f'{measured:.1f} rpm'}")
     if math.isfinite(detected.energy_ratio):
         texts.append(_energy_text(detected.energy_ratio))
     if detected.chatter is not None:
         lobe = comparison.lobe_number
-        texts.append(f"lobe {lobe} ({lobe} full waves per tooth passing), {len(detected.chatter.peaks)} side bands")
+        texts.append(
+            f"lobe {lobe} ({lobe} full chatter waves per tooth passing), {len(detected.chatter.peaks)} side bands"
+        )
     if comparison.sensor == "microphone":
         texts.append(MICROPHONE_NOTE)
     if comparison.power is not None:
@@ -168,7 +177,7 @@ def _prediction_texts(comparison: CutComparison) -> Iterator[str]:
         word = "stable" if expected.stable else "chatter"
         yield f"predicted from tap tests (not rotating): {word}, {expected.frequency:.1f} Hz at this depth"
         if difference is not None:
-            yield f"predicted to detected frequency: {difference:.1f} Hz (modulo tooth passing)"
+            yield f"predicted and detected frequency differ by {difference:.1f} Hz (modulo tooth passing)"
 
 
 def recording_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:
@@ -293,7 +302,7 @@ def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first
 
 def _observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
     observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
-    return f"Then: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+    return f"Enter the result: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
 
 
 def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, float] | None:
@@ -336,28 +345,28 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         yield f"Chatter risk {round(100 * cut.chatter_probability)} %, {_suggestion_reason(cut, learning)}"
         yield _observe_text(folder, program.name, cut.speed_rpm, depth)
         if program.feed_per_tooth_mm is not None:
-            yield "Add --power KW if the drive shows its power: it gives Kt."
+            yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."
     best = _best_stable_cut(learning)
     if best is not None:
-        gain = f", expected gain of the next {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
+        gain = f", expected gain of the next test cut {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
         yield f"Best stable test cut: {1e3 * best[1]:.4g} mm at {format_rpm(best[0])} rpm{gain}"
-    yield "A test cut may chatter. Safe settings: lobewatch check"
+    yield "A test cut may chatter. For safe settings run lobewatch check."
 
 
 def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
     if cut.repeats:
         is_accepted = cut.repeats in [made.id for made in learning.accepted_cuts]
-        return f"repeats {cut.repeats}, which {'may be wrong' if is_accepted else 'contradicts the other cuts'}"
-    return f"determines mostly {factor_text(cut.most_informative)}"
+        return f"the cut repeats {cut.repeats}, which {'may be wrong' if is_accepted else 'contradicts the other cuts'}"
+    return f"the cut determines mostly {factor_text(cut.most_informative)}"
 
 
 def _no_suggestion_text(next_cut: NextCut) -> str:
     if not next_cut.cuts_left:
         finding = f"all {len(next_cut.learning.own_cuts)} test cuts are done"
-        return join_sentences(finding, "Give a larger --cuts for more")
+        return join_sentences(finding, "Give a larger --cuts for more test cuts")
     if next_cut.cut_range.is_empty:
-        return join_sentences(f"no test cut in {next_cut.cut_range.text}", "Choose another tool")
-    return "no further test cut, because it would gain nothing"
+        return join_sentences(f"no test cut is possible in {next_cut.cut_range.text}", "Choose another tool")
+    return "no further test cut, because another test cut would gain nothing"
 
 
 def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
@@ -397,4 +406,6 @@ def learned_remarks(learning: LearningResult) -> Iterator[Remark]:
     yield from inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, learning.program.name)
     if learning.accepted_cuts and not learning.posterior.n_frequencies:
         text = "frequency not learned: no cut with a chatter frequency yet"
-        yield Remark("frequency-not-learnt", learning.program.name, text, "Give --frequency for the next chatter")
+        yield Remark(
+            "frequency-not-learnt", learning.program.name, text, "Give --frequency with the next test cut that chatters"
+        )

@@ -47,7 +47,7 @@ LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (6.4, 4.4)
 """Size of a separate diagram, and of the one in the report (inches)."""
 MAP_LEVELS = 12
 """Number of levels of a map."""
-DEPTH_SCALE_LABEL = "limiting depth ap (mm), brightest: this or more"
+DEPTH_SCALE_LABEL = "limiting depth ap (mm), brightest: top value or more"
 MAX_DAYS_WITH_TIME = 10.0
 """Longest range that is labelled with times, not only with dates (days)."""
 TEST_CUT_MARKS = {False: ("test cut, stable", Paint.GOOD, "o"), True: ("test cut, chatter", Paint.ALARM, "x")}
@@ -148,7 +148,7 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
     if lobes.remarks:
         figure.supxlabel(fill(join_sentences(*map(str, lobes.remarks)), 120), fontsize=8)
-    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth ae (mm), dashed: this cut")
+    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth ae (mm), dashed: ae of the cut")
     axes.grid(visible=False)
     return figure
 

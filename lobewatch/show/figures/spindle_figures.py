@@ -63,7 +63,7 @@ def _circle_rank(mode: Mode) -> tuple[int, float]:
 def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     f = state.frf.frequency
     axes.semilogy(f, np.abs(state.frf.accelerance), color=Paint.FIRST, lw=0.8, label="measured")
-    labels = "fit in its bands", "measured - fit"
+    labels = "fit in the fitted bands", "measured - fit"
     for band in state.bands:
         part, left = f[band.lines], state.residual(band)[0]
         size = (2 * np.pi * part) ** 2
@@ -106,7 +106,7 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
         axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=Paint.FIRST, ms=3)
     for chart in stabilisation_charts(state):
         axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=Paint.NEWEST, ms=3)
-    axes.plot([], [], "x", color=Paint.FIRST, ms=3, label="pole (in the bands)")
+    axes.plot([], [], "x", color=Paint.FIRST, ms=3, label="pole (in the fitted bands)")
     axes.plot([], [], "o", color=Paint.NEWEST, ms=3, label="stable pole")
     for mode in modes:
         axes.axvline(mode.frequency, color=Paint.NEWEST, lw=0.6)
@@ -115,7 +115,9 @@ def _draw_stabilization_chart(axes: Axes, state: Extraction, modes: Sequence[Mod
     for frequency, place in zip(others, places, strict=True):
         text, style = _frequency_text(frequency), {"fontsize": 7, "color": Paint.NEWEST, **VERTICAL_LABEL}
         axes.annotate(text, (place, ORDER_AXIS_TOP), **style)
-    axes.set(xlabel="frequency (Hz), grey: fitted bands, blue: stable pole without a mode, ?: doubtful, -: rejected")
+    axes.set(
+        xlabel="frequency (Hz), grey: fitted bands, blue: stable pole without a mode, ? doubtful mode, - rejected mode"
+    )
     axes.set(ylabel="order", ylim=(0, ORDER_AXIS_TOP + 3))
     axes.yaxis.set_major_locator(MultipleLocator(2))
     axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")

@@ -217,12 +217,12 @@ def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome
         differ = " OR ".join(f"present.{name} IS DISTINCT FROM lines.{name}" for name in EXPORT_COLUMNS[3:])
         query = OUTDATED_QUERY.format(differ=differ)
         outdated = [month for (month,) in base.execute(query, [[table.folder for table in tables]]).fetchall()]
-    sentences = [f"{added} of them new in this folder"]
+    sentences = [f"{added} tap tests new in this folder"]
     if outdated:
         months = ", ".join(f"month={month}" for month in outdated)
         folders = "this folder" if len(outdated) == 1 else "these folders"
         finding = f"{months}: some tap tests were excluded or analysed again after their export"
-        sentences.append(join_sentences(finding, f"To update them, delete {folders} and export again"))
+        sentences.append(join_sentences(finding, f"Delete {folders} and export again to update the tap tests"))
     return ExportOutcome(count, {"folder": str(folder), "added": added, "outdated_months": outdated}, sentences)
 
 

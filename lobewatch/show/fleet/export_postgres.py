@@ -72,7 +72,7 @@ def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
             read, written, set_aside = read + counts[0], written + counts[1], set_aside + counts[2]
     kind = "a hypertable of TimescaleDB" if is_hypertable else "a plain table"
     sentences = [f"{POSTGRES_TABLE} is {kind}, {written} rows added or changed"]
-    sentences += [f"{set_aside} stored rows marked as no longer counting"] if set_aside else []
+    sentences += [f"{set_aside} stored rows marked as excluded (counts = false)"] if set_aside else []
     fields = {"database": place, "written": written, "set_aside": set_aside, "hypertable": is_hypertable}
     return ExportOutcome(read, fields, sentences)
 
@@ -108,10 +108,12 @@ def _connection(address: str, place: str) -> Iterator[Any]:
             connection.execute(f"SET lock_timeout = '{POSTGRES_LOCK_WAIT}s'")
             yield connection
     except psycopg.errors.LockNotAvailable:
-        raise DataError(f"--to {place}: another export is writing there. Wait until it has ended.") from None
+        raise DataError(
+            f"--to {place}: another export is writing to this database. Repeat the command later."
+        ) from None
     except psycopg.Error as error:
         reason = str(error).partition("\n")[0]
-        cure = "Repeat the command: rows already written stay, missing ones are added"
+        cure = "Repeat the command: written rows stay, and missing rows are added"
         raise DataError(join_sentences(f"--to {place}: {reason}", cure)) from None
 
 

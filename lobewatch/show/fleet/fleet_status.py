@@ -111,7 +111,7 @@ def _machine_notes(row: Mapping[str, Any]) -> list[str]:
     """Return the name of a machine if the folder has another, the next step, and the reasons."""
     named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
     shown, further = row["reasons"][:MAX_SHOWN_REASONS], row["reasons"][MAX_SHOWN_REASONS:]
-    more = [f"{len(further)} more: lobewatch trend"] if further else []
+    more = [f"{len(further)} more reasons: lobewatch trend"] if further else []
     return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])
 
 

@@ -134,10 +134,12 @@ def advice_items(program: ProgramAdvice, machine: Machine) -> list[str]:
         items = [capitalize(text) for remark in settles for text in (remark.cure, remark.text) if text]
         if verdict.assembly is not None and is_compliance_known(verdict.program, verdict.assembly):
             first, *others = _alternative_items(program, machine)  # open measurements come first
-            items += [f"Until then {first[:1].lower()}{first[1:]}", *others]
+            items += [f"Until the verdict is clear, {first[:1].lower()}{first[1:]}", *others]
     if verdict.is_beyond_drive:
         deepest = math.floor(verdict.drive_limit * 1e5) / 100
-        items.append(f"Cut no deeper than {deepest:.2f} mm at this speed, or change [drive] in machine.toml")
+        items.append(
+            f"Drive limit: cut no deeper than {deepest:.2f} mm at this speed, or correct [drive] in machine.toml"
+        )
     return items
 
 
@@ -242,10 +244,10 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
     texts: Texts = [
         f"{now.name}: {now.lobes.method_text}",
-        f"from the {now.source} of {now.assembly.tap_id}",
+        f"computed from the {now.source} of {now.assembly.tap_id}",
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
-        else f"no limit in this speed range ({now.lobes.method_text})",
+        else f"no stability limit in this speed range ({now.lobes.method_text})",
         *shift_lines(comparison.shifts),
     ]
     if comparison.pockets:
@@ -255,7 +257,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     if verdicts:
         texts.append(verdict_table(verdicts))
         methods = dict.fromkeys(verdict.method for verdict in verdicts if verdict.method)
-        texts += [f"Verdicts by {method}, as in lobewatch check" for method in methods]
+        texts += [f"Verdicts computed by {method}, as in lobewatch check" for method in methods]
     if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
         shown = "The diagram and its pockets are" if now.name == REFERENCE_CUT else "The diagram is"
         texts.append(join_sentences(at_speed_text(taught), f"{shown} for the spindle not rotating"))

@@ -72,7 +72,9 @@ def _range_text(limits: tuple[float, float] | None, unit: float, digits: int) ->
 def power_text(power: CutPower, cut: Cut) -> str:
     """Return the power of a cut, its Kt, and that of machine.toml."""
     by_power, known = power.tangential / 1e6, cut.tangential / 1e6
-    return f"from {power.watts / 1e3:.4g} kW: Kt {by_power:.0f} N/mm2 (machine.toml: {known:.0f})"
+    return (
+        f"from {power.watts / 1e3:.4g} kW of drive power: Kt {by_power:.0f} N/mm2 (in machine.toml: {known:.0f} N/mm2)"
+    )
 
 
 def power_json(power: CutPower | None) -> JsonObject:

@@ -109,8 +109,8 @@ def _recommended_lines(answer: Recommendation) -> Iterator[str]:
             yield from wrap_lines(answer.remedies)
         return
     yield from wrap_lines([f"{answer.program.name}: {_setting_text(setting, answer)}"], "")
-    items = ["Up or down milling"] if answer.any_direction and answer.program.immersion < 1 else []
-    items += [] if verdict.is_measured else ["Predicted, doubtful until the tool is tapped"]
+    items = ["Valid for up and down milling"] if answer.any_direction and answer.program.immersion < 1 else []
+    items += [] if verdict.is_measured else ["Predicted by the spindle model, doubtful until you tap the tool"]
     cuts = f"Valid for the rotating spindle, learned from {count_noun(verdict.n_cuts, 'test cut')}"
     yield from wrap_lines(
         [*items, *_margin_items(setting, answer, worst_feed_text(verdict)), *[cuts][: verdict.n_cuts]]
@@ -213,20 +213,20 @@ def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
     share = math.ceil(100 * proposed.share_worse)
     largest, fed = proposed.pattern.feed_ratio_range[1], program.feed_per_tooth_mm
     chip = "" if fed is None else f", {fed * largest:.3g} mm at {fed:g} mm feed per tooth"
-    yield f"Best {at}: pitch_deg = [{angles}]"
+    yield f"Best pitches {at}: pitch_deg = [{angles}]"
     yield from wrap_lines(
         [
-            f"Lower than with equal pitch in {share} % of the Monte Carlo samples",
-            f"Uneven chips: {round(100 * (largest - 1))} % thicker than the mean after the widest gap{chip}",
-            "Valid for this speed only. Run lobewatch pitch again for another speed.",
-            "lobewatch lobes shows speeds that need no other cutter.",
+            f"The limit is lower than with equal pitch in {share} % of the Monte Carlo samples",
+            f"Uneven chips: {round(100 * (largest - 1))} % thicker than the mean chip after the widest gap{chip}",
+            "The pitches are valid for this speed only. Run lobewatch pitch again for another speed.",
+            "lobewatch lobes shows stable speeds of the present cutter.",
         ]
     )
 
 
 def _equal_pitch_reason(proposal: PitchProposal) -> str:
     if not math.isfinite(proposal.equal.limit):
-        return f"no limit up to {MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm:g} mm"
+        return f"no stability limit up to {MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm:g} mm"
     if not proposal.unequal:
         return "no unequal pitch keeps chip load and balance within limits"
-    return f"no unequal pitch raises the lower end of the limit by {100 * (MIN_PITCH_GAIN - 1):.0f} %"
+    return f"no unequal pitch raises the lower end of the 98 % interval by {100 * (MIN_PITCH_GAIN - 1):.0f} %"

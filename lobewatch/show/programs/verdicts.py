@@ -99,7 +99,7 @@ def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     before, after = at_speed.prior_ranges, at_speed.posterior_ranges
     for key in ("tangential", "ratio", *(name for name in before if name.startswith("frequency"))):
         prior, posterior = (f"{factor.low:.2f}..{factor.high:.2f}" for factor in (before[key], after[key]))
-        yield f"{factor_text(key)} x {posterior} ({prior} before the test cuts)"
+        yield f"{factor_text(key)} times {posterior} (times {prior} before the test cuts)"
     yield f"speed {_half_width_text(speed)}"
 
 
@@ -107,7 +107,9 @@ def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: Unc
     asked, texts = (given.frequency_percent, given.damping_percent, given.stiffness_percent), dict[str, str]()
     for side in assembly.directions:
         scatter = f"scatter of {len(assembly.series.get(side, ()))} tests"
-        sources = [scatter if assembly.scatter(side) is not None else f"default until {MIN_TAPS_FOR_SCATTER} tests"]
+        sources = [
+            scatter if assembly.scatter(side) is not None else f"default value until {MIN_TAPS_FOR_SCATTER} tests"
+        ]
         sources = [] if None not in asked else sources
         sources += [FROM_MACHINE_FILE] if any(wish is not None for wish in asked) else []
         width = widths[len(assembly.x or ()) if side == "y" else 0]

@@ -111,7 +111,7 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
         "gauge": make_gauge(drop, *row["limits"]) if has_changed else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
-        "due": f"{due}, last {last.partition('T')[0]}" if last else due,
+        "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,
     }
 
 

@@ -140,8 +140,14 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
 MIN_TAPS_FOR_VALUE = 2
 """Smallest number of tap tests in a trend."""
 SHOWN_VALUES = (
-    SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Error bars: 95 % for one tap test."),
-    SeriesValue("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, "Equivalent stiffness of each bearing (model)."),
+    SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Error bars: 95 % interval of one tap test."),
+    SeriesValue(
+        "bearing_stiffness",
+        "Bearing stiffness",
+        "N/µm",
+        1e6,
+        "Equivalent stiffness of each bearing, from the spindle model.",
+    ),
 )
 """Values shown over time, in order."""
 

@@ -79,10 +79,10 @@ def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
         "\N{NO-BREAK SPACE}→ ".join(f"{value:.1f}" for value in values) or "-",
         "first test" if series.is_baseline else trends.change_text(series),
         (trend and trends.trend_text(trend)) or f"since {series.first_time:%Y-%m-%d}",
-        (trend and trends.rate_text(trend)) or f"from {MIN_FORECAST_POINTS} tests",
+        (trend and trends.rate_text(trend)) or f"needs {MIN_FORECAST_POINTS} tests",
         f"{max(alarm - drop.value, 0):.2f} %" if drop.is_known else "-",
         f"{trend.spread:.2f} %" if trend is not None and is_fitted else "-",
-        f"{score:.1f}" if math.isfinite(score) else f"from {MIN_MONITORED_POINTS} tests",
+        f"{score:.1f}" if math.isfinite(score) else f"needs {MIN_MONITORED_POINTS} tests",
         "0" if trend is None else str(len(trend.points)),
         f"{series.time:%Y-%m-%d}",
     ]
@@ -97,7 +97,7 @@ def make_programs(data: ReportData) -> list[Section]:
         return []
     dates = {} if data.no_dates else {name: texts for name, *texts in trends.forecast_date_rows(data.outlook)}
     heads = ["program", "verdict", *(DATE_HEADS if dates else ()), "run instead", "speed (rpm)", "ap (mm)"]
-    heads += ["limit, 98 % (mm)", "ap margin", "chatter risk", "f1 margin", "at first"]
+    heads += ["limit, 98 % interval (mm)", "ap margin", "chatter risk", "f1 margin", "first verdict"]
     table = DataTable(heads, [_program_row(program, dates) for program in data.programs], "words")
     checked = [program.verdict for program in data.programs if program.verdict.stability is not Stability.UNKNOWN]
     remarks = [remark for program in data.programs for remark in program.verdict.remarks]
@@ -140,9 +140,9 @@ def alternative_text(program: ProgramAdvice) -> str:
     if program.verdict.stability is Stability.STABLE:
         return "no change"
     if program.verdict.stability is Stability.UNKNOWN or assembly is None or not assembly.is_complete:
-        return "unknown, see reasons"
+        return "unknown, reasons below"
     texts = [f"{format_rpm(item.speed_rpm)} rpm, {item.depth_mm:g} mm" for item in settings if item is not None]
-    return " or ".join(dict.fromkeys(texts)) or "another tool (no safe speed)"
+    return " or ".join(dict.fromkeys(texts)) or "another tool (no stable speed)"
 
 
 def make_figures(data: ReportData) -> list[Section]:
@@ -159,8 +159,8 @@ def make_value_figures(data: ReportData) -> Iterator[Section]:
         trend = make_value_trend(data, value)
         if trend is not None:
             texts = [value.text, *(["Dotted lines: maintenance."] if trend.events else [])]
-            texts += ["Hollow: excluded tests."] if trend.drawn_excluded else []
-            texts += ["Line: trend. Band: 80 % forecast."] if trend.curve else []
+            texts += ["Hollow points: excluded tests."] if trend.drawn_excluded else []
+            texts += ["Line: trend. Band: 80 % interval of the forecast."] if trend.curve else []
             style = "half" if value is SHOWN_VALUES[0] else "folded"
             drawing = Drawing.of(plot_trend(trend), _tabulate_trend(trend))
             yield Section(value.heading, [Paragraph(" ".join(texts), is_small=True), drawing], style)
@@ -193,9 +193,9 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
     method = f"{diagram.now.method}, {' and '.join(directions)} direction{'s' if len(directions) > 1 else ' only'}"
     text = f"{diagram.cut} ({method}): chatter above the line."
     if np.isinf(diagram.now.minimum.depth):
-        text = f"{diagram.cut} has no limit in this speed range ({method})."
+        text = f"{diagram.cut} has no stability limit in this speed range ({method})."
     if history:
-        text += " Orange: chosen test or forecast (all modes drop like f1)."
+        text += " Orange: chosen test or forecast (all modes drop by the same % as f1)."
     numbers = NumberTable.from_lobes(diagram.now.speed_rpm, [*diagram.depths.items(), *diagram.edges.items(), *history])
     drawing = Drawing.of(plot_lobes(diagram, is_small=True), numbers, len(history))
     return [Section("Stability lobes", [Paragraph(text, is_small=True), drawing], "half")]
@@ -237,7 +237,7 @@ def make_values(data: ReportData) -> list[Section]:
     if not rows:
         return []
     heads = ["value", f"start ({data.rows[0].time:%Y-%m-%d})", f"newest ({data.last.time:%Y-%m-%d})", "change"]
-    text = f"± is the standard error of one test. ± at the start is the scatter (from {MIN_FORECAST_POINTS} tests)."
+    text = f"± is the standard error of one test. ± at the start is the scatter of {MIN_FORECAST_POINTS} or more tests."
     if data.series.is_baseline:
         heads, rows = ["value", heads[2]], [[name, now] for name, _, now, _ in rows]
         text = "± is the standard error of one tap test."
@@ -310,7 +310,7 @@ def make_test_cuts(data: ReportData) -> list[Section]:
 def make_tap_tests(data: ReportData) -> list[Section]:
     """Make the table of tap tests, the newest first, and their numbers, the oldest first."""
     history = data.analysis.history.current
-    heads = ["time", "tool", "in", "f1 (Hz)", "zeta (%)", "K (N/µm)", "k_b (N/µm)", "questions, verdicts"]
+    heads = ["time", "tool", "direction", "f1 (Hz)", "zeta (%)", "K (N/µm)", "k_b (N/µm)", "questions, verdicts"]
     numbers = NumberTable(TAP_TABLE_HEADS, [_tap_values(row) for row in history])
     table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers)
     return [Section("Tap tests", [table], "folded")]
@@ -338,7 +338,8 @@ NOT_DETECTED = (
     "Damage since the newest tap test",
 )
 ALARM_CONFIDENCE = (
-    "two clampings in a row, each by scatter once in 2000. False alarms: 5 of 100 healthy series within 60 clampings"
+    "two clampings in a row with a score that scatter reaches once in 2000. "
+    "False alarms: 5 of 100 healthy series within 60 clampings"
 )
 """Confidence of the alarm, measured (docs/decay.md)."""
 
@@ -360,8 +361,8 @@ def make_sign_off(data: ReportData) -> list[Section]:
         *map(_sensor_row, tap.hits[0].channels or () if tap.hits else ()),
         ("cutting coefficients", "machine.toml"),
         ("monitored failure", FAILURE_MODE),
-        ("alarm", ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else f"from {MIN_MONITORED_POINTS} clampings"),
-        ("dates", "80 % intervals for unchanged use"),
+        ("alarm", ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else f"needs {MIN_MONITORED_POINTS} clampings"),
+        ("forecast dates", "80 % intervals for unchanged use of the machine"),
         *(("open alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
         ("name, date, signature", ""),
     ]

@@ -17,15 +17,17 @@ def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> Machine
             if question is DAQ_QUESTION and draft.daq.problem:
                 _print_notes(f"note: {draft.daq.problem}")
     if draft.missing_sensors:
-        cure = "This DAQ does not describe its sensors: give input, sensitivity and range."
-        raise ValueError(f"--{draft.missing_sensors[0]} is missing. {cure}")
+        finding = f"--{draft.missing_sensors[0]} is missing, because the DAQ does not describe its sensors"
+        raise ValueError(join_sentences(finding, "Give input, sensitivity and range of the sensor"))
     return draft
 
 
 def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answers: Mapping[str, str]) -> MachineDraft:
     """Ask a person the questions that `answers` of options do not cover; raise EOFError without an answer."""
     if questions == SETUP_QUESTIONS:
-        _print_notes("Enter keeps the value in [brackets], - skips a question. Nothing is written before the end.")
+        _print_notes(
+            "Enter keeps the value in [brackets], - skips a question. No file is written before the last answer."
+        )
     for question in questions:
         number = SETUP_QUESTIONS.index(question) + 1
         already = question.skip_reason(draft)
@@ -61,7 +63,7 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
         except ValueError as error:
             _print_notes(f"    {str(error).removeprefix('machine.toml: ')}")
             continue
-        look, kept = answered.daq, "The port is kept. Check it with lobewatch ports"
+        look, kept = answered.daq, "The port is kept. Check the port with lobewatch ports"
         if question is DAQ_QUESTION and (text := join_sentences(look.problem, kept) if look.problem else look.text):
             _print_notes(f"    {text}")
         return answered
@@ -72,7 +74,7 @@ def _find_daqs(draft: MachineDraft) -> MachineDraft:
     looks = find_daqs()
     _print_notes(*(f"    {i}: {look.port}: {look.text}" for i, look in enumerate(looks, 1)))
     if not looks:
-        _print_notes("    no DAQ answers on USB. Enter its port, or - to give it later with --port")
+        _print_notes("    no DAQ answers on USB. Enter the port of the DAQ, or - to give the port later with --port")
     return replace(draft, detected_daqs={**draft.detected_daqs, **{look.port: look for look in looks}})
 
 

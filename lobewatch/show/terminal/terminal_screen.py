@@ -77,7 +77,7 @@ class TapPrinter:
         if state.title != before.title:
             self._n_printed = 0
         if state.device != before.device:
-            self._console.print(f"{state.device}. Tap the tool repeatedly.", markup=False)
+            self._console.print(f"{state.device}. Hit the tool with the hammer, again and again.", markup=False)
         for check in state.checks:
             if (check.is_notable or not check.passed) and check not in before.checks:
                 symbol = "[bold green]✓[/]" if check.passed else "[bold yellow]![/]"
@@ -258,7 +258,7 @@ class TerminalScreen:
         """Read a line while the screen is paused."""
         self._live.stop()
         self._keys.__exit__()
-        self._console.print("\nNext tool, from machine.toml or a new name (Enter: none) > ", end="")
+        self._console.print("\nNext tool, a name from machine.toml or a new name (Enter: no tool) > ", end="")
         try:
             return sys.stdin.readline().strip()
         finally:

@@ -178,7 +178,7 @@ def test_from_an_empty_folder_to_a_verdict_on_a_tapped_tool_in_three_commands(
             person.type("q")
             assert person.end() == 0
             last = person.text.rstrip().splitlines()[-1]
-            assert last.startswith("✓ GOOD  next: ")
+            assert last.startswith("✓ GOOD  Next: ")
     said = run("check", "mill-3")
     assert (said.code, said.out.splitlines()[-1]) == (0, "1 program: 1 stable")
     assert [tap.direction for tap in MachineFolder("mill-3").taps()] == ["x", "y"]

@@ -16,9 +16,9 @@ pytestmark = pytest.mark.quick
 @pytest.mark.parametrize(
     ("rate", "text"),
     [
-        (Rate(-0.1532, -0.1711, -0.1402), "-0.15 % a month now (-0.17 to -0.14, 95 %)"),
-        (Rate(-0.0005, 0.0, 0.0), "+0.0000 % a month now (+0.0000 to +0.0000, 95 %)"),
-        (Rate(-0.0001, -0.2, 0.3), "+0.00 % a month now (-0.20 to +0.30, 95 %)"),
+        (Rate(-0.1532, -0.1711, -0.1402), "-0.15 % a month now (95 % interval -0.17 to -0.14)"),
+        (Rate(-0.0005, 0.0, 0.0), "+0.0000 % a month now (95 % interval +0.0000 to +0.0000)"),
+        (Rate(-0.0001, -0.2, 0.3), "+0.00 % a month now (95 % interval -0.20 to +0.30)"),
     ],
 )
 def test_a_rate_is_within_its_interval(rate: Rate, text: str) -> None:

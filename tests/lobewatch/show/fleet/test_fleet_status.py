@@ -36,7 +36,9 @@ def test_the_next_step_comes_before_a_short_list_of_reasons(shop: Shop) -> None:
     lines = fleet_text([row]).splitlines()[2:]
     assert max(map(len, lines)) <= MAX_LINE_LENGTH
     assert lines[0].split()[:3] == ["Next:", "Tap", "again."]
-    assert [line.strip() for line in lines if line.strip().startswith("reason")] == [f"reason {number}" for number in range(4)]
+    assert [line.strip() for line in lines if line.strip().startswith("reason")] == [
+        f"reason {number}" for number in range(4)
+    ]
     assert lines[-1].strip().startswith("2 ")
 
 

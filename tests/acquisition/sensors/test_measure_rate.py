@@ -255,7 +255,7 @@ def test_what_the_first_versions_kept_without_a_checksum_is_known(folder: Machin
 @pytest.mark.parametrize("content", [b"{", b'[{"model": 1}]', b"\xff"])
 def test_a_damaged_memory_is_reported(folder: MachineFolder, content: bytes) -> None:
     (folder.path / "daq.json").write_bytes(content)
-    with pytest.raises(DataError, match=r"daq\.json: .*delete this file"):
+    with pytest.raises(DataError, match=r"daq\.json: .*Delete"):
         check(folder, Stream(even(25600.0)))
 
 

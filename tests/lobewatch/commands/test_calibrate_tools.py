@@ -135,7 +135,7 @@ def test_too_few_modes_share_factors_and_predict_nothing(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--tool", LONG], "two tools"),
+        (["--tool", LONG], "two"),
         (["--tool", LONG, "--tool", LONG], "2 times"),
         (
             ["--tool", LONG, "--tool", "short"],

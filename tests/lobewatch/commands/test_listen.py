@@ -212,7 +212,7 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
         (("--program", "A", "--file", "none.csv"), ["none.csv"]),
         (
             ("--program", "A", "--file", "none.csv", "--sensor", "ear"),
-            ["--sensor ear", "accelerometer, microphone"],
+            ["--sensor ear", "accelerometer", "microphone"],
         ),
         (("--program", "A", "--port", "x", "--sensor", "microphone"), ["--sensor microphone", "--file"]),
         (("--program", "A", "--port", "x", "--pulses", "2"), ["--pulses 2", "--file"]),

@@ -206,7 +206,7 @@ def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
 
 
 def test_a_prediction_is_rejected_before_the_first_tap(folder: MachineFolder) -> None:
-    with pytest.raises(ValueError, match="bearings"):
+    with pytest.raises(ValueError, match="long end mill"):
         predict_assembly(folder.machine, [], TOOL)
 
 

@@ -83,7 +83,7 @@ def test_the_power_of_a_cut_is_in_its_line_with_the_kt_that_it_says(shop: Shop) 
     rate = 4 * 215 * 1.5e-3 * 0.02
     watts = 1.1 * rate * (1.4e9 * 1e-4 + 42e3 * np.pi / 2)
     result = run(shop, "observe", "--program", "A", "--stable", "--power", watts / 1e3)
-    assert re.search(rf"{watts / 1e3:.4g} kW .*Kt 1540 N/mm2.* 1400", result.stdout)
+    assert re.search(rf"{watts / 1e3:.4g} kW.*Kt 1540 N/mm2.* 1400", result.stdout)
     (cut,) = shop.logbook.cuts
     assert cut.power is not None
     assert (cut.power.watts, cut.power.tangential) == pytest.approx((watts, 1.54e9))

@@ -40,7 +40,7 @@ def with_pockets(folder: MachineFolder, found: Sequence[dict[str, Any]]) -> Mach
 
 
 def test_a_pocket_entered_as_a_program_is_stable(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "radial_depth_mm = 20            # 20 of 20 mm: slot", "radial_depth_mm = 12\nflute_length_mm = 9")
+    edit(folder, "radial_depth_mm = 20            #", "radial_depth_mm = 12\nflute_length_mm = 9  #")
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
     found = json.loads(run("lobes", "m", "--json").out)["pockets"]

@@ -1,1 +1,1 @@
-"""Estimation of averaged FRFs from hits, and their correction."""
+"""Estimation of averaged FRFs from hits, and correction of the FRFs."""

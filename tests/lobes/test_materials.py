@@ -161,7 +161,7 @@ def test_the_page_holds_what_the_tables_hold() -> None:
 def as_row(known: CuttingCoefficients) -> list[str]:
     low, high = (round(limit / 1e6) for limit in known.tangential_range or (0, 0))
     least, most = known.ratio_range or (0, 0)
-    laws = ", ".join(f"{force.at_1_mm / 1e6:.0f} / {force.exponent:.2f}" for force in known.specific_forces)
+    laws = ", ".join(f"{force.at_1_mm / 1e6:.0f}/{force.exponent:.2f}" for force in known.specific_forces)
     return [
         known.material,
         known.iso_group,

@@ -113,7 +113,7 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.tap.emulated_spindle import MountingVariation, WearScenario, build_mounted_spindle
 
-    folder = MachineFolder(options.machine)
+    driver, folder = find_driver(name), MachineFolder(options.machine)
     if folder.machine.spindle is None:
         notes.print(f"{folder.toml} has no [spindle]: the example spindle is emulated", markup=False)
     mounting = MountingVariation(options.scatter / 100, options.bad_clampings / 100, options.temperature)
@@ -121,7 +121,7 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     story, seed, spindle = WearScenario(options.story), options.seed, None
     if story is not WearScenario.NONE or any(mounting):
         spindle = build_mounted_spindle(folder, story, SCENARIO_MONTHS, options.month, mounting, seed)
-    shared = {"driver": find_driver(name), "folder": folder, "spindle": spindle, "seed": seed}
+    shared = {"driver": driver, "folder": folder, "spindle": spindle, "seed": seed}
     shared |= {"realtime": not options.fast, "tcp": options.tcp}
     cut = options.cut
     _serve(_emulate_tap(options, shared) if cut is None else _emulate_cut(options, cut, shared), options)

@@ -125,5 +125,5 @@ def test_a_device_that_is_on_no_serial_port(trial: Path) -> None:
     wrong = run("tap", "trial", "--port", "dummybench:right", plugin=bench)
     assert (wrong.returncode, wrong.stderr.splitlines()[-1]) == (
         2,
-        "error: there is no bench dummybench:right; there is dummybench:left",
+        "error: there is no bench dummybench:right. Use dummybench:left.",
     )

@@ -77,7 +77,7 @@ class BenchSource:
 
 def _open(port: str, _settings: DeviceSettings) -> BenchSource:
     if port != ADDRESS:
-        raise DeviceError(f"there is no bench {port}", f"there is {ADDRESS}")
+        raise DeviceError(f"there is no bench {port}", f"Use {ADDRESS}")
     return BenchSource()
 
 

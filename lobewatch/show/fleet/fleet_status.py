@@ -11,7 +11,7 @@ from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
 from lobewatch.monitoring import threshold_dates
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
-from lobewatch.show.terminal.output import JsonObject, align_columns, format_csv, make_printable
+from lobewatch.show.terminal.output import JsonObject, align_columns, count_noun, format_csv, make_printable
 from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.status_labels import status_label
 
@@ -111,7 +111,7 @@ def _machine_notes(row: Mapping[str, Any]) -> list[str]:
     """Return the name of a machine if the folder has another, the next step, and the reasons."""
     named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
     shown, further = row["reasons"][:MAX_SHOWN_REASONS], row["reasons"][MAX_SHOWN_REASONS:]
-    more = [f"{len(further)} more reasons: lobewatch trend"] if further else []
+    more = [f"{count_noun(len(further), 'more reason')}: lobewatch trend {row['key']}"] if further else []
     return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])
 
 

@@ -54,7 +54,7 @@ def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | T
             "Values from kc1.1 and mc: Kt = (1 - mc) kc1.1 h^-mc and Kte = mc kc1.1 h^(1 - mc) "
             f"at h = {REFERENCE_CHIP_THICKNESS * 1e3:g} mm."
         )
-        yield f"Ranges cover all publications and h = {thin} to {thick} mm (docs/lobes.md)."
+        yield f"Ranges cover all publications and h = {thin} to {thick} mm (docs/materials.md)."
 
 
 def _material_cells(material: CuttingCoefficients) -> list[str]:

@@ -80,12 +80,16 @@ def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
         "first test" if series.is_baseline else trends.change_text(series),
         (trend and trends.trend_text(trend)) or f"since {series.first_time:%Y-%m-%d}",
         (trend and trends.rate_text(trend)) or f"needs {MIN_FORECAST_POINTS} tests",
-        f"{max(alarm - drop.value, 0):.2f} %" if drop.is_known else "-",
+        _margin_text(alarm - drop.value) if drop.is_known else "-",
         f"{trend.spread:.2f} %" if trend is not None and is_fitted else "-",
         f"{score:.1f}" if math.isfinite(score) else f"needs {MIN_MONITORED_POINTS} tests",
         "0" if trend is None else str(len(trend.points)),
         f"{series.time:%Y-%m-%d}",
     ]
+
+
+def _margin_text(margin: float) -> str:
+    return f"{margin:.2f} %" if margin > 0 else "exceeded"
 
 
 DATE_HEADS = "becomes doubtful", "becomes not stable"

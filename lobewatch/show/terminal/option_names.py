@@ -73,7 +73,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "list_comparison_files.beside": "--beside",
     "LobeChart.source": "--source",
     "lobes.materials_by_name": "lobewatch materials",
-    "Logbook.verdicts": "lobewatch check",
+    "Logbook.verdicts": "lobewatch check MACHINE",
     "MachineFolder.accept": "replay --accept",
     "MachineFolder.contents": "lobewatch history",
     "MaintenanceEvent.time": "--date",

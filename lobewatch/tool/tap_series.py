@@ -64,7 +64,7 @@ class MountingTracker:
         if force is not None:
             self._drawbar[tap.tool] = force
             if last_force not in (None, force):
-                text = f"drawbar force changed from {last_force:g} kN to {force:g} kN, which may have changed the frequency"
+                text = f"drawbar force changed from {last_force:g} kN to {force:g} kN, so f1 may have changed"
                 yield Remark("drawbar-changed", tap.tool, text, "Inspect the drawbar if the change was not intended")
         if hours is not None:
             self._hours = hours

@@ -168,8 +168,8 @@ def test_of_a_file_of_version_1_nothing_is_known() -> None:
         ("stick_out_mm = -3", r"machine.toml: tap: stick_out_mm=-3 .*0\.1 to 5000"),
         ("drawbar_kn = 0", r"machine.toml: tap: drawbar_kn=0 .*0\.1 to 1000"),
         ("stick_out_mm = nan", "machine.toml: tap: stick_out_mm=nan "),
-        ("state = 3", "machine.toml: tap state: .*int"),
-        ('stick_out_mm = "80"', "machine.toml: tap stick_out_mm: .*str"),
+        ("state = 3", "machine.toml: tap state: .*whole number"),
+        ('stick_out_mm = "80"', "machine.toml: tap stick_out_mm: .*a text"),
         ('state = "a\\u001b"', "machine.toml: tap: state='a.*control"),
     ],
 )

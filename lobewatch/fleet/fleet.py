@@ -49,7 +49,9 @@ def find_machines(path: Path) -> dict[str, Path]:
     except OSError:
         names = []
     if not names:
-        raise DataError(f"{path} is no machine folder and contains none. Make one with make_machine_folder.")
+        raise DataError(
+            f"{path} is not a machine folder and contains no machine folder. Make a folder with make_machine_folder."
+        )
     return {format_path(name): path / name for name in names}
 
 

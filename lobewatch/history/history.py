@@ -203,8 +203,8 @@ OLDER_VERSION_CODE, KEPT_ROW_CODE = "row-of-older-version", "row-kept"
 
 def keep_older_row(row: HistoryRow, place: TapPlace, error: Exception) -> HistoryRow:
     """Return the row of an older version if this version cannot analyse the tap test."""
-    text = f"result of {row.software} kept, because this version cannot analyse the test ({error})"
-    remark = Remark(OLDER_VERSION_CODE, f"tap test {row.tap_id}", text, "Exclude the test if it is not valid")
+    text = f"result of {row.software} kept, because this version of lobewatch cannot analyse the test ({error})"
+    remark = Remark(OLDER_VERSION_CODE, f"tap test {row.tap_id}", text, "Exclude the tap test if it is not valid")
     row = replace(row, baseline=place.baseline, series=place.series, conditions=place.entry.conditions)
     return _set_remark(row, remark)
 
@@ -217,8 +217,8 @@ def _set_remark(row: HistoryRow, remark: Remark) -> HistoryRow:
 def keep_unusable_row(row: HistoryRow, software: str) -> HistoryRow:
     """Return the row of a tap test with an unusable file; software: default version of the row."""
     row = replace(row, software=row.software or software)
-    text = f"file unusable, result of {row.software} shown but not used"
-    return _set_remark(row, Remark(KEPT_ROW_CODE, f"taps/{row.tap_id}.h5", text, "Restore it from a backup"))
+    text = f"tap file unusable, so the result of {row.software} is shown but not used"
+    return _set_remark(row, Remark(KEPT_ROW_CODE, f"taps/{row.tap_id}.h5", text, "Restore the file from a backup"))
 
 
 def find_older_version_remarks(history: History | None) -> list[Remark]:

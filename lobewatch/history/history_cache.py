@@ -72,7 +72,7 @@ class HistoryCache:
             with self._folder.locked(patience=0):
                 self._store(history)
         except (BusyError, OSError) as error:
-            text = f"not updated on disk, computed in memory only: {format_error(error)}"
+            text = f"history computed in memory only, because the file was not updated: {format_error(error)}"
             remark = Remark("history-in-memory", self._folder.history_path.name, text)
             self.remarks += [] if remark in self.remarks else [remark]
 

@@ -65,8 +65,8 @@ class UsableTaps:
         """Raise DataError for an excluded tap test."""
         for tap in self.excluded:
             if tap.id == tap_id:
-                cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use it again."
-                raise DataError(f"{tap_id}: stored already, but excluded ({tap.excluded!r}). {cure}")
+                cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use the test again."
+                raise DataError(f"{tap_id}: tap test stored already, but excluded ({tap.excluded!r}). {cure}")
 
     def list_until(self, tap_id: str | None) -> list[TapPlace]:
         """Return the tap tests up to one of them since its baseline; None: up to now."""
@@ -123,11 +123,11 @@ class UsableTaps:
         damaged = [str(remark) for remark in self.remarks]
         if damaged:
             raise NotTappedError(join_sentences(f"{self._folder.path}: no usable tap test{tool_text}", *damaged))
-        cure = "Take one with session.TapSession, or replay a recorded file."
+        cure = "Take a tap test with session.TapSession, or replay a recorded file."
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
         if self.excluded:
             since += f" ({len(self.excluded)} excluded)"
-            cure += f" Run {format_command('include', self._folder.path)} TAP to use an excluded one."
+            cure += f" Run {format_command('include', self._folder.path)} TAP to use an excluded test."
         raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}. {cure}")
 
     def newest_damaged_remarks(self, tool: str = "") -> tuple[Remark, ...]:
@@ -138,7 +138,7 @@ class UsableTaps:
         since = self.baseline or EARLIEST_TIME
         lost = [entry for entry in self.lost if entry.created >= since and tool in ("", entry.tool)]
         newer = [entry for entry in lost if entry.created > usable.get((entry.tool, entry.direction), EARLIEST_TIME)]
-        text = "newest test of its tool and direction, but its file is damaged"
+        text = "the file of this test, the newest of its tool and direction, is damaged"
         return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "Tap again") for entry in newer)
 
     def add(self, entry: TapEntry) -> bool:
@@ -339,7 +339,7 @@ class TapMeasurements:
             if row.stiffness.is_known and not row.questions and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
         if calibrated and not any(rows[place.number].stiffness.is_known for place in calibrated):
-            text = "K is unknown (no force measured). Tap with an instrumented hammer."
+            text = "stiffness K is unknown (no force measured). Tap again with an instrumented hammer."
             raise NotTappedError(f"no tap test and no prediction for tool {tool!r}, because {text}")
         try:
             return predict_assembly(self._folder.machine, list(newest.values()), tool)

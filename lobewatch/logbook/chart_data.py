@@ -102,7 +102,7 @@ def _make_chart(
     machine = logbook.machine
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
-        known = f"Its cuts: {', '.join(map(repr, cuts)) or 'none'}."
+        known = f"Cuts of this tool: {', '.join(map(repr, cuts)) or 'none'}."
         raise DataError(f"compare_lobes.cut {cut!r} is not a cut of tool {assembly.tool!r}. {known}")
     assembly = assembly.check()
     frfs = _read_frfs(logbook, assembly) if source is lobe_chart.DynamicsSource.FRF else None
@@ -116,7 +116,7 @@ def _read_frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
     place = logbook.machine.tap.position_mm
     if place > 0 and (not assembly.predicted or assembly.tool == logbook.machine.tap.tool):
         text = f"DynamicsSource.FRF needs an FRF at the tool tip, but [tap] position_mm = {place:g}"
-        raise DataError(f"{text}. Use DynamicsSource.MODES, which the model transfers to the tip.")
+        raise DataError(f"{text}. Use DynamicsSource.MODES, because the model transfers modes to the tip.")
     read = _predict_frf if assembly.predicted else _read_assembly_frf
     frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
     other = frfs[assembly.directions[0]]

@@ -213,7 +213,7 @@ def calibrate_joints(
     """
     machine = logbook.machine
     if not any(joint.group for joint in machine.model(tools[0]).joints):
-        cure = 'Add one in machine.toml, such as group = "holder" for the joint between tool and spindle.'
+        cure = 'Add a group in machine.toml, such as group = "holder" for the joint between tool and spindle.'
         raise DataError(f"no joint of [spindle] has a group. {cure}")
     taps = tool_modes.find_tapped_tools(logbook, tools, direction, mode)
     try:
@@ -260,9 +260,9 @@ def _find_unmatched(joint_fit: JointFit) -> Iterator[tuple[str, tuple[float, ...
 
 def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
     if joint_fit.grouping is not split_tilting_groups:
-        shared = "bearings share a factor, " if joint_fit.grouping is merge_groups else ""
-        kept = f"{shared}joint stiffnesses keep their ratio and other tools are not predicted"
-        text = f"only {joint_fit.fit.mode.size} modes, so {kept}"
+        shared = "all bearings share one stiffness factor, " if joint_fit.grouping is merge_groups else ""
+        kept = f"{shared}the ratios of the joint stiffnesses are kept and other tools are not predicted"
+        text = f"only {joint_fit.fit.mode.size} measured modes, so {kept}"
         cure = "Measure more modes with a wider [mode] band_hz or a harder hammer tip"
         yield Remark("factors-shared", "", text, cure)
 
@@ -271,5 +271,5 @@ def _time_gap_remarks(taps: Sequence[tool_modes.TappedTool], machine: Machine) -
     times = [tap.time for tap in taps]
     days = (max(times) - min(times)) / timedelta(days=1)
     if days > machine.machine.tap_interval_days:
-        text = f"tapped {days:.0f} days apart, so the bearings may have changed"
-        yield Remark("taps-apart", ", ".join(tap.tool for tap in taps), text, "Tap all of them on one day")
+        text = f"tools tapped {days:.0f} days apart, so the bearings may have changed"
+        yield Remark("taps-apart", ", ".join(tap.tool for tap in taps), text, "Tap all of these tools on one day")

@@ -36,7 +36,9 @@ class MachineForecast:
                 return series
         known = [(series.tool, series.direction) for series in self.status.series]
         names = ", ".join(f"SeriesStatus.tool {name} SeriesStatus.direction {axis}" for name, axis in known)
-        raise DataError(f"no series of tool {tool or 'any'}, direction {direction or 'any'}. Choose one of: {names}.")
+        raise DataError(
+            f"no tap-test series of tool {tool or 'any'}, direction {direction or 'any'}. Choose one of: {names}."
+        )
 
 
 def forecast_machine(logbook: Logbook, now: datetime | None = None) -> MachineForecast:

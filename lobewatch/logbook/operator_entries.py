@@ -69,4 +69,5 @@ def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) 
 def store_edits(logbook: Logbook, tap_ids: Sequence[str], edits: ModeEdits) -> str:
     """Store edits of the modes of tap tests. Return a text on the tap tests that the edits do not fit."""
     reasons = logbook.edit_modes(tap_ids, edits) if edits else {}
-    return "\n".join(["stored without these edits:", *group_by_message(reasons.items())]) if reasons else ""
+    lines = ["tap tests stored without the mode edits:", *group_by_message(reasons.items())]
+    return "\n".join(lines) if reasons else ""

@@ -81,11 +81,11 @@ def _check_tools(tools: Sequence[str], mode: Sequence[int]) -> None:
         raise ValueError(f"calibrate_joints.tools {tools[0]} is only one tool. Name at least two tapped tools.")
     for tool in tools:
         if tools.count(tool) > 1:
-            cure = "Name another tool, or give this one at another stick-out its own [[tool]]."
+            cure = "Name each tool once, or add a [[tool]] for the same tool at another stick-out."
             raise ValueError(f"calibrate_joints.tools {tool} is named {tools.count(tool)} times. {cure}")
     if mode and len(mode) != len(tools):
         numbers = f"{len(mode)} calibrate_joints.mode for {len(tools)} calibrate_joints.tools"
-        raise ValueError(f"{numbers}. Give one for each tool, or none.")
+        raise ValueError(f"{numbers}. Give one mode number for each tool, or none.")
 
 
 def _find_newest_row(rows: Sequence[HistoryRow], tool: str, direction: str | None) -> HistoryRow:
@@ -94,20 +94,22 @@ def _find_newest_row(rows: Sequence[HistoryRow], tool: str, direction: str | Non
         return matching[-1]
     tapped = sorted({f"{row.tool!r} in {row.direction}" for row in rows})
     where = "" if direction is None else f" in direction {direction}"
-    raise DataError(f"tool {tool!r} was never tapped{where}. Tap it, or choose from: {', '.join(tapped) or 'none'}.")
+    raise DataError(
+        f"tool {tool!r} was never tapped{where}. Tap this tool, or choose from: {', '.join(tapped) or 'none'}."
+    )
 
 
 def _build_tapped_tool(logbook: Logbook, row: HistoryRow, number: int) -> TappedTool:
     measurement, machine = logbook.measurement(row.tap_id), logbook.machine
     if measurement.followed is None:
-        raise DataError(f"{row.tap_id}: no followed mode in the newest test of tool {row.tool!r}. Tap it again.")
+        raise DataError(f"{row.tap_id}: no followed mode in the newest test of tool {row.tool!r}. Tap this tool again.")
     if not measurement.followed.has_stiffness:
-        text = "K is unknown, because no force was measured"
+        text = "stiffness K is unknown, because no force was measured"
         raise DataError(f"{row.tap_id}: {text}. Tap tool {row.tool!r} with a hammer that measures force.")
     if questions := find_open_questions(measurement.remarks):
         codes = ", ".join(remark.code for remark in questions)
         raise DataError(
-            f"{row.tap_id}: open questions on the newest test of tool {row.tool!r} ({codes}). Answer them first."
+            f"{row.tap_id}: open questions on the newest test of tool {row.tool!r}. Answer them first: {codes}."
         )
     low, high = machine.mode.band_hz or (0.0, math.inf)
     in_band = [mode for mode in measurement.modes if low <= mode.frequency <= high]

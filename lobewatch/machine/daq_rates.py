@@ -178,7 +178,7 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
     try:
         entries = msgspec.json.decode(read_regular_file(path, MAX_SETTINGS_FILE_SIZE), type=list[StoredDevice])
         if any(entry.crc not in (0, entry.computed_crc) for entry in entries):
-            raise ValueError("changed since it was written")
+            raise ValueError("changed since lobewatch wrote this file")
         return entries
     except FileNotFoundError:
         return []

@@ -90,7 +90,7 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
         taps = [*_sort_by_time([*taps, *whole])]
     else:
         cure = f"Run {format_command('verify', folder)} for details"
-        text = "not in the journal and not used"
+        text = "not in the journal, so this file is not used"
         remarks += [unlisted_file_remark(path, text, cure) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
             text = f"{len(extra) - MAX_LISTED_FILES} more files, not in the journal and not used"
@@ -128,10 +128,10 @@ def find_file_fault(folder: Path, entry: TapEntry | RecordingFile) -> str:
         with open_regular_file(f"{folder}/{entry.file}") as file:
             size = os.fstat(file.fileno()).st_size
             if size != entry.size:
-                return f"{size} bytes instead of {entry.size} bytes"
+                return f"the file has {size} bytes instead of {entry.size} bytes"
             digest = hashlib.sha256(file.read()).hexdigest()
         if digest != entry.sha256:
-            return "changed since it was written (SHA-256 differs)"
+            return "the file changed since lobewatch wrote it (SHA-256 differs)"
     except FileNotFoundError:
         return "missing, but listed in the journal"
     except OSError as error:
@@ -151,23 +151,23 @@ def hash_file(path: Path) -> str:
 
 def tap_damage_remark(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:
     """Return the remark on a tap test with a damaged file."""
-    text = f"{fault}, so it is not used"
+    text = f"{fault}, so this tap test is not used"
     if is_given_up:
         return Remark("tap-lost", entry.file, text)
-    cure = f"Restore it from a backup, or run {format_command('rebuild', folder)} to continue without it"
+    cure = f"Restore the file from a backup, or run {format_command('rebuild', folder)} to continue without it"
     return Remark("tap-damaged", entry.file, text, cure)
 
 
 def missing_journal_remark(folder: Path, count: int) -> Remark:
     """Return the remark on tap files without a journal."""
-    return journal_damage_remark(Journal(folder).path, f"missing next to {count} tap file{'s' if count > 1 else ''}")
+    fault = f"missing although taps/ has {count} tap file{'s' if count > 1 else ''}"
+    return journal_damage_remark(Journal(folder).path, fault)
 
 
 def restore_toml_advice(folder: Path) -> str:
     """Return the remedy for a missing machine.toml next to tap tests."""
-    return (
-        f"Restore it from a backup, or run {format_command('rebuild', folder)} to use the copy in the newest tap test"
-    )
+    rebuild = format_command("rebuild", folder)
+    return f"Restore machine.toml from a backup, or run {rebuild} to use the copy in the newest tap test"
 
 
 def has_known_origin(folder: Path, entry: TapEntry) -> bool:
@@ -218,7 +218,7 @@ class MachineFolder:
         if format_path(path) != str(path):
             raise DataError(f"{format_path(path)}: the folder name is not UTF-8. Rename the folder.")
         if not self.toml.exists() and list_tap_files(self.path):
-            raise DataError(f"{self.toml}: missing next to tap tests. {restore_toml_advice(self.path)}.")
+            raise DataError(f"{self.toml}: missing, but the folder has tap tests. {restore_toml_advice(self.path)}.")
         if not self.toml.exists():
             cure = f"Run folder_files.make_machine_folder {self.path} to create a machine folder."
             raise DataError(f"{self.path}: no machine.toml. {cure}")

@@ -76,7 +76,7 @@ def make_machine_text(folder: Path, template: str) -> str:
     check_name(name, "folder")
     toml = folder / "machine.toml"
     if toml.exists():
-        raise DataError(f"{toml}: already exists. Choose another folder, or edit that file.")
+        raise DataError(f"{toml}: file already exists. Choose another folder, or edit this file.")
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
     quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
     return text.replace('"MACHINE_NAME"', quoted)

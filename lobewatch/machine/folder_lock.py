@@ -91,9 +91,9 @@ class FolderLock:
         except (FileNotFoundError, NotADirectoryError) as error:
             raise type(error)(error.errno, error.strerror, str(self._folder)) from error
         except OSError as error:
-            cure = "You can only read this folder. Copy it to a place with write access"
+            cure = "You can only read this folder. Copy the folder to a place with write access"
             if error.errno not in PERMISSION_ERRNOS:
-                cure = "This drive cannot lock files. Mount it with locks, or copy the folder to another drive"
+                cure = "This drive cannot lock files. Mount the drive with locks, or copy the folder to another drive"
             raise OSError(error.errno, join_sentences(error.strerror or "", cure), str(self._folder)) from error
 
     def _wait(self, handle: int, patience: float) -> None:
@@ -104,7 +104,7 @@ class FolderLock:
                 with contextlib.suppress(OSError, msgspec.MsgspecError):  # it has not written its name yet
                     content = read_regular_file(self._holder, MAX_SETTINGS_FILE_SIZE)
                     holder = msgspec.json.decode(content, type=LockHolder)
-                raise BusyError(f"{self._folder}: {holder} is writing here. Wait until it is done.")
+                raise BusyError(f"{self._folder}: {holder} is writing to this folder. Wait until the command ends.")
             time.sleep(LOCK_POLL_INTERVAL)
 
 

@@ -72,7 +72,7 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
     if tapped:
         clock = ", ".join(f"{time.astimezone():%H:%M}" for time in tapped)
         day, cure = f"{begin.astimezone():%Y-%m-%d}", "Give the time of the new baseline too"
-        raise ValueError(f"{day}: tap tests at {clock}. {cure}, such as MaintenanceEvent.time {day}T12:00:00.")
+        raise ValueError(f"{day} has tap tests at {clock}. {cure}, such as MaintenanceEvent.time {day}T12:00:00.")
 
 
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:
@@ -96,7 +96,9 @@ def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.Exclud
         if entry.excluded:
             raise ValueError(f"{entry.id} is already excluded, for {entry.excluded!r}")
         if not reason.strip():
-            raise ValueError(f"{entry.id}: the reason is missing. Give it with exclude_entry.reason.")
+            raise ValueError(
+                f"{entry.id}: the reason for the exclusion is missing. Give the reason with exclude_entry.reason."
+            )
         check_name(reason, "reason")
         folder.journal.append(make_entry("exclude", tap=entry.id, reason=reason))
     return entry
@@ -182,13 +184,13 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
         return
     option = f"CutEntry.chatter_frequency_hz {frequency:g}"
     if word == "stable":
-        raise ValueError(f"{option} contradicts a stable cut. Leave it out, or give CutEntry.has_chatter.")
+        raise ValueError(f"{option} contradicts a stable cut. Leave out the frequency, or give CutEntry.has_chatter.")
     if not 0 < frequency < 1e5:
         raise ValueError(f"{option} is not between 0 and 100000. Give the chatter frequency in Hz.")
     tooth = setting.tooth_frequency
     times = round(frequency / tooth)
     if times and abs(frequency - times * tooth) <= TOOTH_FREQUENCY_TOLERANCE * frequency:
-        cure = "Give the frequency of the chatter, or leave the option out."
+        cure = "Give the chatter frequency, or leave the option out."
         raise ValueError(f"{option} is {times} times the tooth passing frequency {tooth:g} Hz. {cure}")
 
 

@@ -34,15 +34,15 @@ def verify_cut_recordings(folder: Path, reading: JournalReading) -> Iterator[Rem
     cuts, given_up = journal_entries.read_committed_cuts(reading), journal_entries.read_given_up_ids(reading)
     mend = format_command("rebuild", folder)
     for recording, fault in _find_damaged_recordings(folder, cuts):
-        text = f"{fault}, but its stored result is used"
+        text = f"{fault}, but the stored result of the cut is used"
         if recording.id in given_up:
             yield Remark("cut-lost", recording.file, text)
         else:
-            cure = f"Restore it from a backup, or run {mend} to continue without it"
+            cure = f"Restore the file from a backup, or run {mend} to continue without it"
             yield Remark("cut-damaged", recording.file, text, cure)
     for path in _list_unlisted_cuts(folder, cuts):
-        cure = f"Run {mend} to enter it or to set it aside"
-        yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal and not used", cure)
+        cure = f"Run {mend} to enter the recording in the journal or to set it aside"
+        yield Remark("cut-unlisted", f"cuts/{path.name}", "not in the journal, so this file is not used", cure)
 
 
 def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
@@ -65,7 +65,7 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
             _move_to_damaged(folder, folder / lost.file)
         if lost.id not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=lost.id))
-            yield f"{lost.file}: lost, but its stored result is used"
+            yield f"{lost.file}: lost, but the stored result of the cut is used"
 
 
 def _find_damaged_recordings(folder: Path, cuts: Sequence[CutEntry]) -> list[tuple[RecordingFile, str]]:
@@ -122,7 +122,7 @@ def rebuild_files(path: Path) -> list[str]:
 def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
     """Yield lines that no copy of the journal has; n_fresh: newly entered tap tests in their place."""
     if not entries:
-        yield f"{JOURNAL_NAME}: unreadable, and so is its copy. {LOST_ENTRIES_ADVICE}"
+        yield f"{JOURNAL_NAME}: file and copy are unreadable. {LOST_ENTRIES_ADVICE}"
         return
     numbers = {entry["number"] for entry in entries if "number" in entry}
     first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
@@ -144,9 +144,9 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
             aside.unlink()
-            yield f"{entry.file}: restored under its own name"
+            yield f"{entry.file}: file restored under its own name"
         else:
-            yield f"{aside.relative_to(folder).as_posix()}: set aside, a copy of {entry.file}"
+            yield f"{aside.relative_to(folder).as_posix()}: set aside as a copy of {entry.file}"
 
 
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
@@ -176,7 +176,7 @@ def _record_lost_taps(folder: Path, journal: Journal) -> Iterator[str]:
             _move_to_damaged(folder, folder / entry.file)
         if name not in journal_entries.read_given_up_ids(reading):
             journal.append(make_entry("lost", tap=name))
-            yield f"{entry.file}: lost and no longer used. Restore it from a backup to use it again."
+            yield f"{entry.file}: lost and no longer used. Restore the file from a backup to use it again."
 
 
 def _is_temporarily_unreadable(path: Path) -> bool:
@@ -201,7 +201,7 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
             atomic_write(toml, text.encode())
             yield f"machine.toml: restored from the copy in {entry.file}"
             return
-    raise DataError(f"{toml}: missing, and no tap test has a copy. Restore it from a backup.")
+    raise DataError(f"{toml}: missing, and no tap test has a copy. Restore this file from a backup.")
 
 
 def _repair_devices_file(folder: Path) -> Iterator[str]:

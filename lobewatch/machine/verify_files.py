@@ -28,8 +28,8 @@ DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged"
 LOBEWATCH_FILES = {journal.JOURNAL_NAME, journal.JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml"}
 LOBEWATCH_FILES |= {"history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "taps", "cuts", "spool"}
 """Files and folders in a machine folder that are verified, or made again if they are deleted."""
-DELETION_ADVICE = "Delete it if you do not need it"
-ALTERED_TEXT = "changed or truncated since it was written"
+DELETION_ADVICE = "Delete this file or folder if you do not need it"
+ALTERED_TEXT = "file changed or truncated since lobewatch wrote it"
 """Fault of a file with a wrong checksum."""
 
 
@@ -72,7 +72,7 @@ def verify(path: Path) -> Verification:
     """
     if not (path / "machine.toml").is_file() and contents.list_tap_files(path):
         advice = contents.restore_toml_advice(path)
-        missing = Remark("file-damaged", "machine.toml", "missing next to tap tests", advice)
+        missing = Remark("file-damaged", "machine.toml", "missing, but the folder has tap tests", advice)
         return Verification((missing,), (), 0)
     folder = MachineFolder(path)
     entered = enter_orphaned_taps(folder)
@@ -125,19 +125,19 @@ def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is
     """Return the remark on a tap file without a line; original: committed tap test with the same content."""
     mend, entry = format_command("rebuild", folder), read_unverified_tap(path) if original is None else None
     if original is not None and is_needed:
-        finding = f"contains {original.file}", f"Run {mend} to rename it"
+        finding = f"contains tap test {original.file}", f"Run {mend} to rename the file"
     elif original is not None:
-        finding = f"copy of {original.file}", f"Run {mend} to set it aside"
+        finding = f"copy of {original.file}", f"Run {mend} to set the file aside"
     elif entry is None:
-        finding = "incomplete tap file, not in the journal", f"Run {mend} to set it aside"
+        finding = "incomplete tap file, not in the journal", f"Run {mend} to set the file aside"
     elif entry.id != path.stem:
-        finding = f"contains tap test {entry.id}", f"Run {mend} to rename it and enter it in the journal"
+        finding = f"contains tap test {entry.id}", f"Run {mend} to rename the file and enter the test in the journal"
     elif contents.has_known_origin(folder, entry):
         cure = f"Run {format_command('verify', folder)} again when no other program writes"
-        text = "not yet in the journal"
+        text = "tap file not yet in the journal"
         return Remark("not-entered", f"taps/{path.name}", text, cure)
     else:
-        cure = f"Run {mend} to enter it, or remove it from taps/ if it belongs to another machine"
+        cure = f"Run {mend} to enter the test in the journal, or remove the file if it belongs to another machine"
         finding = "complete tap file, not in the journal", cure
     return contents.unlisted_file_remark(path, *finding)
 
@@ -148,7 +148,7 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
         _ = folder.machine
     except (ValueError, OSError) as error:
         mend = format_command("rebuild", folder.path)
-        cure = f"Correct it, or move it away and run {mend} to use the copy in the newest tap test"
+        cure = f"Correct machine.toml, or move it away and run {mend} to use the copy in the newest tap test"
         yield Remark("file-damaged", "machine.toml", format_error(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
@@ -168,11 +168,11 @@ def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
     fault = ""
     try:
         if folder.history_path.exists() and read_rows(folder.history_path).is_damaged:
-            fault = "changed since it was written"
+            fault = "file changed since lobewatch wrote it"
     except OSError as error:
         fault = format_error(error).removeprefix(f"{folder.history_path}: ")
     if fault:
-        cure = f"Run {format_command('rebuild', folder.path)} to write it again"
+        cure = f"Run {format_command('rebuild', folder.path)} to write the file again"
         yield Remark("file-damaged", folder.history_path.name, fault, cure)
 
 
@@ -184,17 +184,19 @@ def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
-    known = {"report.html": ("reports are not verified", f"Run {format_command('report', folder)} to write it again")}
-    known["history.h5"] = "old cache, or an export", DELETION_ADVICE
+    known = {
+        "report.html": ("reports are not verified", f"Run {format_command('report', folder)} to write the report again")
+    }
+    known["history.h5"] = "old cache, or an exported history", DELETION_ADVICE
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield Remark("set-aside", path.name, "left over, or set aside", DELETION_ADVICE)
+            yield Remark("set-aside", path.name, "file left over, or set aside by lobewatch", DELETION_ADVICE)
         elif path.name not in LOBEWATCH_FILES:
             yield Remark("not-verified", path.name, *known.get(path.name, ("not a file of lobewatch",)))
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path not in files:
-            yield Remark("not-verified", f"taps/{path.name}", "not a tap file", "Remove it from taps/")
+            yield Remark("not-verified", f"taps/{path.name}", "not a tap file", "Remove the file from taps/")
 
 
 def _verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
@@ -219,22 +221,24 @@ def _verify_spooled(folder: Path, path: Path) -> Iterator[Remark]:
     """Verify a file or the folder of an interrupted test."""
     about, tap = path.relative_to(folder).as_posix(), format_command("tap", folder)
     if path.is_dir():
-        cure = f"Restore it from a backup, or run {tap} to continue with the others. {_deletion_advice(path)}"
-        yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _find_missing_hits(path))
+        cure = f"Restore the hit from a backup, or run {tap} to continue with the other hits. {_deletion_advice(path)}"
+        yield from (
+            Remark("file-damaged", f"{about}/{name}", "hit file missing", cure) for name in _find_missing_hits(path)
+        )
     elif path.suffix == ".h5" and not has_valid_checksum(read_regular_file(path)):
-        cure = f"Run {tap} to set it aside and continue with the others. {_deletion_advice(path.parent)}"
+        cure = f"Run {tap} to set the file aside and continue with the other hits. {_deletion_advice(path.parent)}"
         yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.name == "setup.json" and not _is_valid_setup(path):
-        cure = f"Run {tap} to set it aside and choose the setup again. {_deletion_advice(path.parent)}"
+        cure = f"Run {tap} to set the file aside and choose the setup again. {_deletion_advice(path.parent)}"
         yield Remark("file-damaged", about, ALTERED_TEXT, cure)
     elif path.suffix == ".tmp":
-        yield Remark("set-aside", about, "incomplete", f"Run {tap} to remove it")
+        yield Remark("set-aside", about, "incomplete file", f"Run {tap} to remove the file")
     elif path.suffix == ".damaged":
         yield Remark("set-aside", about, "damaged file of an interrupted test", DELETION_ADVICE)
 
 
 def _deletion_advice(test: Path) -> str:
-    return f"Delete {test} if the test is older than 12 hours, because it cannot be continued"
+    return f"Delete {test} if the test is older than 12 hours and cannot be continued"
 
 
 def _is_valid_setup(path: Path) -> bool:

@@ -39,5 +39,5 @@ def future_tap_remarks(tap_id: str, time: datetime, now: datetime, path: Path | 
     if is_in_future(time, now):
         entry = shlex.join([str(path), tap_id])
         out = f"folder_updates.exclude_entry {entry} exclude_entry.reason 'clock was wrong'"
-        cure = f"Set the clock. If it was wrong at that test, run {out} and tap again."
+        cure = f"Set the clock. If the clock was wrong during this test, run {out} and tap again."
         yield Remark("tap-in-future", f"tap test {tap_id}", f"date {time:%Y-%m-%d} is in the future", cure)

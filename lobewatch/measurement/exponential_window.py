@@ -70,13 +70,13 @@ class Window:
             If the time of the hit is unknown or before the start.
         """
         if self.hit_at is None and not hits:
-            cure = "Give it in s from the start of the record with Window.hit_at, or 0 if the window begins at the hit."
+            cure = "Give that time (s from the start of the record) with Window.hit_at, or 0 if the window begins then."
             raise ValueError(f"Window.time_constant {self.time_constant:g}: the time of the hit is unknown. {cure}")
         times = [acquisition.find_hit_time(hit) for hit in hits] if self.hit_at is None else [self.hit_at]
         hit_at = float(np.mean(times))
         if not hit_at >= self.start:
-            problem = f"the window begins after the hit at {hit_at:.4g} s (both from the start of the record)"
-            raise ValueError(f"Window.start {self.start:g}: {problem}")
+            problem = f"the window begins after the hit at {hit_at:.4g} s (both times from the start of the record)"
+            raise ValueError(f"Window.start {self.start:g}: {problem}. Correct Window.start or Window.hit_at.")
         return hit_at - self.start
 
 
@@ -86,7 +86,7 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     Raises ValueError if the time constant is unknown or contradicts the file.
     """
     if named is None and given is not None and np.isnan(given.time_constant):
-        cure = "Give its time constant (s) with Window.time_constant."
+        cure = "Give the time constant of the window (s) with Window.time_constant."
         raise ValueError(f"Window.hit_at, Window.start: the file declares no window. {cure}")
     if named is None:
         return given
@@ -94,11 +94,13 @@ def resolve_window(named: float | None, given: Window | None) -> Window | None:
     if np.isnan(window.time_constant):
         window = replace(window, time_constant=named)
     if np.isnan(window.time_constant):
-        cure = "Give it with Window.time_constant if the window is exponential, or export without a window."
+        cure = (
+            "Give it with Window.time_constant if the window is exponential, or export the response without a window."
+        )
         raise ValueError(f"the response has a window of unknown time constant. {cure}")
     if abs(window.time_constant / named - 1) > TIME_CONSTANT_TOLERANCE:
         option = f"Window.time_constant {window.time_constant:g}"
-        raise ValueError(f"{option}: the file states {named:.4g} s. Leave the option out.")
+        raise ValueError(f"{option}: the file states {named:.4g} s. Leave out the time constant.")
     return window
 
 
@@ -124,7 +126,7 @@ def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], floa
 def own_window_remark(about: str, time_constant: float, cure: str) -> Remark:
     """Return the remark on our own window over a mode, or over all hits for an empty subject."""
     text = f"{'vibration' if about else 'every hit'} outlasts the record"
-    text += f" (fitted with an exponential window of {time_constant:.3g} s, corrected)"
+    text += f" (fitted with an exponential window of {time_constant:.3g} s, whose damping is removed)"
     return Remark("windowed-here", about, text, cure)
 
 
@@ -147,7 +149,7 @@ def remove_recorded_window(
     rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
     kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]
     wider = (widen_for_window(mode, time_constant, record) for mode in kept)
-    text = f"not a mode, because it decays no faster than the window of {time_constant:.3g} s"
+    text = f"the peak is not a mode, because it decays no faster than the window of {time_constant:.3g} s"
     said = text, "Check Window.time_constant if all modes are affected"
     slow = [mode for mode, is_mode in zip(modes, rings, strict=True) if not is_mode]
     remarks = tuple(Remark("slower-than-window", f"{mode.frequency:.0f} Hz", *said) for mode in slow)
@@ -195,6 +197,6 @@ def hidden_window_remarks(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterato
         rate, sign = common_decay_rate(trusted), "all modes decay at the same rate"
         tau = None if rate is None else 1 / rate
     if tau is not None:
-        text = f"{sign}, as with an exponential window of {tau:.2g} s: zeta and K read too high"
-        cure = "Give the window with Window.time_constant, or export without a window"
+        text = f"{sign}, as with an exponential window of {tau:.2g} s: zeta and stiffness K read too high"
+        cure = "Give the time constant with Window.time_constant, or export the response without a window"
         yield Remark("window-suspected", "", text, cure)

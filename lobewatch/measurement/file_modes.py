@@ -62,7 +62,8 @@ def read_file_frf(
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:
-        raise ValueError(f"Description.averages {averages}: lobewatch counts the hits of {path.name}. Leave it out.")
+        finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
+        raise ValueError(f"{finding}. Leave out the number of averages.")
     frf = _average_hits(path, recording.hits, accepted, description)
     return replace(frf, facts=recording.facts, recorded_window=recording.window)
 
@@ -105,7 +106,9 @@ def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
     accepted = HitFlags.OK
     for code in codes:
         if code not in flags:
-            raise ValueError(f"fit_file_modes.accept {code}: not accepted. Choose from {', '.join(flags)}.")
+            raise ValueError(
+                f"fit_file_modes.accept {code}: this code cannot be accepted. Choose from {', '.join(flags)}."
+            )
         accepted |= flags[code]
     return accepted
 
@@ -117,11 +120,11 @@ def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
         if averages < 1:
             raise ValueError(f"{option}: not above 0. Give the number of averaged hits.")
         if frf.coherence is None:
-            raise ValueError(f"{option}: {path.name} has no coherence. Leave it out.")
+            raise ValueError(f"{option}: {path.name} has no coherence. Leave out the number of averages.")
         return FileFrf(replace(frf, n_averages=averages))
     if frf.coherence is None or frf.n_averages > 1:
         return FileFrf(frf)
-    inferred, cure = acquisition.infer_averages(frf), "Give it with Description.averages"
+    inferred, cure = acquisition.infer_averages(frf), "Give the number of averages with Description.averages"
     if inferred is None:
         text = "coherence not used, because the number of averages is unknown"
         return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))
@@ -224,7 +227,7 @@ def fit_file_modes(
     if file_frf.frf is None:
         if window is not None or conjugate:
             fields = "Window.time_constant, Window.hit_at and fit_file_modes.conjugate"
-            raise ValueError(f"{fields} need a measured force. Leave them out.")
+            raise ValueError(f"{fields} need a measured force. Leave out all three.")
         return _fit_decay_modes(path, file_frf, band, by_hand, sensor)
     frf, hits = file_frf.frf, file_frf.hits
     if conjugate:
@@ -262,7 +265,7 @@ def _fit_decay_modes(
 ) -> FileModes:
     """Fit the modes of hits without force; DataError if a window adds damping to them."""
     if decays.recorded_window is not None:
-        raise DataError(f"{path}: the response has a window, which adds damping. Export it without a window.")
+        raise DataError(f"{path}: the response has a window, which adds damping. Export the response without a window.")
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
@@ -274,11 +277,16 @@ def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | No
     yield from check_modes_together(modes)
     for edge in modal.find_truncated_peaks(frf, modes, band):
         text = "a mode may be missing, because a peak is cut off at the edge of the band"
-        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "Widen the band, with a harder tip if necessary")
+        yield Remark(
+            "mode-missing-at-edge",
+            f"{edge:.0f} Hz",
+            text,
+            "Widen the frequency band, with a harder hammer tip if necessary",
+        )
     if band is None:
         yield from _peaks_beyond_remarks(frf)
     if not modes:
-        yield Remark("no-mode", "", "no mode found", "Check the band, and hit hard enough")
+        yield Remark("no-mode", "", "no mode found", "Check the frequency band, and hit harder")
 
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
@@ -290,7 +298,7 @@ def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:
     if len(peaks) > MAX_LISTED_PEAKS:
         where = f"{len(peaks)} frequencies from {peaks[0]:.0f} to {peaks[-1]:.0f}"
     text = f"peaks at {where} Hz not fitted, because they are above the usable band ({frf.usable_band[1]:.0f} Hz)"
-    yield Remark("peaks-beyond", "", text, "Use a harder tip")
+    yield Remark("peaks-beyond", "", text, "Use a harder hammer tip")
 
 
 def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
@@ -308,13 +316,13 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     """
     remarks = []
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
-        text = "K is negative for all modes, because hammer or sensor is mounted or wired in reverse"
-        remarks.append(Remark("sign-swapped", "", text, "Reverse it, or change the sign of its sensitivity"))
+        text = "stiffness K is negative for all modes, because hammer or sensor is mounted or wired in reverse"
+        remarks.append(Remark("sign-swapped", "", text, "Reverse the sensor, or change the sign of its sensitivity"))
     delay = modal.common_delay(modes)
     if delay is not None:
         late = format_with_error(delay.skew, delay.skew_std, 1e-6)
         text = f"phase grows with frequency for all modes: response sampled {late} us late"
-        cure = "Measure the delay with sensor_checks.check_skew, or add it to the accelerometer's skew_us"
+        cure = "Measure the delay with sensor_checks.check_skew, or add the delay to skew_us of the accelerometer"
         remarks.append(Remark("channel-delay", "", text, cure))
     return remarks
 
@@ -369,7 +377,7 @@ def match_modes_across_files(file_modes: FileModes, beside: Sequence[str], other
     numbers = [modes.extraction.frf.receptance for modes in (file_modes, *others)]
     for place, (text, new) in enumerate(zip(beside, numbers[1:], strict=True), 1):
         if any(np.array_equal(new, earlier) for earlier in numbers[:place]):
-            problem = "same data as another measurement. Name a different one."
+            problem = "same data as another measurement. Name a different measurement."
             raise ValueError(f"list_comparison_files.beside {text}: {problem}")
     found = [other.fitted for other in others]
     as_recorded, fitted = (modal.match_modes(modes, found) for modes in (file_modes.as_recorded, file_modes.fitted))

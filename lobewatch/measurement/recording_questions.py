@@ -41,7 +41,8 @@ class RecordingQuestion:
 FREQUENCY_JUMP = RecordingQuestion(
     "frequency-jump",
     0.15,
-    "frequency {now:.1f} Hz is {percent:+.0f} % off the newest test ({last:.1f} Hz): wrong machine, tool or direction?",
+    "frequency {now:.1f} Hz differs by {percent:+.0f} % from the newest test ({last:.1f} Hz): "
+    "wrong machine, tool or direction?",
 )
 """Limit: relative change of the frequency since the newest test of the series, either way; chosen."""
 NO_MODE_IN_BAND = RecordingQuestion("no-mode-in-band", sentence="no mode with positive stiffness{place} ({peaks})")
@@ -55,7 +56,7 @@ NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
 STIFFNESS_JUMP = RecordingQuestion(
     "stiffness-jump",
     1.5,
-    "K {now} N/um is {ratio:.2g} times that of the newest test ({last} N/um), but the frequency changed only "
+    "stiffness K {now} N/um is {ratio:.2g} times that of the newest test ({last} N/um), but the frequency changed only "
     "{percent:g} %: gain, range, sensitivity or hit point changed?",
 )
 """Limit: ratio of K, and of K / f_n^2, to the newest test of the series, or the inverse; chosen.
@@ -65,7 +66,8 @@ mostly switched by 2 and more."""
 STIFFNESS_OFF_MODEL = RecordingQuestion(
     "stiffness-off-model",
     4.0,
-    "K {now} N/um is {ratio:.2g} times that of the model ({model} N/um): wrong machine, [spindle] or sensitivity?",
+    "stiffness K {now} N/um is {ratio:.2g} times that of the model ({model} N/um): "
+    "wrong machine, [spindle] or sensitivity?",
 )
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
@@ -117,7 +119,7 @@ def no_mode_remark(modes: Sequence[Mode], machine: Machine) -> Remark:
     """Return the question about a recording without a mode to follow; modes: all that were found."""
     low, high = machine.mode.band_hz or (0.0, np.inf)
     place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
-    peaks = f"found: {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "no modes found"
+    peaks = f"modes found: {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "no modes found"
     return NO_MODE_IN_BAND.ask(place=place, peaks=peaks)
 
 
@@ -185,7 +187,9 @@ def accept_questions(
 def format_not_asked(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[str, Sequence[str]]) -> str:
     """Return the sentence on codes that tap tests do not ask, with their open questions."""
     still_open = ", ".join(f"{tap_id}: {' '.join(open_codes)}" for tap_id, open_codes in asked.items())
-    text = f"accept_questions.codes {' '.join(codes)}: not an open question of {', '.join(tap_ids)} (stored)"
+    text = (
+        f"accept_questions.codes {' '.join(codes)}: not an open question of the stored tap tests {', '.join(tap_ids)}"
+    )
     return f"{text}. Open questions: {still_open or 'none'}."
 
 

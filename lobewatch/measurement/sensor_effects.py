@@ -43,7 +43,7 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
     bare = remove_sensor_mass(frf, sensor.mass)
     state, modes, remarks = fit(bare)
     if not _is_driving_point(modes):
-        remark = _mass_not_removed_remark(sensor, "not the driving point (a K is negative)")
+        remark = _mass_not_removed_remark(sensor, "sensor not at the driving point (a stiffness K is negative)")
         state, modes, remarks = fit(frf)
         return FrfFit(state, modes, (*remarks, remark))
     modes = tuple(modal.with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
@@ -57,7 +57,10 @@ def _mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:
 
 
 def _format_sensor_mass(sensor: SensorLoading) -> str:
-    return f"{1e3 * (sensor.mass or 0.0):.3g} ± {1e3 * sensor.mass_std:.1g} g of accelerometer and cable"
+    return (
+        f"{1e3 * (sensor.mass or 0.0):.3g} g of accelerometer and cable "
+        f"(standard deviation {1e3 * sensor.mass_std:.1g} g)"
+    )
 
 
 def _trusted_driving_point_modes(modes: Sequence[Mode], frf: Frf) -> list[Mode]:
@@ -79,8 +82,10 @@ def _unknown_mass_remarks(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
         fall = 1 - (1 - 2 * loading.frequency) ** -0.5  # also where the modal mass is far below 10 g
         stiffness = f" and stiffness by {round(100 * loading.stiffness):+d} %" if fall < MAX_FIRST_ORDER_DROP else ""
         changes = f"the frequency by {-100 * fall:.2g} %{stiffness}"
-        text = f"sensor mass unknown: {1e3 * TYPICAL_SENSOR_MASS:g} g would change {changes}, beyond the interval"
-        cure = "Enter [tap] sensor_mass_g (0 without a sensor on the structure), or fit_file_modes.sensor for a file"
+        text = f"sensor mass unknown: {1e3 * TYPICAL_SENSOR_MASS:g} g would change {changes}, beyond the 95 % interval"
+        cure = (
+            "Enter [tap] sensor_mass_g (0 without a sensor on the structure), or give fit_file_modes.sensor for a file"
+        )
         yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", text, cure)
 
 
@@ -94,9 +99,15 @@ def _mounting_remarks(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) ->
     worst = [pair for pair, limit in zip(biased, limits, strict=True) if pair[1] > limit]
     if worst:
         mode, bias = max(worst, key=lambda pair: pair[1])
-        text = f"resonance at about {resonance / 1e3:g} kHz makes K read about {100 * min(bias, 1.0):.0f} % low"
+        text = (
+            f"resonance at about {resonance / 1e3:g} kHz makes stiffness K read about {100 * min(bias, 1.0):.0f} % low"
+        )
         held = f"held by {sensor.mounting}" if sensor.mounting else "with unknown mounting (magnet assumed)"
-        cure = "Use a stud, glue or wax" if sensor.mounting else "Enter [tap] mounting (stud, glue and wax are fine)"
+        cure = (
+            "Mount the accelerometer with a stud, glue or wax"
+            if sensor.mounting
+            else "Enter [tap] mounting (stud, glue or wax avoid this error)"
+        )
         yield Remark("mounting-resonance", f"{mode.frequency:.0f} Hz", f"accelerometer {held}: {text}", cure)
 
 
@@ -121,4 +132,4 @@ def decay_remarks(sensor: SensorLoading) -> list[Remark]:
     """Return the remarks on what free decays cannot tell."""
     text = "no force measured: only frequency and damping, no stiffness and no stability lobes"
     remark = Remark(NO_FORCE_CODE, "", text, "Tap with an instrumented hammer")
-    return [remark, *([_mass_not_removed_remark(sensor, "the correction needs K")] if sensor.mass else [])]
+    return [remark, *([_mass_not_removed_remark(sensor, "the correction needs stiffness K")] if sensor.mass else [])]

@@ -52,7 +52,7 @@ def scheduler_remarks(address: str) -> list[Remark]:
     scheme, host = _parse_scheduler_address(address)
     if scheme in ENCRYPTED_SCHEMES or _is_local_host(host):
         return []
-    text = "not encrypted: anyone with access can run programs on all its computers and on this one"
+    text = "connection not encrypted: anyone with access can run programs on this computer and on all workers"
     return [Remark("scheduler-open", f"Workers.scheduler {address}", text, "Use tls:// (docs/several-computers.md)")]
 
 
@@ -63,7 +63,7 @@ def _parse_scheduler_address(address: str) -> tuple[str, str]:
 
         return parse_address(address)[0], get_address_host_port(address)[0]
     except ImportError as error:
-        cure = 'Install it with pip install "lobewatch[fleet]".'
+        cure = 'Install Dask with pip install "lobewatch[fleet]".'
         raise DataError(f"Workers.scheduler {address}: Dask is missing. {cure}") from error
     except ValueError as error:
         allowed = "Give tls://HOST:PORT or tcp://HOST:PORT."
@@ -102,7 +102,7 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
             thread.submit(asyncio.run, _probe_scheduler(address)).result()
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as error:
-        cure = 'Start one with "dask scheduler" (for tls:// see docs/several-computers.md).'
+        cure = 'Start a scheduler with "dask scheduler" (for tls:// see docs/several-computers.md).'
         raise DataError(f"{option}: no Dask scheduler answers ({error}). {cure}") from error
     with client:
         _wait_for_workers(client, address)
@@ -113,7 +113,7 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
         except KilledWorker as error:
             raise DataError(f"{option}: a task crashed several workers ({error})") from error
         except ModuleNotFoundError as error:
-            raise DataError(f"{option}: {error} on a worker. Install lobewatch there as well.") from error
+            raise DataError(f"{option}: {error} on a worker. Install lobewatch on all workers.") from error
         except (CancelledError, OSError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise
@@ -127,7 +127,7 @@ def _wait_for_workers(client: Any, address: str) -> None:
         if client.status != "running":
             raise CancelledError
         if time.monotonic() - begin > WORKER_TIMEOUT:
-            raise DataError(f'Workers.scheduler {address}: no workers. Start some with "dask worker {address}".')
+            raise DataError(f'Workers.scheduler {address}: no workers. Start workers with "dask worker {address}".')
         time.sleep(WORKER_START_POLL_INTERVAL)
 
 
@@ -159,7 +159,8 @@ class Workers:
 
     def __post_init__(self) -> None:
         if self.jobs > 1 and self.scheduler:
-            raise ValueError(f"Workers.jobs {self.jobs} and Workers.scheduler {self.scheduler} exclude each other")
+            given = f"Workers.jobs {self.jobs} and Workers.scheduler {self.scheduler}"
+            raise ValueError(f"{given} are both given. Leave out one of the two.")
 
     @property
     def use_other_processes(self) -> bool:
@@ -206,7 +207,7 @@ def share_work(
             yield take()
     if refused:
         kinds = ", ".join(dict.fromkeys(refused))
-        _log.warning("invalid answers of workers (%s): %d, computed here instead", kinds, len(refused))
+        _log.warning("invalid answers of workers (%s): %d, computed on this computer instead", kinds, len(refused))
 
 
 @contextmanager
@@ -240,7 +241,9 @@ def _collect_answer(team: WorkerPool, future: Future[Any]) -> object:
     if not (isinstance(answer, tuple) and len(answer) == 2 and isinstance(answer[0], SoftwareVersions)):
         return TypeError()
     if answer[0] != CURRENT_SOFTWARE:
-        raise DataError(f"a worker has {answer[0].text}, not {CURRENT_SOFTWARE.text}. Install the same on all.")
+        raise DataError(
+            f"a worker has {answer[0].text}, not {CURRENT_SOFTWARE.text}. Install the same versions on all computers."
+        )
     return answer[1]
 
 

@@ -69,7 +69,7 @@ def build_model_state(machine: Machine, newest: Measurement | None, tool: str | 
     calibration = newest.calibration if newest else None
     if newest is None or calibration is None:
         return ModelState(machine, wanted, drawn, reference, None, "machine.toml, not calibrated yet")
-    origin = f"tap test {newest.tap_id}: {calibration.bearing_stiffness / 1e6:.1f} N/um on average"
+    origin = f"tap test {newest.tap_id}: {calibration.bearing_stiffness / 1e6:.1f} N/um on average per bearing"
     drawn, reference = (_copy_bearings(calibration.spindle, shaft) for shaft in (drawn, reference))
     return ModelState(machine, wanted, drawn, reference, newest, origin)
 
@@ -113,7 +113,7 @@ def compute_model_frf(state: ModelState) -> Frf:
     """
     machine, table = state.machine, state.machine.spindle
     if table is None:
-        raise DataError("no spindle model. Add a [spindle] table.")
+        raise DataError("no spindle model. Add a [spindle] table to machine.toml.")
     first = float(dsm.natural_frequencies(state.spindle, 1)[0])
     frequency = np.linspace(MODEL_FRF_BAND[0] * first, MODEL_FRF_BAND[1] * first, 2 * MODEL_FRF_POINTS)
     followed = state.measurement.followed if state.measurement else None

@@ -132,7 +132,7 @@ def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tup
 
 def mode_edits_remarks(by_hand: ModeEdits) -> tuple[Remark, ...]:
     """Return the remark on mode edits; none without any."""
-    return (Remark("modes-by-hand", str(by_hand), "modes chosen by hand"),) if by_hand else ()
+    return (Remark("modes-by-hand", str(by_hand), "modes chosen by the user"),) if by_hand else ()
 
 
 def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
@@ -162,7 +162,7 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
     remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
     if machine.tap.position_mm:
         text = "cross tap not used, because it was not at the tool tip ([tap] position_mm)"
-        remarks.append(Remark("cross-beside-tip", "", text, "Repeat it at the tip"))
+        remarks.append(Remark("cross-beside-tip", "", text, "Repeat the cross tap at the tool tip"))
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
     results = {"followed": followed, "cross": at_tip, "remarks": (*remarks, *trusted.remarks)}
@@ -225,7 +225,7 @@ def _check_calibration(calibration: Calibration, followed: Mode, last: Mode | No
         cure = "Compare [spindle] with the drawing, and [mode] model_mode with the tapped mode"
     elif not 1 / MAX_STIFFNESS_CHANGE_RATIO <= ratio <= MAX_STIFFNESS_CHANGE_RATIO:
         then, now = (format_rounded(stiffness, scale=1e6, digits=3) for stiffness in (before, followed.stiffness))
-        text = f"K changed from {then} to {now} N/um since the test before ({ratio:.2g} times)"
+        text = f"stiffness K changed from {then} to {now} N/um since the previous test ({ratio:.2g} times)"
         cure = "Tap again, and check hit point and sensitivities of hammer and accelerometer"
     else:
         return None
@@ -240,7 +240,7 @@ def _transfer_to_tip(
         return []
     if trusted.opposed:
         where = ", ".join(f"{mode.frequency:.0f}" for mode in trusted.opposed)
-        text = f"no stability lobes, because K is negative at {where} Hz (not a driving point)"
+        text = f"no stability lobes, because stiffness K is negative at {where} Hz (not a driving point)"
         cure = "Hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
         remarks.append(Remark("no-lobes-driving-point", "", text, cure))
         return []

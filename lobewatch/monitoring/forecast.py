@@ -171,7 +171,8 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
     """Fit all shapes to a series over its increasing dates (n,)."""
     at, y = dates - dates[:1].sum(), readings.y
     if y.size < MIN_FORECAST_POINTS or at[-1] <= 0:
-        raise ValueError(f"{y.size} points on {np.unique(at).size} dates, but a forecast needs {MIN_FORECAST_POINTS}")
+        needed = f"a forecast needs {MIN_FORECAST_POINTS} points on several dates"
+        raise ValueError(f"{y.size} points on {np.unique(at).size} dates, but {needed}")
     places = _average_neighbors(at)
     base = build_level_model(_average_readings(readings))
     families = trend_shapes.fit_shapes(base, places)

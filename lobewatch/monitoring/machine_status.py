@@ -70,7 +70,7 @@ def _describe_change(change: SeriesChange) -> dict[str, str]:
     """Describe trend and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
     past, present = ("dropped", "dropping") if change.size > 0 else ("rose", "rising")
     ratio = math.exp(-change.size / 100)
-    size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} %"
+    size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} % (95 % interval)"
     course = f"{past} suddenly before" if change.kind == "step" else f"has been {present} since"
     return {"course": course, "change": size}
 

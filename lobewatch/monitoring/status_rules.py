@@ -154,19 +154,19 @@ PROGRAM_NOT_STABLE = StatusRule(
 )
 UNREADABLE = StatusRule("unreadable", UNKNOWN, "{reason}")
 NEVER_TAPPED = StatusRule(
-    "never-tapped", UNKNOWN, "no tap test {since}", "Take the first tap test, the reference for all others"
+    "never-tapped", UNKNOWN, "no tap test {since}", "Take the first tap test, the reference for all later tests"
 )
 FREQUENCY_WARNING = StatusRule(
     "frequency-warn",
     WARN,
     "frequency dropped {drop:.1f} % since the first tests (warning at {limit:g} %)",
-    "Repeat the tap test. If it confirms the drop, inspect bearings and clamping soon.",
+    "Repeat the tap test. If the second test confirms the drop, inspect bearings and clamping soon.",
     is_limit=True,
 )
 DOUBTFUL_DECAY = StatusRule(
     "decay-doubtful",
     WARN,
-    "frequency of the newest test is lower than before",
+    "frequency of the newest test is lower than in earlier tests",
     "Reclamp the tool, then run TapSession.run {folder} Conditions.reclamped to check the drop",
 )
 MODE_LOST = StatusRule(
@@ -176,12 +176,14 @@ MODE_LOST = StatusRule(
     "Repeat the tap test",
 )
 OVERDUE = StatusRule("overdue", WARN, "tap test overdue by {days}", "Take the tap test")
-PROGRAM_UNKNOWN = StatusRule("program-unknown", WARN, "{stability}", "Run Logbook.verdicts for the reason")
+PROGRAM_UNKNOWN = StatusRule(
+    "program-unknown", WARN, "{stability}", "Run Logbook.verdicts for the reason of this verdict"
+)
 PROGRAM_DOUBTFUL = StatusRule(
     "program-doubtful",
     WARN,
     "{stability}",
-    "Run Logbook.verdicts for the cause, and for safe values until then",
+    "Run Logbook.verdicts for the cause of this verdict and for safe values",
 )
 FREQUENCY_ROSE = StatusRule(
     "frequency-rose", GOOD, "frequency rose by {change} (assembly changed?)", "Run {event} if the assembly was changed"
@@ -220,7 +222,7 @@ STATUS_RULES = (
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}
 """Status by remark code, in order of severity."""
-UNREADABLE_NEXT_STEP = "Repair or restore the file named above"
+UNREADABLE_NEXT_STEP = "Repair or restore the unreadable file"
 """Next step for a machine that cannot be read."""
 
 

@@ -78,7 +78,7 @@ class _BrokerThread(threading.Thread):
             from paho.mqtt import client as paho
             from paho.mqtt.enums import CallbackAPIVersion
         except ImportError as error:
-            raise DataError('MQTT needs paho-mqtt. Install it with: pip install "lobewatch[mqtt]"') from error
+            raise DataError('MQTT needs paho-mqtt. Install this package with: pip install "lobewatch[mqtt]"') from error
         client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
         # For each address of a name: the second has a chance where one is silent.
         client.connect_timeout = MQTT_TIMEOUT / 2

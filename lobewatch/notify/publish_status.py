@@ -34,7 +34,9 @@ LAST_PUBLISHED_FILE, FLEET_LAST_PUBLISHED_FILE = "told.json", ".lobewatch-told.j
 """Files of the last published messages, in a machine folder and in the folder of a fleet."""
 REPUBLISH_INTERVAL = timedelta(hours=23)
 """Time after which an unchanged status is published again, for daily jobs; chosen."""
-MISSING_FOLDER_REASON = "its folder is missing (to forget it: lobewatch status {folder} --notify --forget {key})"
+MISSING_FOLDER_REASON = (
+    "the machine folder is missing (to forget this machine: lobewatch status {folder} --notify --forget {key})"
+)
 """Reason for a machine that was published and is missing now."""
 
 
@@ -145,7 +147,7 @@ def _print_failures(brokers: Iterable[Broker], failures: Mapping[Broker, str]) -
     for broker in brokers:
         failure = failures.get(broker, "")
         if failure:
-            text = join_sentences(f"note: status not published to {failure}", "The next command publishes it")
+            text = join_sentences(f"note: status not published to {failure}", "The next command publishes the status")
             notes.print(text, markup=False)
         if broker.password_warning and broker.password_warning not in failure:
             notes.print(f"note: {broker.address}: {broker.password_warning}", markup=False)

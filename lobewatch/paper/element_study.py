@@ -79,12 +79,16 @@ def element_section(spindle: Spindle) -> NumberGroup:
     right, other, wrong = _cantilever_roots(-1.0, False), _cantilever_roots(1.0, False), _cantilever_roots(-1.0, True)
     solver = "compared with an eigenvalue solver, 26 segments at 1722 Hz: correct as printed"
     rpm = ELEMENT_SPEED_RPM
-    rounding = f"signs corrected, 26 segments, {rpm:.0f} rpm: rounding. At speed 0 A B^-1 {at_rest}, ours does."
-    near = f"speed 1e-6 off 1722 Hz. At exactly that speed A B^-1 {at_speed}, ours does."
+    rounding = f"signs corrected, 26 segments, {rpm:.0f} rpm: rounding. At speed 0 A B^-1 {at_rest}, our element does."
+    near = f"speed 1e-6 off 1722 Hz. At exactly 1722 Hz A B^-1 {at_speed}, our element does."
     shapes = f"cantilever with unequal axes: {right[0]:.5f} with the correct sign, which changes the shapes only"
-    symmetric = "largest entry: end forces printed with one sign. With the correct signs K is symmetric."
+    symmetric = (
+        "largest entry: end forces printed with one sign. With the correct signs the stiffness matrix is symmetric."
+    )
     highest = f"{ROOT_SCAN_FREQUENCIES[-1]:.0f} rad/s"
-    none = f"number of frequencies of that cantilever below {highest}, assembled as printed. Correct: {len(right)}."
+    none = (
+        f"number of natural frequencies of the cantilever below {highest}, assembled as printed. Correct: {len(right)}."
+    )
     numbers = (
         Comparison("error of the roots", "(14)-(16)", None, root_error, "-", 1, solver),
         Comparison("error of A B^-1", "(17)-(25)", None, error, "-", 1, rounding),

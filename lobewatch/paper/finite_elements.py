@@ -47,7 +47,8 @@ def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, bearings
 def _mesh(spindle: Spindle, elements: int) -> tuple[Floats, Floats]:
     """Return element lengths (m), and EI (N m^2), kappa GA (N), mass per length (kg/m), rho I (kg m), shape (4, n)."""
     if elements < len(spindle.segments):
-        raise ValueError(f"elements={elements} is less than the {len(spindle.segments)} segments. Give one for each.")
+        cure = "Give at least one element for each segment."
+        raise ValueError(f"elements={elements} is less than the {len(spindle.segments)} segments. {cure}")
     length, outer, bore = np.array([(s.length, s.outer_diameter, s.bore_diameter) for s in spindle.segments]).T
     count = np.ones(length.size, dtype=int)
     for _ in range(elements - length.size):
@@ -166,15 +167,15 @@ def mesh_section(study: FiniteElementStudy) -> NumberGroup:
     ours = (straight / study.exact["euler-bernoulli"] - 1) * 100
     off = {kind: f"{format_share(study.error(kind), '+')} off exact theory" for kind in study.exact}
     mesh = f"linear with shear, the default of BEAM188: {off['linear']}, so neither shear nor mesh explains 2367 Hz"
-    softer = "shear and rotary inertia lower f1, so a model with them is below one without, never above"
-    apart = f"same number of elements, {off['euler-bernoulli']}, by code independent of the model"
+    softer = "shear and rotary inertia lower f1, so f1 of a model with both effects is never higher"
+    apart = f"same number of elements, {off['euler-bernoulli']}, computed by code independent of the model"
     name = f"{printed.FEM_ELEMENTS} elements"
-    held = "clamped in all bearings, the stiffest support: still below"
+    held = f"clamped in all bearings, the stiffest support: still below {printed.FEM_FREQUENCY:.0f} Hz"
     numbers = (
         Comparison(f"f1, {name}", "", printed.FEM_FREQUENCY, straight, "Hz", 6, mesh),
         Comparison("excess over f1 of the model", "", above, ours, "%", 3, softer),
         Comparison("f1, cubic without shear", "", None, plain, "Hz", 7, apart),
-        Comparison("f1, cubic with shear", "", None, cubic, "Hz", 7, f"same number, {off['timoshenko']}"),
+        Comparison("f1, cubic with shear", "", None, cubic, "Hz", 7, f"same number of elements, {off['timoshenko']}"),
         Comparison("f1, cubic with shear, clamped", "", None, study.clamped, "Hz", 6, held),
     )
     return NumberGroup("Finite elements, rigid bearings", ("convergence",), numbers)

@@ -76,8 +76,8 @@ def lobe_section(study: LobeStudy) -> NumberGroup:
     """Return the numbers of the lobes."""
     before, after = study.pocket
     deepest = f"deepest pocket below {LOBE_SPEEDS_RPM[-1]:.0f} rpm, two flutes"
-    moved = f"x {after / before:.3f}: shifts with f1, independent of K"
-    text = "limit at the speed of the new pocket, old over new"
+    moved = f"x {after / before:.3f}: the pocket shifts with f1, independent of stiffness K"
+    text = "old limit over new limit at the speed of the new pocket"
     rule, model = study.pocket_limit_ratio(study.by_rule), study.pocket_limit_ratio(study.by_model)
     numbers = (
         *_limit_numbers(study),
@@ -118,8 +118,8 @@ def _further_numbers(study: LobeStudy) -> list[Comparison]:
         lowest, median, worst = (100 * error for error in study.errors_of_one_mode(first, several))
         beginning = f"one mode, {name}"
         method = {"zero order": "ZOA"}.get(several.method, several.method)
-        claim = f"error of the lowest limit, 1 mode instead of 6 ({method}): a claim of its reference [18]"
-        side = "on the side of a pocket, which other modes shift"
+        claim = f"error of the lowest limit, 1 mode instead of 6 ({method}): a claim of reference [18] of the paper"
+        side = "error on the side of a pocket, which other modes shift"
         rows += [
             Comparison(f"{beginning}: lowest", "", None, lowest, "%", 2, claim),
             Comparison(f"{beginning}: median", "", None, median, "%", 2, "absolute error over all speeds"),

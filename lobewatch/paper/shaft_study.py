@@ -86,11 +86,12 @@ def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, N
 
 def _numbers_at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     fitted = "residual of the surrogate fit"
-    same = "same number. The paper's dimensions are not public, ours are fitted to its frequencies."
+    same = "same number as in the paper. The surrogate's dimensions are fitted to the printed frequencies."
     excess = (plain.rigid_frequency / printed.FREQUENCY - 1) * 100
-    rounded = f"the paper rounds {(printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100:.1f} %, the rest is the fit"
-    theory = "a calibrated stiffness is an equivalent stiffness of its beam theory"
-    left = "ratio of the two above"
+    unrounded = (printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100
+    rounded = f"the paper rounds {unrounded:.1f} %, the rest is the error of the fit"
+    theory = "a calibrated bearing stiffness is valid only for the beam theory of its model"
+    left = "ratio of the bearing stiffness for 1550 Hz to that for 1722 Hz"
     (new, old), stiff, soft = plain.printed_frequencies, printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
     return [
         Comparison("segments", "Fig. 3", printed.SEGMENTS, len(plain.rigid.segments), "", 2, same),
@@ -118,7 +119,9 @@ def _spinning_numbers(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
     for i, (name, where, value, exact) in enumerate(pairs):
         off = format_share(value / exact - 1, "+")
         reason = lifted if i else f"{lifted}, but shear and rotary inertia lower f1 more"
-        text = f"exact: 60 f1, {exact:.0f} rpm with the paper's f1. The paper is {off} off (read from its figure?)."
+        text = (
+            f"exact: 60 f1, {exact:.0f} rpm with the paper's f1. The printed speed is {off} off (read from a figure?)."
+        )
         rows += [
             Comparison(name, where, value, plain.critical_speeds[i], "rpm", 6, text),
             Comparison(f"{name}, shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
@@ -161,10 +164,10 @@ def stiffness_section(study: StiffnessStudy) -> NumberGroup:
     rounded = "0.9 x 1722, rounded in the paper"
     rule = "equal in every printed digit: K_theo follows from this rule, not from (30) to (36)"
     off = format_share(study.linearized[1] / study.static[1] - 1, "+")
-    cost = f"linearised at 1550 Hz, {off} off the exact value, and for another shaft"
-    exact = "term 0 of the dynamic stiffness, exact"
+    cost = f"linearised at 1550 Hz, {off} off the exact value, and the surrogate is not the paper's shaft"
+    exact = "first term of the power series of the dynamic stiffness in frequency, exact"
     part = "by (30) to (36) at both frequencies: the bearings are only part of the compliance"
-    shown = "seen in an FRF and needed for lobes: hardly drops"
+    shown = "the modal stiffness, seen in an FRF and needed for lobes, hardly drops"
     numbers = (
         Comparison("f1, old", "", printed.OLD_FREQUENCY, 0.9 * printed.FREQUENCY, "Hz", 5, rounded),
         Comparison("K_theo by the rule 0.9 K_exp", "(36)", old, 0.9 * printed.STIFFNESS, "N/m", 6, rule),

@@ -13,11 +13,11 @@ from lobewatch.paper.tap_study import TapStudy, study_tap, tap_section
 def _validation_claim(meshes: FiniteElementStudy) -> Claim:
     softer = meshes.exact["timoshenko"] / meshes.exact["euler-bernoulli"] - 1
     return Claim(
-        "Finite elements with shear validate the model without it: 2367 compared with 2303 Hz, less than 3 % apart.",
+        "Finite elements with shear validate the model without shear: 2367 compared with 2303 Hz, less than 3 % apart.",
         "fails",
         f"Shear lowers f1 of this shaft by {format_share(-softer)}, and {printed.FEM_ELEMENTS} elements are exact to "
-        f"{format_share(meshes.error('linear'))}. A model with shear is always below one without, even if clamped in "
-        f"all bearings ({meshes.clamped:.0f} Hz). A model with shear above it describes another shaft.",
+        f"{format_share(meshes.error('linear'))}. f1 with shear is always below f1 without shear, even if clamped in "
+        f"all bearings ({meshes.clamped:.0f} Hz). If f1 with shear is higher, the model describes another shaft.",
     )
 
 
@@ -28,14 +28,15 @@ def _bearing_claims(plain: shaft_study.ShaftStudy, shear: shaft_study.ShaftStudy
         Claim(
             "Rigid bearings make f1 about a third too high. Springs must be tuned to the measured frequency.",
             "holds",
-            f"{format_share(high)} here, but {format_share(sheared)} with shear: nearly half of the third is theory.",
+            f"{format_share(high)} on the surrogate shaft, but {format_share(sheared)} with shear: the "
+            "beam theory explains nearly half of the excess.",
         ),
         Claim(
             "The tuned springs represent the bearings: 1.28e9 N/m each, 7.72e8 N/m after the frequency drop.",
             "holds in part",
-            f"They depend on the beam theory: {stiffness:.0f} N/um without shear, {stiffer:.0f} N/um with it. At 1550 "
-            f"Hz {format_share(plain.old.factor)} and {format_share(shear.old.factor)} remain. Compare such numbers "
-            "within one model only.",
+            f"The springs depend on the beam theory: {stiffness:.0f} N/um without shear, {stiffer:.0f} N/um with "
+            f"shear. At 1550 Hz {format_share(plain.old.factor)} and {format_share(shear.old.factor)} of the "
+            "stiffness remain. Compare bearing stiffnesses within one model only.",
         ),
     )
 
@@ -45,9 +46,9 @@ def _spin_claim(shear: shaft_study.ShaftStudy) -> Claim:
     return Claim(
         "f1 drops with spindle speed and reaches zero at the critical speed.",
         "holds in part",
-        "True in the rotating frame only. In the fixed frame of hammer, sensor and workpiece, f1 of the paper's theory "
-        f"does not change. With rotary inertia it splits into {backward:.0f} and {forward:.0f} Hz at "
-        f"{shaft_study.OPERATING_SPEED_RPM:.0f} rpm. Without it the critical speed is simply 60 f1.",
+        "f1 drops in the rotating frame only. In the fixed frame of hammer, sensor and workpiece, f1 of the paper's "
+        f"theory does not change. With rotary inertia f1 splits into {backward:.0f} and {forward:.0f} Hz at "
+        f"{shaft_study.OPERATING_SPEED_RPM:.0f} rpm. Without rotary inertia the critical speed is simply 60 f1.",
     )
 
 
@@ -60,14 +61,14 @@ def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tu
             "fails",
             "K_theo is 0.9 K_exp in every digit. On the surrogate the static stiffness drops by "
             f"{format_share(static)}, the modal stiffness seen in an FRF by {format_share(modal)}. lobewatch measures "
-            "K in each tap test.",
+            "stiffness K in each tap test.",
         ),
         Claim(
             "A drop of f1 by 10 % shifts the stability lobes significantly.",
             "holds",
-            f"Pockets shift with f1 ({before:.0f} to {after:.0f} rpm). At the first speed "
+            f"Pockets shift with f1 ({before:.0f} to {after:.0f} rpm). At the speed of the new pocket "
             f"{format_share(lobes.pocket_limit_ratio(lobes.by_model))} of the limit remains. The lowest limit depends "
-            f"on K: {format_share(lobes.share(lobes.by_model))} remains with the model's K, "
+            f"on stiffness K: {format_share(lobes.share(lobes.by_model))} remains with the model's K, "
             f"{format_share(lobes.share(lobes.by_rule))} by the paper's rule.",
         ),
     )
@@ -76,7 +77,7 @@ def _decay_claims(stiffness: shaft_study.StiffnessStudy, lobes: LobeStudy) -> tu
 def _mode_claim(lobes: LobeStudy) -> Claim:
     lowest, worst = lobes.errors_of_one_mode(lobes.one_mode, lobes.six_modes)[::2]
     return Claim(
-        "Modes above the first hardly affect the lobes (its reference [18]).",
+        "Modes above the first hardly affect the lobes (reference [18] of the paper).",
         "holds in part",
         f"With one mode instead of six, along the feed only, the lowest limit is off by {format_share(lowest)}. "
         f"On the side of a pocket, shifted by the other modes, the limit is off by up to {format_share(worst)}.",

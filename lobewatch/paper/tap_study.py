@@ -115,10 +115,11 @@ def tap_section(study: TapStudy) -> NumberGroup:
     zeta, stiffness = printed.DAMPING_RATIO, printed.STIFFNESS
     picked, fitted, model = study.picked, study.fitted, study.surrogate_modes[0]
     closed = "closed form, not printed"
-    exact = "least squares without bias"
-    halves = "half from (28), half from the f1 of the peak"
-    high = f"zeta^2 ({format_share(zeta**2)}) too high for a single mode, {halves}. The rest: lines 1 Hz apart."
-    low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) too low for a single mode. The rest: lines 1 Hz apart."
+    exact = "least-squares fit without bias"
+    halves = "half from eq. (28), half from the f1 of the peak"
+    rest = "The rest comes from frequency lines 1 Hz apart."
+    high = f"zeta^2 ({format_share(zeta**2)}) too high for a single mode, {halves}. {rest}"
+    low = f"5/4 zeta^2 ({format_share(1.25 * zeta**2)}) too low for a single mode. {rest}"
     other = "surrogate fitted to frequencies, not to K"
     shift = format_share(study.surrogate_picked.stiffness / model.stiffness - 1, "+")
     tails = f"{shift}, also from the tails of modes 2 to {SURROGATE_MODES}"

@@ -92,9 +92,9 @@ def _check_ports(machine: MachineFolder | None) -> Iterator[Finding]:
         subject = f"port {wanted}"  # a pseudo-terminal, the network, or missing
         try:
             SerialLink(wanted).close()
-            yield Finding(subject, "fine", "set in [daq], can be opened")
+            yield Finding(subject, "fine", "port set in [daq], can be opened")
         except DeviceError as error:
-            yield Finding(subject, "hinders", f"set in [daq], but {error.text}", error.cure)
+            yield Finding(subject, "hinders", f"port set in [daq], but {error.text}", error.cure)
 
 
 def _check_port(port: ScannedPort) -> Finding:
@@ -172,7 +172,7 @@ def _check_browser() -> Finding:
         name = webbrowser.get().__class__.__name__
     except webbrowser.Error:
         cure = "Use screen.ScreenServer with ScreenServer.listen 0.0.0.0, and open its address on a tablet"
-        return Finding("browser", "note", "none on this computer", cure)
+        return Finding("browser", "note", "no browser on this computer", cure)
     return Finding("browser", "fine", f"installed ({name})")
 
 

@@ -73,9 +73,9 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
     """Return the remark on a missing anti-alias filter. declared: whether there is one, None if not stated."""
     if declared:
         return []
-    stated = "no anti-alias filter is stated" if declared is None else "without an anti-alias filter"
+    stated = "no anti-alias filter is stated" if declared is None else "the device has no anti-alias filter"
     text = f"{stated}, so vibration above {rate / 2:g} Hz (half the sample rate) may appear as false modes"
-    cure = "If the device or an amplifier has a filter, set [daq] anti_alias = true. If not, use a higher sample rate"
+    cure = "If the device or an amplifier has a filter, set [daq] anti_alias = true. Otherwise use a higher sample rate"
     return [Remark("no-anti-alias", "", text, cure)]
 
 
@@ -115,7 +115,9 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
     """
     wanted = folder.machine.tap.hits
     check_device_rate(folder, device)
-    tell(f"HIT the suspended mass opposite the accelerometer {wanted} times. Wait until it is still before each hit.")
+    tell(
+        f"HIT the suspended mass opposite the accelerometer {wanted} times. Let the mass come to rest before each hit."
+    )
     good: list[Hit] = []
     device.start()
     baseline = find_quiet_part(DeviceConnection(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
@@ -174,7 +176,9 @@ def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[
     """
     if len(device.channels) != 2:
         n = len(device.channels)
-        raise acquisition.DataError(f"a skew needs two inputs, but the DAQ has {n}. Give two in [[daq.channel]].")
+        raise acquisition.DataError(
+            f"a skew check needs two inputs, but the DAQ has {n}. Add both inputs as [[daq.channel]]."
+        )
     rate = check_device_rate(folder, device)
     tell(f"recording {SKEW_RECORDING_SECONDS:g} s, join both inputs with a T-piece and feed noise or taps")
     device.start()

@@ -110,11 +110,11 @@ AIR_BEFORE_CUT = 1.0
 SENSOR_CHECK_DELAY = 1.0
 """Time after which the sensor signal is checked (s)."""
 
-SENSOR_ON_HOUSING_TEXT = "The sensor must be on the housing and the spindle running in air. Start the cut."
+SENSOR_ON_HOUSING_TEXT = "Keep the sensor on the spindle housing and run the spindle in air. Start the cut."
 CUT_TOO_SHORT_TEXT = (
     "The cut was too short, or there was no running in air before it. Cut again for a second or longer."
 )
-CUT_RUNNING_TEXT = "Cut for a second or longer, then leave the cut. The verdict appears by itself."
+CUT_RUNNING_TEXT = "Cut for a second or longer, then leave the cut. The verdict then appears automatically."
 
 
 @dataclass
@@ -173,7 +173,8 @@ def record_cut(
     """
     row = next((i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"), None)
     if row is None:
-        raise DataError("the device has no acceleration channel. Plug the accelerometer in, or add it to [daq].")
+        cure = "Plug the accelerometer in, or add a [[daq.channel]] for it to machine.toml"
+        raise DataError(join_sentences("the device has no acceleration channel", cure))
     buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
     waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
     show("Recording. Start the cut.")
@@ -218,7 +219,9 @@ def _check_sensor_signal(buffer: _SignalBuffer) -> None:
     codes = np.concatenate(buffer.codes)
     low, high = buffer.channel.rails
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
-        raise DeviceError("the accelerometer signal is at the end of its range", "Check the cable and the power supply")
+        raise DeviceError(
+            "the accelerometer signal is at the limit of the input range", "Check the cable and the power supply"
+        )
     if np.ptp(codes) == 0:
         cure = "Plug the accelerometer in, fix it to the housing, and run the spindle"
         raise DeviceError("the accelerometer signal is constant", cure)
@@ -244,7 +247,9 @@ def acquire_cut(
         return read_cut_recording(file, description)
     port = port or folder.machine.daq.port
     if not port:
-        raise ValueError(f"no port. Give acquire_cut.port or acquire_cut.file, or set port in [daq] of {folder.toml}.")
+        raise ValueError(
+            f"DAQ port missing. Give acquire_cut.port or acquire_cut.file, or set port in [daq] of {folder.toml}."
+        )
     if port.startswith(REPLAY_PREFIX):
         cure = "Give the recording of a cut with acquire_cut.file"
         raise ValueError(join_sentences(f"acquire_cut.port {port}: this is a recording of hits", cure))
@@ -265,11 +270,13 @@ def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path |
     """
     if file is None and (tacho or pulses is not None):
         given = f"Description.tacho {tacho}" if tacho else f"Description.pulses {pulses}"
-        raise ValueError(f"{given} works only with a recording. Give one with acquire_cut.file.")
+        raise ValueError(f"{given} works only with a recording. Give a recording with acquire_cut.file.")
     if sensor not in get_args(CutSensor):
         raise ValueError(f"Description.sensor {sensor} is unknown. Use {' or '.join(get_args(CutSensor))}.")
     if sensor == "microphone" and file is None:
-        raise ValueError("Description.sensor microphone works only with a recording. Give one with acquire_cut.file.")
+        raise ValueError(
+            "Description.sensor microphone works only with a recording. Give a recording with acquire_cut.file."
+        )
     return {"sensor": sensor, "tacho": tacho, "pulses": pulses}
 
 

@@ -33,7 +33,7 @@ class DeviceOpener:
         if self._identity is not None and find_usb_identity(self._port) != self._identity:
             if (port := acquisition.find_usb_port(*self._identity)) is None:
                 number = self._identity[1]
-                raise DeviceError(f"the DAQ with USB serial number {number} is not plugged in", "Plug it in")
+                raise DeviceError(f"the DAQ with USB serial number {number} is not plugged in", "Plug the DAQ in")
             self._port = port
         source = open_device(self._daq, self._port)
         self._identity = self._identity or find_usb_identity(self._port)

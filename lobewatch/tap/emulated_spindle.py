@@ -71,7 +71,7 @@ def rotate_structure(spindle: Structure, degrees: float, direction: TapDirection
     shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
     if not any(shares):
         text = f"rotate_structure.degrees {degrees:g} gives no cross FRF for rotate_structure.direction xy"
-        raise ValueError(f"{text}. Use an angle between 0 and 90 degrees.")
+        raise ValueError(f"{text}. Use an angle above 0 and below 90 degrees.")
     stiffer = 1.0, (1 + SECOND_AXIS_FREQUENCY_SHIFT) ** 2
     visible = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
     frequency = np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in visible])
@@ -160,7 +160,9 @@ def emulate_device(
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
-        raise acquisition.DataError(f"{driver.title} cannot be emulated. Connect one, or emulate another driver.")
+        raise acquisition.DataError(
+            f"{driver.title} cannot be emulated. Connect a real device, or emulate another driver."
+        )
     inputs = get_emulated_inputs(folder, driver)
     signal_at, clock = partial(signal_of, inputs), folder.machine.daq.digital_clock
     setup = acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, digital_clock=clock, **serving)

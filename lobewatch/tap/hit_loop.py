@@ -26,7 +26,7 @@ from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s). The trigger may be armed before."""
-EARLY_HIT_TEXT = "That hit came while the tool still vibrated and does not count. Wait for TAP."
+EARLY_HIT_TEXT = "The hit came while the tool still vibrated and does not count. Wait for TAP."
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -121,7 +121,7 @@ class TapPhases:
     def _check_rate(self, device: Device) -> None:
         """Measure the sample rate of a device that this machine does not know yet."""
         if has_clock(device) and find_stored_rate(self._folder, device) is None:
-            self._publisher.show(reason="New device. Its sample rate is being measured for 5 s.")
+            self._publisher.show(reason="The sample rate of the new device is being measured for 5 s.")
         remarks = list[Remark]()
         check_device_rate(self._folder, device, remarks=remarks)
         if remarks:
@@ -133,7 +133,7 @@ class TapPhases:
         trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.device.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
-        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
+        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
         baseline = find_quiet_part(connection.record(self._blocks(connection), SELF_CHECK_DURATION))
         self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
         checks = [*self._publisher.state.checks]
@@ -203,7 +203,9 @@ class TapPhases:
     def _handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
         if self.stopping.is_set():
-            raise TapStopped(f"stopped with {self._tap.good} good hits. Repeat the command to continue with them.")
+            raise TapStopped(
+                f"stopped with {self._tap.good} good hits. Repeat the command to continue with these hits."
+            )
         while self.undos.acquire(blocking=False):
             self._undo()
 
@@ -256,7 +258,7 @@ class TapPhases:
         self._show_curves(hit)
         if not verdict.flags and (outlier := self._tap.recheck_first_hits()) is not None:
             number, now = outlier
-            self._show_taken_out(now.flags, f"Hit {number + 1} differs from the others and is excluded. {now.text}")
+            self._show_taken_out(now.flags, f"Hit {number + 1} differs from the other hits and is excluded. {now.text}")
 
     def _undo(self, means: str = "") -> None:
         if (number := self._tap.undo()) is not None:
@@ -276,5 +278,5 @@ def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> 
     try:
         return run_self_check(baseline, level, free_bytes)
     except Exception as error:  # noqa: BLE001 - a check warns and ends no test
-        text = f"failed ({type(error).__name__}: {error}). The test continues without it."
+        text = f"failed ({type(error).__name__}: {error}). The test continues without this check."
         return (Check("self-check", False, text),)

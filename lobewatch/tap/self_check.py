@@ -80,7 +80,9 @@ def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple
 def check_calibration(channels: Sequence[Channel], interval_months: float) -> Check:
     """Check sensitivities and calibration dates."""
     remarks = sensor_remarks(channels, interval_months)
-    return Check("calibration", not remarks, join_sentences(*map(str, remarks)) or "known and up to date")
+    return Check(
+        "calibration", not remarks, join_sentences(*map(str, remarks)) or "all sensitivities known and up to date"
+    )
 
 
 def sensor_remarks(channels: Sequence[Channel], interval_months: float) -> list[Remark]:
@@ -94,9 +96,9 @@ def sensor_remarks(channels: Sequence[Channel], interval_months: float) -> list[
 def _check_samples(baseline: Hit) -> Check:
     lost = baseline.lost_scans
     if not lost:
-        return Check("samples", True, f"{baseline.sample_rate:g} Hz, none lost")
+        return Check("samples", True, f"{baseline.sample_rate:g} Hz, no samples lost")
     cure = "Lower the sample rate or use another cable or port"
-    return Check("samples", False, join_sentences(f"{lost} scans lost in one second", cure))
+    return Check("samples", False, join_sentences(f"{lost} samples per channel lost in one second", cure))
 
 
 def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
@@ -110,7 +112,7 @@ def _iterate_sensors(baseline: Hit) -> Iterator[tuple[Codes, Channel]]:
 def _check_sensor(codes: Codes, channel: Channel) -> Check:
     name, low, high = f"{channel.name} sensor", *channel.effective_rails(codes)
     if np.mean((codes <= low) | (codes >= high)) > 0.5:
-        return Check(name, False, "signal at the end of its range. Check the cable and the power supply.")
+        return Check(name, False, "signal at the limit of the input range. Check the cable and the power supply.")
     if np.ptp(codes) == 0:
         return Check(name, False, f"constant signal of {codes[0] * channel.scale:.3g}. Check the cable and its plugs.")
     return Check(name, True, "OK")
@@ -121,8 +123,8 @@ def _check_force_noise(rms: float, level: float | None) -> Check:
         against = "" if level is None else f", trigger at {level:g} N"
         return Check("force noise", True, f"{format_rounded(rms, digits=2)} N rms{against}")
     amplitude = format_rounded(2 * MIN_TRIGGER_NOISE_RATIO * rms, digits=2)
-    cure = f"Set trigger_n above {amplitude}, or find the source of the noise"
-    text = f"{format_rounded(rms, digits=2)} N rms is too close to the trigger at {level:g} N"
+    cure = f"Set trigger_n above {amplitude} N, or find the source of the noise"
+    text = f"{format_rounded(rms, digits=2)} N rms of noise is too close to the trigger at {level:g} N"
     return Check("force noise", False, join_sentences(text, cure))
 
 
@@ -159,7 +161,9 @@ def _check_hum(baseline: Hit) -> Check:
         sums = [float(np.sum(power[_select_lines(frequency, *lines)])) for lines in map(_list_harmonics, MAINS)]
         hum, worst = max(sums), MAINS[int(np.argmax(sums))]
         if hum > MIN_HUM_POWER_SHARE * np.sum(power) and np.sqrt(hum) > MIN_LINE_CODES * abs(channel.scale):
-            texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and harmonics in the {channel.quantity}")
+            texts.append(
+                f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and harmonics in the {channel.quantity} signal"
+            )
     if texts:
         return Check("hum", False, join_sentences(", ".join(texts), "Check cable shields and grounding"))
     return Check("hum", True, "no mains hum")
@@ -223,10 +227,12 @@ def check_detectable_band(baseline: Hit, machine: Machine, tool: str) -> Check:
         return Check("band", True, text, is_notable=True)
     if frequency > highest:
         cure = "Use a faster sensor or a higher sample rate"
-        return Check("band", False, join_sentences(f"{detectable}, not {frequency:.0f} Hz ({where})", cure))
+        return Check(
+            "band", False, join_sentences(f"{detectable}, but not the mode at {frequency:.0f} Hz ({where})", cure)
+        )
     amplitude = min_decay_amplitude(frequency, damping_ratio, noise / math.sqrt(min(rate / 2, band)))
     hits = f"{REFERENCE_HITS} hits with a response of {format_rounded(amplitude, digits=2)} m/s^2"
-    error = f"{hits} give {frequency:.0f} Hz ({where}) to {100 * TARGET_FREQUENCY_ERROR:g} %"
+    error = f"{hits} give the mode at {frequency:.0f} Hz ({where}) to within {100 * TARGET_FREQUENCY_ERROR:g} %"
     return Check("band", True, join_sentences(with_noise, error), is_notable=True)
 
 

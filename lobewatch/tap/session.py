@@ -235,7 +235,7 @@ def _format_values(measurement: Measurement, series: SeriesStatus | None) -> lis
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "first test of this tool and direction"
     if find_open_questions(measurement.remarks):
-        against = "with an open question"
+        against = "but the test has an open question"
     elif series is not None and not series.is_baseline:
         sign = "+" if series.drop.value < 0 else ""
         against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % compared with the first test"
@@ -291,7 +291,7 @@ def plan_session(
     machine = folder.machine
     port = port or machine.daq.port
     if not port:
-        raise ValueError(f"no port. Give plan_session.port, or set port in [daq] of {folder.toml}.")
+        raise ValueError(f"DAQ port missing. Give plan_session.port, or set port in [daq] of {folder.toml}.")
     tool, wanted = tool or machine.tap.tool, acquisition.parse_direction(direction)
     if wanted == CROSS_TAP and machine.tap.hammer == "none":
         raise ValueError("direction xy needs a force sensor. Tap only x and y.")

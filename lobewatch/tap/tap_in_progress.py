@@ -105,7 +105,7 @@ class TapInProgress:
 
     def make_setup_error(self) -> ValueError:
         """Return the error that rejects mixing hits of two set-ups."""
-        text = f"the interrupted test {self.id} has another record length, sample rate or sensor"
+        text = f"the interrupted test {self.id} was recorded with another record length, sample rate or sensor"
         return ValueError(join_sentences(text, "Start a new test with plan_session.resume=False"))
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
@@ -251,7 +251,7 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
         else:
             test = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
             text = f"An interrupted test ({test}) is still in {path}"
-            new.not_resumed.append(join_sentences(text, "Delete that folder if you do not need it"))
+            new.not_resumed.append(join_sentences(text, "Delete this folder if you do not need the test"))
     return newest
 
 
@@ -282,7 +282,7 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     verdicts = [flags or evaluate_safely(partial(_evaluate_cross_hit, hit)).flags for hit, flags in cross_hits]
     good, wanted = verdicts.count(HitFlags.OK), driving_point_flags.count(HitFlags.OK)
     faults = {flags.words for flags, first in zip(verdicts, driving_point_flags, strict=True) if flags and not first}
-    used = f"{good} of the same {wanted} hits ({', '.join(sorted(faults))} in y)" if faults else f"the same {good} hits"
+    used = f"{good} of the {wanted} hits in x ({', '.join(sorted(faults))} in y)" if faults else f"the {good} hits in x"
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
         if good < MIN_CROSS_TAP_HITS:

@@ -73,7 +73,7 @@ class TrialHits:
     def text(self) -> str:
         """Sentence on what to do. When done, on what was chosen and which range to choose."""
         if not self.is_done:
-            return f"Trial hit {len(self._hits) + 1} sets the trigger level and the record length. It does not count."
+            return f"Trial hit {len(self._hits) + 1} sets the trigger level and the record length, but does not count."
         slowest = max(estimate_decay_time(hit) for hit in self._hits)
         level = f"{self.trigger.level:.3g} {CHANNEL_UNITS[self._setup.quantity]}"
         record = f"record length {self._record:g} s, {_format_time_constants(self._record, slowest)}"
@@ -133,6 +133,6 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
     too_large, percent = share < MIN_RANGE_SHARE, float(f"{100 * share:.2g}")
     wanted = RANGE_HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
     text = f"hits reach {percent:g} % of the range of {full:.3g} {unit}"
-    cure = f"Choose a range or a sensor of about {wanted:.2g} {unit}"
+    cure = f"Choose a range or a sensor for about {wanted:.2g} {unit}"
     alternative = "" if too_large else ", or hit softer"
     return Remark("range-too-large" if too_large else "range-too-small", name, text, cure + alternative)

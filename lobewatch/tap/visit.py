@@ -71,7 +71,7 @@ class TapVisit:
         if not self.is_waiting or key not in [choice.key for choice in self.state.choices]:
             raise ValueError(f"{key!r} is not available now. Use a choice that the page shows.")
         if key == NEXT_TOOL_CHOICE.key and not tool.strip():
-            raise ValueError("the next tool has no name. Enter a name of machine.toml or a new one.")
+            raise ValueError("the next tool has no name. Enter a tool name of machine.toml or a new name.")
         self._answers.put((key, tool.strip()))
 
     def run(self) -> None:
@@ -101,7 +101,7 @@ class TapVisit:
         if missing is not None:
             tap = DIRECTION_CHOICES[missing]
             turn = "Turn hammer and sensor to"
-            turn = f"{cross_tap.text} Leave the sensor. Turn the hammer to" if cross_tap else turn
+            turn = f"{cross_tap.text} Leave the sensor in place. Turn the hammer to" if cross_tap else turn
             reason = f'Direction {self._direction} is saved. {turn} {missing}, then choose "{tap.text}".'
             choices: Sequence[Choice] = (tap, DONE_CHOICE)
             state = replace(state, word=TapStep.MOVE, direction=missing, reason=reason, outcome=None)

@@ -45,7 +45,7 @@ def _check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipMode
     if problem is None:
         return cross, ()
     cure = "Tap x, y and xy again without reclamping the tool"
-    return None, (Remark("cross-other-clamping", "", f"cross tap not used, {problem}", cure),)
+    return None, (Remark("cross-other-clamping", "", f"cross tap not used, because {problem}", cure),)
 
 
 def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode]) -> Iterator[str]:
@@ -59,9 +59,9 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
         at, share = mode.frequency, 1 / abs(mode.stiffness) / possible
         apart = min(abs(other.frequency / at - 1) for other in (*x, *y))
         if apart > MAX_CROSS_FREQUENCY_DISTANCE:
-            yield f"its {at:.0f} Hz is {100 * apart:.1f} % from the nearest mode of x and y (another clamping?)"
+            yield f"its mode at {at:.0f} Hz is {100 * apart:.1f} % off the nearest mode of x and y (another clamping?)"
         if share > MAX_CROSS_RESIDUE_RATIO:
-            yield f"its {at:.0f} Hz is {share:.1f} times larger than possible (other sensors or another clamping?)"
+            yield f"its mode at {at:.0f} Hz is {share:.1f} times larger than possible (other sensors or clamping?)"
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
@@ -72,12 +72,12 @@ def _is_same_mode(mode: Mode, other: Mode) -> bool:
 DIRECTION_CODES = ("one-direction", "older-direction")
 """Codes of the remarks on missing or older directions."""
 UNUSABLE_TAP_REASONS = {
-    NO_FORCE_CODE: ("no force was measured, K is unknown", "Tap {} with a force hammer"),
-    "no-lobes-driving-point": ("not a driving point", "Hit and measure at one point in {}, and tap again"),
-    "no-lobes-beside-tip": ("not at the tool tip", "Tap {} at the tip, or add a [spindle] table"),
+    NO_FORCE_CODE: ("no force was measured, so stiffness K is unknown", "Tap direction {} with a force hammer"),
+    "no-lobes-driving-point": ("not a driving point", "Hit and measure at one point in direction {}, and tap again"),
+    "no-lobes-beside-tip": ("not tapped at the tool tip", "Tap direction {} at the tool tip, or add a [spindle] table"),
 }
 """Reason and remedy of a tap test without modes at the tip, by the code of its remark."""
-NO_MODE_REASON = ("no mode in the band", "Tap {} again")
+NO_MODE_REASON = ("no mode in the band", "Tap direction {} again")
 """Reason and remedy without such a remark."""
 MAX_DIRECTION_AGE = timedelta(hours=24)
 """Age difference of x and y above which the older one is shifted; chosen."""
@@ -213,9 +213,9 @@ def _unusable_reason(tap: Measurement) -> tuple[str, str]:
 def _untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
     """Return the remark on a missing direction; unusable: reason and remedy of its tap test."""
     missing = "y" if tapped == "x" else "x"
-    text = f"modes only in direction {tapped}, {missing} assumed equal"
+    text = f"modes only in direction {tapped}, direction {missing} assumed equal"
     if unusable is None:
-        return Remark("one-direction", tool, text, f"Tap direction {missing} of the same tool too")
+        return Remark("one-direction", tool, text, f"Tap direction {missing} of this tool too")
     return Remark("one-direction", tool, f"{text} ({missing} is tapped but not usable: {unusable[0]})", unusable[1])
 
 
@@ -229,8 +229,9 @@ def _direction_remarks(
         return ()
     days = round((newest.time - across.time) / timedelta(days=1))
     text = f"direction {across.direction} is from {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
+    text += f" than direction {newest.direction}"
     if moved is not None:
-        text += f", frequency shifted by {100 * (moved - 1):+.1f} % like that of {newest.direction}"
+        text += f", frequency shifted by {100 * (moved - 1):+.1f} % as in direction {newest.direction}"
     return (Remark("older-direction", newest.tool, text, f"Tap direction {across.direction} again"),)
 
 
@@ -264,7 +265,7 @@ def _predict_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[l
     """Return the modes of the model in the measured band, shifted with the softest one."""
     state, followed = build_model_state(machine, tap, tool), tap.followed
     if followed is None:
-        raise DataError(f"{tap.tap_id}: there is no followed mode")
+        raise DataError(f"{tap.tap_id}: no followed mode in this tap test")
     frequency, stiffness = modes_at(state.spindle, PREDICTED_MODE_COUNT)
     softest = int(np.argmin(stiffness))
     shown = stiffness < MAX_PREDICTED_STIFFNESS_RATIO * stiffness[softest]

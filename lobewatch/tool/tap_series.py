@@ -64,13 +64,15 @@ class MountingTracker:
         if force is not None:
             self._drawbar[tap.tool] = force
             if last_force not in (None, force):
-                text = f"drawbar force {force:g} kN after {last_force:g} kN, the frequency may have changed with it"
-                yield Remark("drawbar-changed", tap.tool, text, "Inspect the drawbar if this was not intended")
+                text = f"drawbar force changed from {last_force:g} kN to {force:g} kN, so f1 may have changed"
+                yield Remark("drawbar-changed", tap.tool, text, "Inspect the drawbar if the change was not intended")
         if hours is not None:
             self._hours = hours
             if last_hours is not None and hours < last_hours:
-                cure = "Exclude it and replay its file with the correct Conditions.hours"
-                text = f"running hours {hours:g} h after {last_hours:g} h, so forecasts of this series use days"
+                cure = "Exclude the tap test and replay its file with the correct Conditions.hours"
+                text = (
+                    f"running hours dropped from {last_hours:g} h to {hours:g} h, so forecasts of this series use days"
+                )
                 yield Remark("hours-went-back", tap.tool, text, cure)
 
 

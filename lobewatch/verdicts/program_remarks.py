@@ -16,7 +16,7 @@ from lobewatch.verdicts.uncertainty_causes import QUESTION, UNCERTAINTY_CAUSES, 
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
-    MissingToolData.TOOL_MATERIAL: "tool_material in its [[tool]]",
+    MissingToolData.TOOL_MATERIAL: "tool_material in the [[tool]]",
     MissingToolData.MATERIAL: "material in the program (Kt and Kr give no ISO 513 group)",
 }
 """Missing tool data to ask for besides the cutting speed."""
@@ -31,23 +31,25 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
         reach = CutRange(machine, table, limits)
         cure = "Choose another tool" if limits.is_empty else f"Use {reach.low_rpm:g} to {reach.high_rpm:g} rpm"
         is_over = table.speed_rpm > limits.tool.max_speed_rpm
-        own = "correct max_speed_rpm" if is_over else "set the cutting_speed_m_min of its maker"
+        own = "correct max_speed_rpm" if is_over else "set the cutting_speed_m_min of the tool maker"
         yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
         allowed = f"{_range_text(borne.low, borne.high)} mm"
         text = f"feed_per_tooth_mm = {feed:g} is outside {allowed} {_tool_text(table, limits)} ({borne.source})"
-        yield _tool_limit_remark(table, text, f"Use {allowed}, or set the feed_per_tooth_mm of its maker")
+        yield _tool_limit_remark(table, text, f"Use {allowed}, or set the feed_per_tooth_mm of the tool maker")
 
 
 def missing_tool_remarks(table: ProgramTable, limits: ToolLimits) -> Iterator[Remark]:
     """Ask for tool data that advice on a program needs."""
     if limits.is_guessed:
-        whose = "of the spindle" if limits.cutting_speed_m_min is None else "up to those of the fastest tool"
+        whose = (
+            "of the spindle" if limits.cutting_speed_m_min is None else "up to the limit of the fastest tool material"
+        )
         asked = " and ".join(text for unknown, text in MISSING_TOOL_FACTS.items() if unknown in limits.missing)
         own = [key for key in TOOL_MAKER_KEYS if key is MissingToolData.CUTTING_SPEED or key in limits.missing]
-        cure = ", or ".join(filter(None, [asked, f"{' and '.join(own)} in its [[tool]]"]))
-        text = f"the cutting-speed limit is unknown, speeds {whose} are recommended"
+        cure = ", or ".join(filter(None, [asked, f"{' and '.join(own)} in the [[tool]]"]))
+        text = f"the cutting-speed limit is unknown, so speeds {whose} are recommended"
         yield Remark("tool-not-described", table.tool, text, f"Set {cure}")
 
 
@@ -57,7 +59,7 @@ def _tool_limit_remark(table: ProgramTable, text: str, cure: str) -> Remark:
 
 def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
     if table.speed_rpm > limits.tool.max_speed_rpm:
-        return f"{table.speed_rpm:g} rpm is above max_speed_rpm = {limits.tool.max_speed_rpm:g} of its tool"
+        return f"{table.speed_rpm:g} rpm is above max_speed_rpm = {limits.tool.max_speed_rpm:g} of the tool"
     speed, borne = math.pi * table.tool_diameter_mm / 1e3 * table.speed_rpm, limits.cutting_speed_m_min
     if borne is None:
         return f"{table.speed_rpm:g} rpm is outside the speed range of the spindle"
@@ -67,10 +69,10 @@ def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
     """Return the source of the tool limits for a remark."""
-    tool = "the fastest tool" if limits.is_guessed else limits.tool.tool_material or "the tool"
+    tool = "the fastest tool material" if limits.is_guessed else limits.tool.tool_material or "the tool"
     cut = "slotting" if limits.cut == "slot" else "side milling"
-    material = f" {table.material}" if table.material else ""
-    return f"allowed for {tool} of {table.tool_diameter_mm:g} mm {cut}{material}"
+    material = f" of {table.material}" if table.material else ""
+    return f"allowed for {tool}, {table.tool_diameter_mm:g} mm, {cut}{material}"
 
 
 def _range_text(low: float, high: float) -> str:
@@ -119,9 +121,9 @@ def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
     speed = np.array([table.speed_rpm])
     limit = min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
     ratio = limit / result.median.limit
-    share = f", {100 * ratio:.0f} % of the straight path" if 0 < ratio < 1 else ""
+    share = f", {100 * ratio:.0f} % of that on the straight path" if 0 < ratio < 1 else ""
     corner = f"a corner of {radius:g} mm radius has ae {inside * table.tool_diameter_mm:.2g} mm"
-    limited = f"limit there about {1e3 * limit:.2g} mm{share}"
+    limited = f"limit in the corner about {1e3 * limit:.2g} mm{share}"
     text = f"evaluated at ae {radial:g} mm, but {corner} ({limited})"
     straight = f"[{radial:g}, {radial:g}] if the path is straight"
     cure = f"Set corner_radius_mm, or radial_depth_mm = [smallest, largest] ({straight})"

@@ -107,12 +107,12 @@ MAX_REMOVAL_LABEL, PRESENT_SPEED_LABEL = "most chips", "deepest at the present s
 NEW_TOOL_REMEDIES = "Use a shorter stick-out and tap again", "Use a thicker tool or one with fewer flutes"
 CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "Reduce the radial depth")
 """Measures that make an unsafe cut safe, for verdicts."""
-TOOL_DATA_REMEDY = "Set tool_material and cutting_speed_m_min in its [[tool]] if the tool allows more"
+TOOL_DATA_REMEDY = "Set tool_material and cutting_speed_m_min in the [[tool]] if the tool allows other speeds"
 TOOL_SPEED_REMEDIES = ("Use a smaller diameter", TOOL_DATA_REMEDY)
 """Measures if the spindle is too fast for the tool."""
-MAX_SPEED_REMEDIES = ("Use a tool or holder with a higher speed limit", "Correct max_speed_rpm in its [[tool]]")
+MAX_SPEED_REMEDIES = ("Use a tool or holder with a higher speed limit", "Correct max_speed_rpm in the [[tool]]")
 """Measures if max_speed_rpm limits the speed."""
-FIXED_SPEED_REMEDIES = ("Choose a speed in that range", TOOL_DATA_REMEDY)
+FIXED_SPEED_REMEDIES = ("Choose a speed in the allowed range", TOOL_DATA_REMEDY)
 """Measures if a program runs at a speed outside the tool limits."""
 THIN_CUT_IMMERSION = 0.1
 """Immersion up to which a smaller radial depth is not recommended (-)."""

@@ -44,7 +44,7 @@ def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     if ratios.size > 1:
         drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
         clause = f"stiffness from the model ({change:+.1f} % at {drop:.0f} % frequency drop)"
-    text = f"f1 margin: all modes drop alike, constant damping, {clause}"
+    text = f"f1 margin assumes the same frequency drop for all modes, constant damping and {clause}"
 
     def stiffness_at(drop: float) -> float:
         return float(np.interp(drop, CALIBRATED_DROPS[: ratios.size], ratios))

@@ -25,7 +25,9 @@ CLAMPING = Cause(
     f"Tap again until {MIN_TAPS_FOR_SCATTER} tests give the scatter of this tool",
     label="between tap tests",
 )
-PREDICTION = Cause("prediction", "result depends on the prediction", "Tap tool {tool}", label="from the prediction")
+PREDICTION = Cause(
+    "prediction", "result depends on the prediction by the model", "Tap tool {tool}", label="from the prediction"
+)
 UNTAPPED = Cause("untapped", "{missing}", "{missing_remedy}", label="in {direction}, not {lacking}")
 TEST_CUTS = Cause(
     "cuts",

@@ -250,4 +250,9 @@ def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     yield from case.assembly.questions
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
-        yield Remark("drive-ignored", table.name, "[drive] is ignored because feed_per_tooth_mm is missing")
+        yield Remark(
+            "drive-ignored",
+            table.name,
+            "[drive] is ignored, because feed_per_tooth_mm is missing",
+            "Set feed_per_tooth_mm",
+        )

@@ -96,8 +96,10 @@ def apply_test_cuts(verdict: Verdict, tool: Assembly, machine: Machine, cuts: Cu
         return verdict
     found = (chattering or stable)[-1]
     word, what = (Stability.NOT_STABLE, "chatter") if chattering else (Stability.DOUBTFUL, "stable")
-    text = f"based only on cut {found.id} ({what} at {1e3 * found.depth:.4g} mm), because K is unknown"
-    remark = Remark("heard-alone", program.name, text, "Tap with an instrumented hammer")
+    text = (
+        f"verdict based only on cut {found.id} ({what} at {1e3 * found.depth:.4g} mm), because stiffness K is unknown"
+    )
+    remark = Remark("heard-alone", program.name, text, "Tap the tool with an instrumented hammer")
     others = [other for other in verdict.remarks if other.code != NOT_CHECKED_CODE]
     return replace(verdict, stability=word, remarks=(remark, *others))
 

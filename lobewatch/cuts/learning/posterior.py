@@ -282,9 +282,11 @@ def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[Inconsiste
     """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, rejected)
     if posterior.is_frequency_unusual:
-        usual = f"{USUAL_FREQUENCY_INTERVAL[0]:g} to {USUAL_FREQUENCY_INTERVAL[1]:g} times the tap test"
-        text = f"test cuts give a frequency at speed outside {usual}"
-        yield Remark("frequency-far-off", about, text, "Tap again with a warm spindle, this tool and this stick-out")
+        usual = f"{USUAL_FREQUENCY_INTERVAL[0]:g} to {USUAL_FREQUENCY_INTERVAL[1]:g} times that of the tap test"
+        text = f"the frequency at speed from the test cuts is outside {usual}"
+        yield Remark(
+            "frequency-far-off", about, text, "Tap again with a warm spindle and the tool and stick-out of the cuts"
+        )
 
 
 def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
@@ -297,18 +299,18 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
-    wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong by the other cuts"
-    kind, exclude = contradicting.contradiction, "exclude it with folder_updates.exclude_entry"
+    wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong according to the other cuts"
+    kind, exclude = contradicting.contradiction, "exclude the cut with folder_updates.exclude_entry"
     text = {
-        Contradiction.FREQUENCY: f"chatter{pitch} {at} (no mode there: workpiece or fixture?)",
+        Contradiction.FREQUENCY: f"chatter{pitch} {at} (no tool mode at this frequency: workpiece or fixture?)",
         Contradiction.CHATTERS: f"chatter{pitch} {at} ({wrong}: entry error, workpiece, fixture or worn tool?)",
         Contradiction.STABLE: f"stable {at} ({wrong}: entry error, other depth or speed?)",
         Contradiction.POWER: f"power {at} contradicts the known Kt (misread, other feed or depth, worn edges?)",
     }[kind]
     cure = {
         Contradiction.FREQUENCY: "Tap the workpiece at the cut",
-        Contradiction.CHATTERS: f"Repeat the cut, or {exclude}. If it chatters again, repeat the tap test.",
+        Contradiction.CHATTERS: f"Repeat the cut, or {exclude}. If the cut chatters again, repeat the tap test.",
         Contradiction.STABLE: f"Repeat the cut, or {exclude}",
-        Contradiction.POWER: f"Read the power again, or if it was misread, {exclude}. Its stability still counts.",
+        Contradiction.POWER: f"Read the power again, or {exclude}. The stability of the cut still counts.",
     }[kind]
     return Remark("cut-unexplained", cut.id, f"not used: {text}", cure)

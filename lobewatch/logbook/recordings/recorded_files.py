@@ -21,7 +21,7 @@ from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
 
 DATE_REQUEST = 'Give the recording date with Description.date 2024-05-01 or Description.date_pattern "%Y%m%d"'
-CHANGING_FILE_TEXT = "changed while it was read. Wait until it is completely written."
+CHANGING_FILE_TEXT = "file changed while it was read. Wait until the file is completely written."
 """Error of a file that another program still writes."""
 _DATE_PART_PATTERNS = {
     "%Y": r"\d{4}",
@@ -74,7 +74,7 @@ def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:
         kinds = ", ".join(sorted(extensions))
-        raise DataError(f"{folder}: no recording among {len(files)} files. Supported: {kinds}.")
+        raise DataError(f"{folder}: no recording among {len(files)} files. Supported file types: {kinds}.")
     found = set(recordings)
     return recordings, [file for file in files if file not in found]
 
@@ -135,7 +135,7 @@ def _reject_windowed(recording: Recording) -> None:
     """Reject a window: a tap test does not store it, so its damping would count as that of the spindle."""
     if recording.window is not None:
         text = f"the response has a window ({format_window(recording.window)}), which adds damping"
-        cure = "Export it without, or correct an exponential window with fit_file_modes."
+        cure = "Export the response without a window, or correct an exponential window with fit_file_modes."
         raise DataError(f"{recording.path}: {text}. {cure}")
 
 
@@ -143,7 +143,7 @@ def _find_date(file: Path, description: Description, in_file: datetime | None) -
     if not description.date_pattern:
         return description.date or in_file
     if description.date is not None:
-        raise ValueError("both Description.date and Description.date_pattern given. Give only one.")
+        raise ValueError("Description.date and Description.date_pattern are both given. Leave out one of the two.")
     return parse_date_in_name(file, description.date_pattern)
 
 
@@ -212,7 +212,8 @@ def parse_date_in_name(file: Path, pattern: str) -> datetime:
                 return datetime.strptime(match[0], pattern).astimezone()
             except (ValueError, OverflowError, OSError):
                 continue
-    raise ValueError(f"{file}: no date matches Description.date_pattern {pattern!r} in {text!r}")
+    finding = f"no date matches Description.date_pattern {pattern!r} in {text!r}"
+    raise ValueError(f"{file}: {finding}. Correct the pattern, or give Description.date.")
 
 
 def check_time(file: Path, time: datetime) -> datetime:
@@ -220,8 +221,10 @@ def check_time(file: Path, time: datetime) -> datetime:
     try:
         created = time.astimezone()
     except (OverflowError, ValueError, OSError) as error:
-        raise ValueError(f"{file}: recording date {time} is out of range. Give it with Description.date.") from error
+        raise ValueError(
+            f"{file}: recording date {time} is out of range. Give the date with Description.date."
+        ) from error
     if is_in_future(created, datetime.now(UTC)):
-        cure = "Give the date with Description.date, or correct the clock."
+        cure = "Give the date with Description.date, or correct the computer clock."
         raise ValueError(f"{file}: recording date {created:%Y-%m-%d} is in the future. {cure}")
     return created

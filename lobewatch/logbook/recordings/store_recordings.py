@@ -175,6 +175,6 @@ def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = Fa
     lines = group_by_message((str(file), why) for file, why in rejected.items())
     if len(rejected) == n:
         return "\n".join([f"none of the {n} files can be used. Nothing was stored.", *lines])
-    nothing = "so nothing was stored. Use store_recordings.keep_going to store the others."
-    summary = f"{len(rejected)} of {n} files cannot be used, {'the others were stored' if stored else nothing}"
+    nothing = "so nothing was stored. Use store_recordings.keep_going to store the other files."
+    summary = f"{len(rejected)} of {n} files cannot be used, {'the other files were stored' if stored else nothing}"
     return join_sentences(lines[0], summary) if len(rejected) == 1 else "\n".join([summary, *lines])

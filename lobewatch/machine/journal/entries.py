@@ -161,8 +161,10 @@ def find_excludable_entry(name: str, taps: Sequence[TapEntry], cuts: Sequence[Cu
         return matches[0]
     if matches:
         examples = f"({matches[0].id}, {matches[1].id}, ...)"
-        raise ValueError(f"{name!r} matches {len(matches)} tap tests {examples}. Give the whole name.")
-    raise ValueError(f"no tap test {name!r} in {path}. Run MachineFolder.contents {path} to list all {len(taps)}.")
+        raise ValueError(f"{name!r} matches {len(matches)} tap tests {examples}. Give the whole name of the tap test.")
+    raise ValueError(
+        f"no tap test {name!r} in {path}. Run MachineFolder.contents {path} to list all {len(taps)} tap tests."
+    )
 
 
 def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:

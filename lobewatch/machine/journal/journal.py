@@ -199,7 +199,9 @@ class Journal:
         """Raise DataError if the journal is damaged."""
         if reading.damage:
             findings = ", ".join(remark.finding for remark in reading.damage)
-            raise DataError(join_sentences(f"{self.path.parent}: nothing written, {findings}", reading.damage[0].cure))
+            raise DataError(
+                join_sentences(f"{self.path.parent}: nothing written, because of {findings}", reading.damage[0].cure)
+            )
 
     def rewrite(self, entries: list[JournalEntry]) -> None:
         """Write both files with these entries in a new chain, and keep the old files."""
@@ -222,7 +224,7 @@ class Journal:
     def _find_journal_damage(self, journal: JournalFileState, copy: JournalFileState) -> Iterator[Remark]:
         missing = len(copy.chain) - len(journal.chain)
         if not journal.exists and copy.exists:
-            yield journal_damage_remark(self.path, "missing next to its copy")
+            yield journal_damage_remark(self.path, "missing, but its copy exists")
         elif journal.first_broken_line:
             yield journal_damage_remark(self.path, f"line {journal.first_broken_line} is damaged")
         elif missing > 0:
@@ -231,7 +233,7 @@ class Journal:
         elif journal.line_ending != b"\n" and (missing == 0 or journal.line_ending):
             yield journal_damage_remark(self.path, f"end of line {len(journal.chain)} is damaged")
         elif copy.chain != journal.chain[: len(copy.chain)]:
-            yield journal_damage_remark(self.path, f"does not match {JOURNAL_COPY_NAME}")
+            yield journal_damage_remark(self.path, f"contents do not match {JOURNAL_COPY_NAME}")
 
     def _find_copy_damage(self, journal: JournalFileState, copy: JournalFileState) -> Iterator[Remark]:
         behind = len(journal.chain) - len(copy.chain)
@@ -264,7 +266,7 @@ def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
     if not taps_here or sanitize_id_part(machine) in names:
         return ""
     lists = f"lists {len(missing)} tap test{'s' if len(missing) > 1 else ''} of {', '.join(names)}"
-    return f"belongs to another machine, because it {lists} and taps/ holds {len(taps_here)} of {machine}"
+    return f"belongs to another machine, because this journal {lists}, but taps/ holds {len(taps_here)} of {machine}"
 
 
 def _read_machine_name(folder: Path) -> str:
@@ -304,7 +306,8 @@ def _back_up_bytes(path: Path, content: bytes, why: str) -> None:
 
 def journal_damage_remark(path: Path, fault: str) -> Remark:
     """Return the remark on a damaged journal file."""
-    return Remark("journal-damaged", path.name, fault, f"Run {format_command('rebuild', path.parent)} to repair it")
+    cure = f"Run {format_command('rebuild', path.parent)} to repair the journal"
+    return Remark("journal-damaged", path.name, fault, cure)
 
 
 def format_command(name: str, folder: Path) -> str:

@@ -111,7 +111,7 @@ class CutTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         least, most = self.radial_mm
         if least > most:
-            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise. Give [smallest, largest].")
+            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] is not in rising order. Give [smallest, largest].")
         if most > self.tool_diameter_mm:
             raise ValueError(f"radial_depth_mm={most:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}")
         missing = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
@@ -119,7 +119,7 @@ class CutTable(TomlTable, frozen=True):
             cure = "Give material, or both tangential_n_per_mm2 and radial_n_per_mm2, or all three."
             raise ValueError(f"cutting coefficients are incomplete. {cure}")
         if self.feed not in (*FEED_ANGLES, "both"):
-            raise ValueError(f'unknown feed {self.feed!r}. Give "x", "y" or "both".')
+            raise ValueError(f'unknown feed direction {self.feed!r}. Give "x", "y" or "both".')
         convert_pitch(self.pitch_deg, self.teeth)
 
 
@@ -151,7 +151,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.flute_length_mm is not None and self.depth_mm > self.flute_length_mm:
-            raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
+            raise ValueError(f"depth_mm={self.depth_mm:g} is larger than flute_length_mm={self.flute_length_mm:g}")
         if self.corner_radius_mm is not None:
             self.corner_immersion(self.corner_radius_mm)
 
@@ -182,7 +182,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
         """
         tool = self.tool_diameter_mm / 2
         if radius_mm < tool:
-            cure = "Give the radius left in the part, or a smaller tool."
+            cure = "Give the radius of the finished corner, or a smaller tool."
             raise ValueError(f"corner_radius_mm={radius_mm:g} is smaller than the tool radius {tool:g} mm. {cure}")
         return (1 - math.cos(corner_engagement(tool, self.radial_mm[1], radius_mm))) / 2
 

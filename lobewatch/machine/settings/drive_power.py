@@ -111,14 +111,15 @@ def build_power_reading(
 
     Raises ValueError for a power that is implausible or tells nothing about Kt.
     """
-    option, cure = f"build_power_reading.power_kw {power_kw:g}", "Give the power of the cut minus that in air, in kW."
+    option = f"build_power_reading.power_kw {power_kw:g}"
+    cure = "Give the power of the cut minus the power in air, in kW."
     if not (math.isfinite(power_kw) and power_kw > 0):
         raise ValueError(f"{option} is not above 0. {cure}")
     if table.feed_per_tooth_mm is None:
-        raise ValueError(f"{option} needs feed_per_tooth_mm. Add it to machine.toml.")
+        raise ValueError(f"{option} needs feed_per_tooth_mm. Add this key to machine.toml.")
     if len(table.immersions) > 1:
         unknown = "cannot be used, because the radial depth changes during the cut"
-        raise ValueError(f"{option} {unknown}. Leave it out, or read it in a cut with one radial depth.")
+        raise ValueError(f"{option} {unknown}. Leave out the power, or read the power of a cut with one radial depth.")
     if power_kw > machine.drive.power_kw:
         raise ValueError(f"{option} is above power_kw={machine.drive.power_kw:g} of [drive]. {cure}")
     cut, edge = machine.build_cut(table), machine.coefficients(table).tangential_edge
@@ -127,7 +128,7 @@ def build_power_reading(
     expected_kw = reading.expected_power(speed_rpm) / 1e3
     low, high = expected_kw / MAX_POWER_RATIO, expected_kw * MAX_POWER_RATIO
     if not low <= power_kw <= high:
-        expected = f"{low:.2g} to {high:.2g} kW expected with Kt {cut.tangential / 1e6:.0f} N/mm2"
+        expected = f"the {low:.2g} to {high:.2g} kW expected with Kt {cut.tangential / 1e6:.0f} N/mm2"
         raise ValueError(f"{option} is outside {expected}. {cure}")
     return reading
 

@@ -210,7 +210,7 @@ class Machine(toml.TomlTable, frozen=True):
 
     def _check_hammer(self) -> None:
         if self.tap.hammer == "force" and {channel.quantity for channel in self.daq.channel} == {"acceleration"}:
-            cure = 'Add that of the hammer, or set hammer = "none" in [tap].'
+            cure = 'Add the channel of the hammer, or set hammer = "none" in [tap].'
             raise ValueError(f"daq: no [[daq.channel]] measures force. {cure}")
 
     def _check_tools(self) -> None:
@@ -222,7 +222,7 @@ class Machine(toml.TomlTable, frozen=True):
                 continue
             if tool.name == self.tap.tool:
                 problem = f"[spindle] already has the segments of {tool.name!r}, the tool of [tap]"
-                raise ValueError(f"tool {i}: {problem}. Remove them here, or rename this tool.")
+                raise ValueError(f"tool {i}: {problem}. Remove the segments from this [[tool]], or rename it.")
             if self.spindle is None or self.spindle.tool_length_mm is None:
                 cure = f"Give the length of {self.tap.tool!r} on the shaft."
                 raise ValueError(f"tool {i}: tool_length_mm is missing in [spindle]. {cure}")

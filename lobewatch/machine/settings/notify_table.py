@@ -52,7 +52,7 @@ class Broker(NamedTuple):
         if not self.user or self.password or not os.environ.get(PASSWORD_VARIABLE):
             return ""
         host = os.environ.get(PASSWORD_HOST_VARIABLE) or "not set"
-        cure = f"Set it to {self.host_port} to use the password there."
+        cure = f"Set {PASSWORD_HOST_VARIABLE} to {self.host_port} to use the password for this broker."
         return f"{PASSWORD_VARIABLE} is not used, because {PASSWORD_HOST_VARIABLE} is {host}. {cure}"
 
 

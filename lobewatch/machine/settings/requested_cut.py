@@ -76,7 +76,7 @@ def find_cut_setting(
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
     if speed is None or depth is None:
         missing = f"ProgramTable.{'speed_rpm' if speed is None else 'depth_mm'}"
-        raise ValueError(f"{missing} is missing. Give it, because the {REFERENCE_CUT} has no value of its own.")
+        raise ValueError(f"{missing} is missing. Give this value, because the {REFERENCE_CUT} has no default for it.")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
     program_name, tool = (preset.name, preset.tool) if preset else (None, machine.tap.tool)
@@ -96,7 +96,7 @@ def choose_cut(
         raise ValueError(f"{both if cut else neither} choose_cut.cut given. {_choose_one_of(machine.cut_tables)}.")
     if cut and (speed is None or depth is None):
         key = "speed_rpm" if speed is None else "depth_mm"
-        raise ValueError(f"choose_cut.cut {cut} needs ProgramTable.{key}. Give it, or use choose_cut.program.")
+        raise ValueError(f"choose_cut.cut {cut} needs ProgramTable.{key}. Give both, or use choose_cut.program.")
     return find_cut_setting(machine, program or cut, speed, depth, power_kw)
 
 
@@ -195,7 +195,7 @@ def _check_numbers(machine: Machine, given: Mapping[str, Any]) -> None:
 def _complete_missing(machine: Machine, tool: str | None) -> str:
     """Return the remedy for missing values, with the reason why no program gives them."""
     if tool is None:
-        return "Give them, or name a tool with programs."
+        return "Give these values, or name a tool with programs."
     with_programs = {program.tool for program in machine.all_programs}
     names = {machine.tap.tool, *(table.name for table in machine.tool), *with_programs}
     if tool not in names:
@@ -203,5 +203,5 @@ def _complete_missing(machine: Machine, tool: str | None) -> str:
         known = f"Did you mean {near[0]!r}?" if near else f"Known tools: {', '.join(map(repr, sorted(names)))}."
         return f"Tool {tool!r} is not in machine.toml. {known}"
     if tool in with_programs:
-        return f"Give them, because the programs of tool {tool!r} differ."
-    return f"Give them, because no program uses tool {tool!r}."
+        return f"Give these values, because the programs of tool {tool!r} differ."
+    return f"Give these values, because no program uses tool {tool!r}."

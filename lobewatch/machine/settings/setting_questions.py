@@ -83,7 +83,7 @@ class ImplausibleSetting(NamedTuple):
     @property
     def remark(self) -> Remark:
         """Question about the number, with its remedy."""
-        cure = f"Correct it in machine.toml, or confirm it with folder_updates.accept_settings {self.key}"
+        cure = f"Correct the value in machine.toml, or confirm it with folder_updates.accept_settings {self.key}"
         return Remark(self.fault.value, self.location, f"{self.key} = {self.value} {self.reason}", cure)
 
 
@@ -207,7 +207,7 @@ def _check_same_tool(machine: Machine, program: ProgramTable, place: str) -> Ite
     for key in ("tool_diameter_mm", "teeth"):
         value = getattr(program, key)
         for other in [other for other in same_tool if getattr(other, key) != value][:1]:
-            why = f"differs from {getattr(other, key):g} of {other.name!r} with the same tool {LIKELY_MISTAKES}"
+            why = f"differs from {getattr(other, key):g} of program {other.name!r} with the same tool {LIKELY_MISTAKES}"
             yield ImplausibleSetting(SettingFault.CONTRADICTION, place, key, f"{value:g}", why)
 
 
@@ -250,7 +250,7 @@ def _check_parts(place: str, parts: Sequence[TomlTable]) -> Iterator[Implausible
             radius = math.sqrt(inertia / mass)
             if inertia and not GYRATION_RADIUS_RANGE.holds(radius):
                 low, high, unit = GYRATION_RADIUS_RANGE
-                why = f"with {mass:g} kg is {radius:.3g} {unit}, outside {low:g} to {high:g}"
+                why = f"with {mass:g} kg gives {radius:.3g} {unit}, outside {low:g} to {high:g}"
                 yield ImplausibleSetting(SettingFault.OUT_OF_RANGE, f"{place} {i}", key, f"{inertia:g}", why)
 
 

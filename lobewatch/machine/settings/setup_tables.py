@@ -93,10 +93,10 @@ class TapTable(TomlTable, frozen=True):
     def __post_init__(self) -> None:
         self.conditions(self.tool)
         if self.hammer == "none" and self.trigger_n is not None:
-            cure = "Remove it, so that trial hits set the trigger."
+            cure = "Remove trigger_n, so that trial hits set the trigger."
             raise ValueError(f'trigger_n={self.trigger_n:g} cannot be used with hammer="none". {cure}')
         if self.cable_mass_g and self.sensor_mass_g is None:
-            raise ValueError(f"cable_mass_g={self.cable_mass_g:g} needs sensor_mass_g. Give both.")
+            raise ValueError(f"cable_mass_g={self.cable_mass_g:g} needs sensor_mass_g. Give both masses.")
 
     @property
     def quantity(self) -> ChannelQuantity:
@@ -130,7 +130,7 @@ class ModeTable(TomlTable, frozen=True):
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
-            raise ValueError(f"band_hz={list(self.band_hz)} does not rise. Give [lowest, highest] in Hz.")
+            raise ValueError(f"band_hz={list(self.band_hz)} is not in rising order. Give [lowest, highest] in Hz.")
 
 
 class LimitsTable(TomlTable, frozen=True):
@@ -186,9 +186,9 @@ class ChannelTable(TomlTable, frozen=True):
             raise ValueError("give exactly one of sensitivity_mv_per_n (force) and sensitivity_mv_per_g (acceleration)")
         value = self.sensitivity_mv_per_n if self.quantity == "force" else self.sensitivity_mv_per_g
         if value is None:
-            raise ValueError(f"quantity={self.quantity!r} needs {key} instead")
+            raise ValueError(f"quantity={self.quantity!r} does not fit the unit of the sensitivity. Give {key}.")
         if value == 0:
-            raise ValueError(f"{key}=0 is not a sensitivity. Take it from the calibration sheet.")
+            raise ValueError(f"{key}=0 is not a sensitivity. Give the value of the calibration sheet.")
 
     def build(self) -> SensorInput:
         """Build the sensor input in SI units: volts per N or per m/s^2."""

@@ -189,9 +189,9 @@ class ToolTable(TomlTable, frozen=True):
             value = getattr(self, key)
             if isinstance(value, tuple) and value[0] > value[1]:
                 cure = "Give [smallest, largest], or only the largest."
-                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] does not rise. {cure}")
+                raise ValueError(f"{key}=[{value[0]:g}, {value[1]:g}] is not in rising order. {cure}")
         if self.masses and not self.segments:
-            raise ValueError("masses need segments. Add the shape of the tool, or remove the masses.")
+            raise ValueError("masses need segments. Add the segments of the tool, or remove the masses.")
 
     def build(self, spindle: Spindle) -> Spindle:
         """Build the tool as a free shaft in SI units, with defaults of the spindle."""

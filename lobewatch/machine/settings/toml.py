@@ -54,7 +54,7 @@ def check_control_characters(table: Mapping[str, Any], place: str = "") -> None:
                     check_control_characters(inner, f"{place}{key.removesuffix('s')} {i}: ")
 
 
-HELIX_HINT = "Give 0 to below 90 deg from the axis, also for left-hand flutes"
+HELIX_HINT = "Give the helix angle from the axis, 0 to below 90 deg, also for left-hand flutes"
 """Remedy for a helix angle outside its range."""
 TYPE_NAMES = {"int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false"}
 TYPE_NAMES |= {"array": "a list", "object": "a table", "date": "a date"}
@@ -168,7 +168,9 @@ def parse_toml_tables(text: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except RecursionError as error:
         line = "" if dotted is None else f" in line {text.count(chr(10), 0, dotted.start()) + 1}"
-        raise ValueError(f"tables or lists are nested too deeply{line}. machine.toml needs four levels.") from error
+        raise ValueError(
+            f"tables or lists are nested too deeply{line}. machine.toml needs at most four levels."
+        ) from error
 
 
 TomlValue = str | bool | int | float | list[str] | None
@@ -202,7 +204,9 @@ def edit_toml(text: str, place: TablePath, values: Mapping[str, TomlValue]) -> s
     with contextlib.suppress(tomllib.TOMLDecodeError):
         if tomllib.loads(edited) == wanted:
             return edited
-    raise DataError(f"machine.toml: [{place.name}] has a layout that lobewatch cannot edit. Edit it by hand.")
+    raise DataError(
+        f"machine.toml: [{place.name}] has a layout that lobewatch cannot edit. Edit this table in a text editor."
+    )
 
 
 def _set_values(tables: dict[str, Any], place: TablePath, values: Mapping[str, TomlValue]) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
     names = ("flutes", "diameter in mm", "helix in deg", length)
     teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
     if not teeth.is_integer():
-        raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Enter a whole number first.")
+        raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Begin with a whole number.")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
     tool: dict[str, TomlValue] = {"teeth": int(teeth), "tool_diameter_mm": diameter, "helix_deg": helix}
     draft = _set_in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
@@ -245,7 +245,9 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)", "1000 18000", _current_speeds, _set_speeds),
     SetupQuestion("drive", _DRIVE_TEXT, "15 40", _current_drive, _set_drive),
     DAQ_QUESTION,
-    _sensor_question("hammer", "force", f"{_SENSOR_TEXT.format('N')}. Enter none without a force sensor.", "0 2.25 5"),
+    _sensor_question(
+        "hammer", "force", f"{_SENSOR_TEXT.format('N')}. Enter none if you have no force sensor.", "0 2.25 5"
+    ),
     _sensor_question("accelerometer", "acceleration", _SENSOR_TEXT.format("g"), "1 10 5"),
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
     SetupQuestion("tool", _TOOL_TEXT, _EXAMPLE_TOOL, _current_tool, _set_tool),
@@ -259,5 +261,5 @@ def find_setup_question(name: str) -> SetupQuestion:
     """Return the question of a name; ValueError that lists all names."""
     by_name = {question.name: question for question in SETUP_QUESTIONS}
     if name not in by_name:
-        raise ValueError(f"find_setup_question.name {name} is no question. Choose {', '.join(by_name)}.")
+        raise ValueError(f"find_setup_question.name {name} is not a setup question. Choose {', '.join(by_name)}.")
     return by_name[name]

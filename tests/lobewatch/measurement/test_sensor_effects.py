@@ -48,7 +48,7 @@ def test_a_named_sensor_is_taken_off_and_its_uncertainty_is_in_the_errors() -> N
         assert low[0] < true.frequency < high[0]
         assert low[2] < true.stiffness < high[2]
     assert codes(tap) == ["sensor-mass-removed"]
-    assert "10 ± 0.2 g" in tap.remarks[0].text
+    assert all(mass in tap.remarks[0].text for mass in ("10 g", "0.2 g"))
     cable = fit(measured(), "sensor_mass_g = 5", "cable_mass_g = 10", 'mounting = "wax"')
     assert cable.modes[0].frequency == pytest.approx(tap.modes[0].frequency)
     assert cable.modes[0].standard_error[0] > 3 * tap.modes[0].standard_error[0]
@@ -132,5 +132,5 @@ def test_of_a_file_the_mass_is_an_option(tmp_path: Any) -> None:
     said = CliRunner().invoke(app, ["modes", str(path)]).stdout
     assert "10 g would change the frequency" in said
     taken = CliRunner().invoke(app, ["modes", str(path), "--sensor-mass", "10"]).stdout
-    assert "10 ± 0.2 g of accelerometer and cable" in taken
+    assert "10 g of accelerometer and cable" in taken
     assert "1500" in taken

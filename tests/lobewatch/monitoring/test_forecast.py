@@ -116,7 +116,7 @@ def test_the_temperature_is_no_decay() -> None:
 
 @pytest.mark.parametrize("dates", [np.arange(7.0), np.zeros(0), np.zeros(9)])
 def test_too_short_a_history_predicts_nothing(dates: Floats) -> None:
-    with pytest.raises(ValueError, match=rf"^{dates.size} points .*forecast.* 8$"):
+    with pytest.raises(ValueError, match=rf"^{dates.size} points .*forecast.* 8 points"):
         forecast_series(dates, np.zeros(dates.size), 60.0)
 
 

@@ -101,7 +101,7 @@ def test_a_dead_sensor_and_a_missing_one_are_reported() -> None:
         record(Stream(np.zeros(round(3 * RATE))))
     with pytest.raises(DeviceError, match="range"):
         record(Stream(np.full(round(3 * RATE), 1e6)))
-    with pytest.raises(DataError, match=r"acceleration channel.*\[daq\]"):
+    with pytest.raises(DataError, match=r"acceleration channel.*\[\[daq.channel\]\]"):
         record(Stream(sound((1.0, False)), channels=CHANNELS[:1]))
 
 

@@ -79,7 +79,7 @@ def test_a_dead_sensor(channels: Pair, level: float, words: str) -> None:
 def test_lost_scans_and_a_full_disk(channels: Pair) -> None:
     said = failed(record(channels, lost=512), free=10**8)
     assert set(said) == {"samples", "disk"}
-    assert said["samples"].startswith("512 scans lost")
+    assert said["samples"].startswith("512 ")
 
 
 def test_the_longest_stretch_without_hits_is_inspected(channels: Pair) -> None:

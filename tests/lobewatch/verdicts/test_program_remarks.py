@@ -93,8 +93,8 @@ def test_what_cuts_have_taught_of_the_force_leaves_the_limits_as_they_are(tapped
     [
         (steel(6000, radial=3.6), ("6000 rpm", "339 m/min", "74 to 161 m/min")),
         (steel(1100, radial=3.6), ("1100 rpm", "62.2 m/min", "74 to 161 m/min")),
-        (steel(6000, radial=3.6, tool=""), ("fastest tool of 18 mm", "side", "42CrMo4")),
-        (steel(2000), ("carbide of 18 mm", "slot", "42CrMo4")),
+        (steel(6000, radial=3.6, tool=""), ("fastest tool", "18 mm", "side", "42CrMo4")),
+        (steel(2000), ("carbide", "18 mm", "slot", "42CrMo4")),
         (steel(2000, radial=3.6, tool=CARBIDE + "max_speed_rpm = 1900"), ("2000 rpm", "max_speed_rpm = 1900")),
         (
             steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.5"),

@@ -145,10 +145,10 @@ def machine_of(**changes: Any) -> Machine:
         ({"tangential_n_per_mm2": 1.4}, "tangential_n_per_mm2", "200 to 6000"),
         ({"tangential_n_per_mm2": 6500, "radial_n_per_mm2": 2000}, "tangential_n_per_mm2", "200 to 6000"),
         ({"radial_n_per_mm2": 1900}, "radial_n_per_mm2", "1.36 times tangential_n_per_mm2"),
-        ({"tool_diameter_mm": 10}, "tool_diameter_mm", " 20 of 'our'"),
-        ({"tool_diameter_mm": 0.787, "radial_depth_mm": 0.7}, "tool_diameter_mm", " 20 of 'our'"),
+        ({"tool_diameter_mm": 10}, "tool_diameter_mm", " 20 of program 'our'"),
+        ({"tool_diameter_mm": 0.787, "radial_depth_mm": 0.7}, "tool_diameter_mm", " 20 of program 'our'"),
         ({"tool_diameter_mm": 5, "radial_depth_mm": 4}, "stick_out_mm", "16 diameters of 5 mm"),
-        ({"teeth": 5, "pitch_deg": [72, 72, 72, 72, 72]}, "teeth", " 4 of 'our'"),
+        ({"teeth": 5, "pitch_deg": [72, 72, 72, 72, 72]}, "teeth", " 4 of program 'our'"),
     ],
 )
 def test_what_is_not_plausible_is_asked_of_the_program_that_rests_on_it(

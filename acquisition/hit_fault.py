@@ -115,7 +115,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "double hit",
         "Let the hammer bounce off after the hit.",
         {
-            "pulse": "Second force peak {delay:.2g} ms {side} the main peak, with {percent:.2g} % of the main peak",
+            "pulse": "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)",
             "decay": "The decay is disturbed {delay:.2g} ms after the hit, probably by a double hit",
         },
     ),

@@ -144,10 +144,10 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     is_felt = abs(slope) * np.ptp(peaks) > MIN_LINEARITY_CHANGE * mode.frequency
     if assess_trust(mode) is not Trust.TRUSTED or not is_felt or abs(slope) < sure * error:
         return mode
-    per, words = 100 * 100 / mode.frequency, "softens" if slope < 0 else "stiffens"
+    per, words = 100 * 100 / mode.frequency, "falls" if slope < 0 else "rises"
     shift = f"{per * slope:+.2g} ± {per * error:.1g} % per 100 N"
-    text = f"{words} with hit force: {shift} in frequency, from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
-    return add_remark(mode, "force-dependent", text, "Check joints and clamping, and hit equally hard")
+    text = f"frequency {words} with hit force by {shift} (± standard error), from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
+    return add_remark(mode, "force-dependent", text, "Check joints and clamping, and give all hits the same force")
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:

@@ -159,7 +159,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     if not (np.isfinite(mass) and mass > 0):
         raise ValueError(f"mass={mass} kg is not above 0. Give the total moving mass, accelerometer included.")
     if len(hits) < 3:
-        raise ValueError(f"{len(hits)} good hit(s) are too few. Hit the mass at least 3 times.")
+        raise ValueError(f"{len(hits)} good hits are too few. Hit the mass at least 3 times.")
     upper = (estimate_frf(hits).usable_band or (0.0, 0.0))[1]
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
     inside = (frequency >= MIN_CALIBRATION_FREQUENCY) & (frequency <= upper)

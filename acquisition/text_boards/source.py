@@ -186,7 +186,7 @@ def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -
         raise ValueError('sample_rate_hz is missing for driver = "lines". Give the nominal number of lines per second.')
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
         given = ", ".join(str(sensor.number) for sensor in inputs)
-        raise ValueError(f"inputs {given} must be 0 to {len(inputs) - 1}, each once. Correct input in [[daq.channel]].")
+        raise ValueError(f"input = {given} in [[daq.channel]] must be 0 to {len(inputs) - 1}. Use each number once.")
     return sample_rate
 
 

@@ -199,6 +199,8 @@ def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibrati
             raise ValueError(f"{found}. Correct [[daq.channel]].")
         scale *= abs(channel.sensitivity)
     if abs(channel.full_scale / scale - 1) > MAX_RANGE_DEVIATION:
-        text = f"range_v={channel.full_scale:g} differs from the calibration in the name of the {calibration.model}"
+        text = (
+            f"range_v={channel.full_scale:g} differs from the calibration in the name of the {calibration.model} device"
+        )
         raise ValueError(f"{text}. Set range_v = {scale:.4g} for input {number}.")
     return replace(channel, adc_bits=24, full_scale=scale)

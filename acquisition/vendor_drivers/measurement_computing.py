@@ -72,7 +72,7 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     library = library_device.load_library("daqhats")
     address = port.removeprefix("mcc172:")
     if not address.isdigit():
-        raise ValueError(f"port={port!r} has no board address. Give a board (0 to 7), as in mcc172:0.")
+        raise ValueError(f"port={port!r} has no board address. Give board 0 to 7, as in mcc172:0.")
     library_device.check_input_numbers(inputs, 2, "an MCC 172")
     for sensor in inputs:
         if sensor.channel.full_scale != MCC172_FULL_SCALE:

@@ -114,12 +114,12 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
         return replace_band(state, band, None)
     fitted = plan.fitted(state)
     if fitted is None:
-        raise ValueError(f"{request}: the neighbouring modes cannot be fitted without this mode. Drop the neighbours, too.")
+        raise ValueError(f"{request}: the neighbouring modes cannot be fitted without this mode. Drop them all.")
     return replace_band(state, band, fitted)
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    request, advice = f"add {frequency:g} Hz", "Check the figure of the FRF, or fix the damping ratio of the mode as well."
+    request, advice = f"add {frequency:g} Hz", "Check the figure of the FRF, or also fix the damping ratio."
     plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
@@ -131,7 +131,7 @@ def _add_mode(state: Extraction, frequency: float) -> Extraction:
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
-        mode = f"{best.fit.frequency[-1]:.1f} Hz has a standard error of {100 * max(errors):.0f} % of zeta or stiffness K"
+        mode = f"{best.fit.frequency[-1]:.1f} Hz has a standard error of {100 * max(errors):.0f} % in zeta or K"
         raise ValueError(f"{request}: the best fit at {mode}. {advice}")
     return replace_band(state, plan.band, best)
 

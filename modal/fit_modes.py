@@ -94,7 +94,8 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     ['500.0 Hz']
     """
     if hits and len(hits) != len(state.frfs):
-        raise ValueError(f"{len(hits)} lists of hits for {len(state.frfs)} FRFs. Give one list of hits per FRF, even an empty one.")
+        found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
+        raise ValueError(f"{found}. Give one list of hits per FRF, even an empty list.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
@@ -115,7 +116,7 @@ def modes_from_band(
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
-    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes fitted together" if m > 1 else ""
+    of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
     modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
     return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]

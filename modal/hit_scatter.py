@@ -144,9 +144,9 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     is_felt = abs(slope) * np.ptp(peaks) > MIN_LINEARITY_CHANGE * mode.frequency
     if assess_trust(mode) is not Trust.TRUSTED or not is_felt or abs(slope) < sure * error:
         return mode
-    per, words = 100 * 100 / mode.frequency, "falls" if slope < 0 else "rises"
-    shift = f"{per * slope:+.2g} ± {per * error:.1g} % per 100 N"
-    text = f"frequency {words} with hit force by {shift} (± standard error), from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
+    per, words = 100 * 100 / mode.frequency, "softens" if slope < 0 else "stiffens"
+    shift = f"frequency {per * slope:+.2g} ± {per * error:.1g} % (± standard error) per 100 N"
+    text = f"mode {words} with hit force: {shift}, hits of {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
     return add_remark(mode, "force-dependent", text, "Check joints and clamping, and give all hits the same force")
 
 

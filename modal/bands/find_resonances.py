@@ -78,7 +78,9 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     """
     n = frf.frequency.size
     if n < MIN_FRF_LINES:
-        raise ValueError(f"{n} FRF lines are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines.")
+        raise ValueError(
+            f"{n} lines of the FRF are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines."
+        )
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
     frf = remove_drift(frf)

@@ -41,7 +41,7 @@ def mac(a: ArrayLike, b: ArrayLike) -> float:
     """
     x, y = np.asarray(a), np.asarray(b)
     if x.shape != y.shape or x.ndim != 1:
-        raise ValueError(f"mode shapes have {x.shape} and {y.shape} points. Give both mode shapes over the same points.")
+        raise ValueError(f"mode shapes have {x.shape} and {y.shape} points. Give both shapes over the same points.")
     size = float(np.vdot(x, x).real * np.vdot(y, y).real)
     if not size > 0:
         raise ValueError("a mode shape is zero or not finite. Leave this mode out.")
@@ -108,7 +108,8 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
         return ModeMatch(None, (mode_remark(last, "no-mode-to-follow", text),))
     first = _match_distance(last, near[0])
     if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
-        text = f"followed mode is ambiguous: {near[1].frequency:.1f} Hz fits the last test ({_values_text(last)}) nearly as well"
+        rival = f"{near[1].frequency:.1f} Hz fits the last test ({_values_text(last)}) nearly as well"
+        text = f"followed mode is ambiguous: {rival}"
         return ModeMatch(near[0], (mode_remark(near[0], "rival-mode", text),))
     if first > DOUBTFUL_MATCH_DISTANCE:
         text = f"may be another mode: {_values_text(last)} in the last test, now {_values_text(near[0])}"

@@ -46,7 +46,7 @@ class ModeEdits:
         for name, (frequency, *_) in self._edits():
             if frequency in named:
                 both = f"{name} twice" if named[frequency] == name else f"{named[frequency]} and {name}"
-                raise ValueError(f"{frequency:g} Hz has two edits ({both}). Give one edit per mode.")
+                raise ValueError(f"{frequency:g} Hz: {both}. Give one edit per mode.")
             named[frequency] = name
 
     def _edits(self) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -129,5 +129,5 @@ def _numbers(name: str, text: str, wanted: str, count: int) -> list[float]:
         numbers = []
     if len(numbers) != count:
         point = " with a decimal point" if "," in text else ""
-        raise ValueError(f"ModeEdits.{name} {text} is invalid. Give {wanted}{point}.")
+        raise ValueError(f"ModeEdits.{name} {text}: invalid. Give {wanted}{point}.")
     return numbers

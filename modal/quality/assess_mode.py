@@ -78,8 +78,8 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
     )
     mode = with_truncation_error(figures)
     word = band.edits[i] if band.edits else ""
-    text = "frequency and zeta fixed by the operator, without uncertainty"
-    text = text if word == FIXED_MODE else f"mode {word} by the operator"
+    held = "frequency and zeta fixed by the operator, without uncertainty"
+    text = held if word == FIXED_MODE else f"mode {word} by the operator"
     by_hand = (mode_remark(mode, "by-hand", text),) if word else ()
     of_value = *_value_remarks(band, i, mode), *_error_remarks(mode)
     return replace(mode, remarks=(*by_hand, *_position_remarks(state, band, i, mode), *of_value))
@@ -130,7 +130,8 @@ def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     width, share = mode.half_power_damping, mode.misfit_share or 0.0
     if not mode.is_driving_point:
         cure = "Mount the sensor at the hit point. If the sensor is there, change the sign of one channel"
-        yield mode_remark(mode, "not-driving-point", "stiffness K is negative: sensor and hammer move in opposite phase", cure)
+        text = "stiffness K is negative: sensor and hammer move in opposite phase"
+        yield mode_remark(mode, "not-driving-point", text, cure)
     error = band.fit.size_error[0, i]
     if error > MAX_PEAK_FIT_ERROR:
         text = f"mode hardly moves at the driving point, standard error of stiffness K {100 * error:.0f} %"
@@ -145,7 +146,8 @@ def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     is_wide = np.sum(is_near) >= MIN_HALF_POWER_LINES
     differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
     if width is not None and differs and is_wide and band.height.size == 1:
-        yield mode_remark(mode, "half-power-width", f"half-power width gives zeta {100 * width:.2g} % instead of {100 * mode.damping_ratio:.2g} %")
+        text = f"half-power width gives zeta {100 * width:.2g} % instead of {100 * mode.damping_ratio:.2g} %"
+        yield mode_remark(mode, "half-power-width", text)
 
 
 def _error_remarks(mode: Mode) -> Iterator[Remark]:
@@ -153,7 +155,7 @@ def _error_remarks(mode: Mode) -> Iterator[Remark]:
         text = f"zeta {100 * mode.damping_ratio:.0f} % without a clear peak: probably a sum of several modes"
         yield mode_remark(mode, "heavy-damping", text)
     if mode.coherence is not None and mode.coherence < MIN_GOOD_COHERENCE:
-        text = f"coherence {mode.coherence:.2f} at the peak is below {MIN_GOOD_COHERENCE:g}: the FRFs of the hits differ"
+        text = f"coherence {mode.coherence:.2f} at the peak is below {MIN_GOOD_COHERENCE:g}: the hits differ in FRF"
         yield mode_remark(mode, "low-coherence", text, "Hit the same point in the same direction each time")
     scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
     if scatter > MAX_HIT_SCATTER_RATIO:
@@ -170,7 +172,8 @@ def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
 def _add_phase_remark(mode: Mode, expected: float) -> Mode:
     if abs(mode.phase_deg - expected) <= max(MAX_CONSTANT_PHASE_DEG, 3 * mode.phase_deg_std):
         return mode
-    text = f"phase of the modal constant is {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}° (± standard error), not 0°"
+    phase = f"{mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}°"
+    text = f"phase of the modal constant is {phase} (± standard error) instead of 0°"
     cure = "Check the clamping, close modes, and the delay between the channels"
     return add_remark(mode, "complex-mode", text, cure)
 

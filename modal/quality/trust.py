@@ -148,7 +148,9 @@ REJECTION_REASONS = {
 """Text for each rule of `trust_rules` that rejects a mode."""
 MAX_NEGATIVE_PEAK_SHARE = 0.1
 """Peak of a mode with negative stiffness over the largest, below which it is left out; chosen."""
-REJECTED_MODE_REMEDY = "Check the peak with modal.synthesize_frf. If it is sensor drift, let the sensor settle or change the cable"
+REJECTED_MODE_REMEDY = (
+    "Check the peak with modal.synthesize_frf. Against drift, let the sensor settle or change its cable"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +202,7 @@ def select_credible_modes(modes: Sequence[Mode]) -> CredibleModes:
 
 
 def _opposed_mode_remark(mode: Mode, largest: float) -> Remark:
-    text = f"mode left out: stiffness K is negative, and the peak is only {100 * mode.peak / largest:.1g} % of the largest"
+    text = f"mode left out: stiffness K is negative, peak only {100 * mode.peak / largest:.1g} % of the largest peak"
     cure = "If the mode belongs to the machine, hit and measure at the same point in the same direction"
     return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 

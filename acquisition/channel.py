@@ -79,7 +79,7 @@ class Channel:
         if self.quantity not in get_args(ChannelQuantity):
             raise ValueError(f"quantity={self.quantity!r} is not one of {', '.join(get_args(ChannelQuantity))}")
         if self.direction and parse_direction(self.direction) == CROSS_TAP:
-            raise ValueError(f"direction={self.direction!r} is the direction of a cross tap. Give the sensor x or y.")
+            raise ValueError(f"direction={self.direction!r} is for cross taps only. Give the sensor x or y.")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
             raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} must be a finite number other than 0")
         if not (np.isfinite(self.full_scale) and self.full_scale > 0):

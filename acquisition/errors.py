@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
 """Error numbers of a place without write permission or without any."""
 REMEDY_BY_ERRNO = {
-    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "Make room on that disk"),
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "Free space on this disk"),
     **dict.fromkeys((errno.EMFILE, errno.ENFILE), "Close other programs: too many files are open"),
-    errno.ESTALE: "The network drive was lost: mount it again, then repeat the command",
+    errno.ESTALE: "The network drive was lost: mount the drive again, then repeat the command",
     errno.EIO: "The disk is failing: copy the folder to another disk",
 }
 """Remedy for errors of the operating system, by error number."""
@@ -64,7 +64,7 @@ def format_error(error: Exception) -> str:
         return format_os_error(error)
     if isinstance(error, (ValueError, OSError, ArithmeticError)):
         return str(error)
-    return f"{type(error).__name__}, which should not be: {error}"
+    return f"unexpected {type(error).__name__}: {error}"
 
 
 def format_os_error(error: OSError) -> str:

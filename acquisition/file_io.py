@@ -105,7 +105,7 @@ def open_regular_file(path: Path | str, largest: float = MAX_FILE_SIZE) -> FileI
             raise IrregularFileError(errno.EINVAL, f"this is a {kind}, not a file", str(path))
         if status.st_size > largest:
             sizes = f"{status.st_size / 1e6:.4g} MB is too large (limit {largest / 1e6:g} MB)"
-            raise IrregularFileError(errno.EFBIG, f"{sizes}. Restore the file from a backup, or remove it.", str(path))
+            raise IrregularFileError(errno.EFBIG, f"{sizes}. Restore the file from a backup, or delete it.", str(path))
         return FileIO(handle)
     except BaseException:
         os.close(handle)

@@ -169,7 +169,7 @@ class TapInputs:
             listed = ", ".join(channel.name for channel in channels) or "nothing"
             needed = "one force and one acceleration channel"
             if quantity == "acceleration":
-                needed = "one acceleration channel without a force sensor"
+                needed = "exactly one acceleration channel, because no force is measured"
             which = f' with direction = "{axis}"' if several else ""
             raise DataError(f"the DAQ has channels for {listed}. A tap test needs {needed}{which}.")
         cross = [i for i in found if direction == "x" and channels[i].direction == "y" and i not in responses]

@@ -6,8 +6,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-_REPORTED = "The device reports an overload"
-_RINGS = "The last tenth of the record still has {share:.1%} of the loudest tenth"
+_RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
 
 
 class HitFlags(enum.Flag):
@@ -116,26 +115,32 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "double hit",
         "Let the hammer bounce off after the hit.",
         {
-            "pulse": "Second peak {delay:.2g} ms {side} the main one ({percent:.2g} %)",
-            "decay": "The decay is disturbed {delay:.2g} ms after the hit, as by a double hit",
+            "pulse": "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)",
+            "decay": "The decay is disturbed {delay:.2g} ms after the hit, probably by a double hit",
         },
     ),
     HitFlags.OVERLOAD_FORCE: HitFault(
         "overload (force)",
         "Hit softer or choose a larger force range.",
-        {"": "Force clipped at {level:.4g} N for {samples} samples{note}", "reported": _REPORTED},
+        {
+            "": "Force clipped at {level:.4g} N for {samples} samples{note}",
+            "reported": "The device reports an overload of the force",
+        },
     ),
     HitFlags.OVERLOAD_RESPONSE: HitFault(
         "overload (response)",
         "Hit softer or choose a larger acceleration range.",
-        {"": "Response clipped at {level:.4g} m/s^2 for {samples} samples{note}", "reported": _REPORTED},
+        {
+            "": "Response clipped at {level:.4g} m/s^2 for {samples} samples{note}",
+            "reported": "The device reports an overload of the response",
+        },
     ),
     HitFlags.TOO_SOFT: HitFault(
         "too soft",
         "Hit harder.",
         {
-            "range": "Peak of {peak:.4g} N is below {range_share:.0%} of the range of {full:.0f} N",
-            "noise": "Peak of {peak:.4g} N is below {noise_ratio:.0f} times the noise of {noise:.3g} N",
+            "range": "Force peak of {peak:.4g} N is below {range_share:.0%} of the range of {full:.0f} N",
+            "noise": "Force peak of {peak:.4g} N is below {noise_ratio:.0f} times the noise of {noise:.3g} N",
             "response": "Response of {peak:.3g} m/s^2 is below {noise_ratio:.0f} times the noise of {noise:.2g} m/s^2",
             "spectrum": "The force spectrum is 20 dB below its largest value from {start:.3g} Hz on",
         },
@@ -149,39 +154,41 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     ),
     HitFlags.LOST_SCANS: HitFault(
         "lost scans",
-        "Hit again. If scans are lost again, lower the sample rate or change the cable.",
-        {"": "{count} scans are missing in this record"},
+        "Hit again. If samples are lost again, lower the sample rate or change the cable.",
+        {"": "{count} samples per channel are missing in this record"},
     ),
     HitFlags.NO_HIT: HitFault(
         "no hit",
         "Check the hammer cable and the trigger level.",
-        {"": "No hammer pulse above the noise of the force"},
+        {"": "No hammer pulse above the noise of the force signal"},
     ),
     HitFlags.SWAPPED_CHANNELS: HitFault(
-        "swapped channels", "Swap the two cables.", {"": "The force channel rings, the response channel does not"}
+        "swapped channels",
+        "Swap the cables of hammer and accelerometer.",
+        {"": "The force channel vibrates after the hit, the response channel does not"},
     ),
     HitFlags.TOO_HARD: HitFault(
         "too hard",
         "Hit softer or choose a larger force range.",
-        {"": "Peak of {peak:.4g} N is {share:.0%} of the range of {full:.0f} N"},
+        {"": "Force peak of {peak:.4g} N is {share:.0%} of the range of {full:.0f} N"},
         {"range_share": 0.9},
     ),
     HitFlags.NARROW_BAND: HitFault(
         "narrow band",
         "Use a harder hammer tip.",
-        {"": "The force reaches {reach:.0f} Hz (-20 dB) of the required {end:g} Hz"},
+        {"": "The force spectrum reaches {reach:.0f} Hz (-20 dB) of the required {end:g} Hz"},
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",
         "Hit the same spot in the same direction as before.",
-        {"": "FRF differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
+        {"": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),
-    HitFlags.UNDONE: HitFault("undone", "Removed by the operator."),
+    HitFlags.UNDONE: HitFault("undone", "The operator removed this hit."),
     HitFlags.NOT_EVALUATED: HitFault(
         "not judged",
-        "Hit again. If this repeats, check both sensors and their cables.",
-        {"": "Evaluation failed ({reason})"},
+        "Hit again. If the evaluation fails again, check hammer, accelerometer and cables.",
+        {"": "The evaluation of this hit failed ({reason})"},
     ),
 }
 """Fault of each flag.

@@ -32,11 +32,11 @@ def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
         text = f"{point.value} of the package {package} is not an acquisition.{kind.__name__}"
         return make_unusable_remark(kind, point.name, text)
     if loaded.name != point.name:
-        return make_unusable_remark(kind, point.name, f"the package {package} also names it {loaded.name!r}")
+        return make_unusable_remark(kind, point.name, f"the package {package} names this plugin {loaded.name!r}, too")
     return loaded
 
 
-def make_unusable_remark(kind: type, name: str, text: str, cure: str = "Update or remove that package") -> Remark:
+def make_unusable_remark(kind: type, name: str, text: str, cure: str = "Update or remove the package") -> Remark:
     return Remark("package-not-loaded", f"{kind.__name__.lower()} {name!r}", text, cure)
 
 

@@ -54,7 +54,7 @@ class Conditions:
         for name, (low, high) in CONDITION_RANGES.items():
             value = getattr(self, name)
             if value is not None and not low <= value <= high:
-                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}. Correct or omit it.")
+                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}. Correct or omit this value.")
         for name in ("state", "note"):
             check_name(getattr(self, name), name)
 

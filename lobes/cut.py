@@ -29,11 +29,11 @@ def normalize_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
         return ()
     shown = f"pitch [{', '.join(f'{np.degrees(angle):g}' for angle in pitch)}]"
     if len(pitch) != teeth:
-        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} flutes")
+        raise ValueError(f"{shown} degrees has {len(pitch)} angles for {teeth} flutes. Give one angle per flute.")
     if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
         raise ValueError(f"{shown} degrees has an angle that is not > 0")
     if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM_TOLERANCE:
-        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees instead of 360. Measure it again.")
+        raise ValueError(f"{shown} sums to {np.degrees(sum(pitch)):g} degrees instead of 360. Measure the pitch again.")
     alike = [next(other for other in pitch if abs(other - angle) < PITCH_TOLERANCE) for angle in pitch]
     return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
 
@@ -84,15 +84,17 @@ class Cut:
         if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1. Give the number of flutes.")
         if not 0 < self.immersion <= 1:
-            text = "Give the radial depth divided by the cutter diameter."
+            text = "Give the radial depth of cut ae divided by the cutter diameter."
             raise ValueError(f"immersion={self.immersion} is not in (0, 1]. {text}")
         if self.direction not in get_args(Direction):
-            raise ValueError(f'direction={self.direction!r} is neither "up" nor "down". For a slot, give either.')
+            raise ValueError(f'direction={self.direction!r} is neither "up" nor "down". A slot may have either.')
         check_coefficients(self.tangential, self.radial)
         text = "rad/m is not a finite number >= 0. Give 2 tan(helix angle) / diameter."
         check_number("helix_lag", self.helix_lag, text, may_be_zero=True)
         if not np.isfinite(self.feed_angle):
-            raise ValueError(f"feed_angle={self.feed_angle} rad is not finite. Give 0 for feed along x, pi/2 along y.")
+            raise ValueError(
+                f"feed_angle={self.feed_angle} rad is not finite. Give 0 for a feed along x, pi/2 along y."
+            )
         object.__setattr__(self, "pitch", normalize_pitch(self.pitch, self.teeth))
 
     @property
@@ -241,7 +243,7 @@ def mean_torque(cut: Cut, depth: ArrayLike, diameter: float, feed_per_tooth: flo
     """
     for name, value in (("diameter", diameter), ("feed_per_tooth", feed_per_tooth)):
         check_number(name, value, "m is not a finite number > 0 (1 mm is 1e-3 m)")
-    text = "N/m is not a finite number >= 0 (1 N/mm is 1e3 N/m). Leave it out if unknown."
+    text = "N/m is not a finite number >= 0 (1 N/mm is 1e3 N/m). Leave an unknown edge coefficient out."
     check_number("edge", edge, text, may_be_zero=True)
     chip = feed_per_tooth * (np.cos(cut.entry_angle) - np.cos(cut.exit_angle))
     per_depth = cut.tangential * chip + edge * (cut.exit_angle - cut.entry_angle)
@@ -295,7 +297,7 @@ def max_depth_for_drive(
     """
     for name, value in (("power", power), ("torque", torque)):
         if not value > 0:
-            raise ValueError(f"{name}={value} is not > 0. Leave it out if the drive has no such limit.")
+            raise ValueError(f"{name}={value} is not > 0. Leave {name} out if the drive has no {name} limit.")
     turning = 2 * np.pi * np.asarray(speed_rpm, dtype=np.float64) / 60
     allowed = np.minimum(torque, power / turning)
     return np.asarray(allowed / mean_torque(cut, 1.0, diameter, feed_per_tooth, edge))

@@ -57,17 +57,19 @@ class SldHistory:
         object.__setattr__(self, "depth", {name: np.asarray(d, dtype=np.float64) for name, d in self.depth.items()})
         object.__setattr__(self, "units", dict(self.units))
         if np.any(np.diff(self.speed_rpm) <= 0):
-            raise ValueError("speed_rpm does not rise from speed to speed. Sort the grid.")
+            raise ValueError("speed_rpm does not rise from value to value. Sort the speeds in rising order.")
         for text in (self.settings_hash, self.software, *self.units.values(), *self.depth):
             _check_text(text)
         stray = sorted(self.units.keys() - self.columns.keys())
         if stray:
-            raise ValueError(f"units names unknown columns {stray}. Choose from {sorted(self.columns)}.")
+            raise ValueError(f"units names unknown columns {stray}. The columns are {sorted(self.columns)}.")
         for name, depth in self.depth.items():
             self._check_depth(name, depth)
         rows = {name: len(values) for name, values in (*self.columns.items(), *self.depth.items())}
         if len(set(rows.values())) > 1:
-            raise ValueError(f"columns and depths have different numbers of rows: {rows}. Give one per measurement.")
+            raise ValueError(
+                f"columns and depths have different numbers of rows: {rows}. Give one row per measurement."
+            )
 
     def _check_depth(self, name: str, depth: Floats) -> None:
         if not name:
@@ -75,7 +77,7 @@ class SldHistory:
         if depth.ndim != 2 or depth.shape[1] != self.speed_rpm.size:
             raise ValueError(f"depth of {name!r} has shape {depth.shape}, not (n, {self.speed_rpm.size})")
         if np.any(depth <= 0):
-            advice = "Give inf for no limit and nan for a limit not computed."
+            advice = "Give inf for an unlimited depth and nan for a limit that was not computed."
             raise ValueError(f"depth of {name!r} has values that are not > 0 m. {advice}")
 
     def __len__(self) -> int:
@@ -107,16 +109,22 @@ class SldHistory:
 
 def _append_row(table: Mapping[str, ColumnT], row: Mapping[str, ArrayLike]) -> dict[str, ColumnT]:
     if table.keys() != row.keys():
-        raise ValueError(f"the new row has {sorted(row)}, the history {sorted(table)}. Give a value for each column.")
+        raise ValueError(
+            f"the new row has columns {sorted(row)}, the history {sorted(table)}. Give a value for each column."
+        )
     return {name: _append_value(name, values, row[name]) for name, values in table.items()}
 
 
 def _append_value(name: str, values: ColumnT, row: ArrayLike) -> ColumnT:
     new = np.asarray(row)
     if new.shape != values.shape[1:]:
-        raise ValueError(f"the new row of {name!r} has shape {new.shape}, the rows of the history {values.shape[1:]}")
+        raise ValueError(
+            f"the new row of {name!r} has shape {new.shape}, the rows of the history have {values.shape[1:]}"
+        )
     if (new.dtype.kind == "U") != (values.dtype.kind == "U"):
-        raise ValueError(f"the new row of {name!r} is {new.dtype}, the history {values.dtype}. Use the same type.")
+        raise ValueError(
+            f"the new row of {name!r} has type {new.dtype}, the history {values.dtype}. Use the type of the history."
+        )
     return np.concatenate((values, new[np.newaxis]))
 
 
@@ -127,7 +135,7 @@ def _check_column(name: str, values: ArrayLike) -> Column:
     is_text = column.dtype.kind == "U"
     if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if is_text else (1, 2)):
         given = f"{column.dtype} of shape {column.shape}"
-        raise ValueError(f"column {name!r} is {given}. Give numbers (n,) or (n, k), or text (n,).")
+        raise ValueError(f"column {name!r} is {given}. Give numbers of shape (n,) or (n, k), or text of shape (n,).")
     for text in column if is_text else ():
         _check_text(text)
     return column if is_text else column.astype(np.float64)
@@ -136,4 +144,4 @@ def _check_column(name: str, values: ArrayLike) -> Column:
 def _check_text(text: str) -> None:
     """Reject characters that UTF-8 text in HDF5 cannot hold: a zero character or half a surrogate pair."""
     if re.search("[\0\ud800-\udfff]", text):
-        raise ValueError(f"text {text!r} has a character that cannot be stored. Remove it.")
+        raise ValueError(f"text {text!r} has a character that cannot be stored. Remove this character.")

@@ -98,7 +98,7 @@ def read_history(path: str | os.PathLike[str]) -> SldHistory:
     content = Path(path).read_bytes()
     if content[:HISTORY_HEAD_SIZE] != _file_head(content[HISTORY_HEAD_SIZE:]):
         wanted = f"{HISTORY_FORMAT} file of version {HISTORY_FORMAT_VERSION}"
-        raise ValueError(f"{os.fspath(path)}: damaged, or not a {wanted}. Rebuild it from the tap tests.")
+        raise ValueError(f"{os.fspath(path)}: damaged, or not a {wanted}. Rebuild the history from the tap tests.")
     with h5py.File(io.BytesIO(content), "r") as file:
         columns, cuts = file["columns"], file["cuts"]
         return SldHistory(

@@ -89,7 +89,7 @@ MAX_FLIP_IMMERSION = 0.95
 """Largest immersion with flip lobes at fast teeth, around tooth frequency = 2 f_n / (2 k + 1)."""
 MIN_FAST_TOOTH_RATIO = 0.5
 """Tooth frequency over chatter frequency from which the wide flip lobes, k = 0 and 1, occur."""
-MEAN_FORCE_REMEDY = "Use semi-discretisation"
+MEAN_FORCE_REMEDY = "Compute the limit with semi-discretisation"
 """Remedy if a mean force does not describe the cut."""
 
 
@@ -134,20 +134,22 @@ def _band_remarks(grid: Floats, real: Floats) -> tuple[Remark, ...]:
     weakest = int(np.argmin(real))
     if grid[0] == 0 or (real[weakest] < 0 and 0 < weakest < grid.size - 1):
         return ()
-    text = f"the FRF does not cover the chatter band: its real part has no minimum in {grid[0]:g} to {grid[-1]:g} Hz"
-    return (Remark("chatter-band-missing", "", text, "Use or record a wider band"),)
+    text = f"the FRF does not cover the chatter band: no minimum of the real part in {grid[0]:g} to {grid[-1]:g} Hz"
+    return (Remark("chatter-band-missing", "", text, "Use or record an FRF over a wider band"),)
 
 
 def _mean_force_remarks(cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
     """Return a remark if the immersion is too low, or the teeth are too fast, for a mean force."""
     if cut.immersion < MIN_MEAN_FORCE_IMMERSION:
         text = f"immersion {cut.immersion:g} is below {MIN_MEAN_FORCE_IMMERSION}"
-        text = f"limit may be too high: {text} and flip lobes are not included"
+        text = f"depth limit may be too high: {text}, and flip lobes are not included"
         return (Remark("low-immersion", "", text, MEAN_FORCE_REMEDY),)
     fast = MIN_FAST_TOOTH_RATIO * 60 * chatter / cut.teeth
     if cut.immersion >= MAX_FLIP_IMMERSION or np.max(speed_rpm) < fast:
         return ()
-    text = f"limit may be much too high above {fast:.0f} rpm at immersion {cut.immersion:g}: flip lobes not included"
+    text = (
+        f"depth limit may be much too high above {fast:.0f} rpm: flip lobes not included (immersion {cut.immersion:g})"
+    )
     return (Remark("fast-teeth", "", text, MEAN_FORCE_REMEDY),)
 
 

@@ -100,7 +100,7 @@ def build_milling_system(x: TipModes, y: TipModes, vectors: ArrayLike | None = N
         raise ValueError("x and y are both None. Give the modes of at least one direction.")
     for _, name, modes in given:
         if isinstance(modes, Frf):
-            raise ValueError(f"{name} is an FRF, but semi-discretisation needs modes. Fit them with modal.fit_modes.")
+            raise ValueError(f"{name} is an FRF, but semi-discretisation needs modes. Fit modes with modal.fit_modes.")
         check_modes(modes, name)
     modes = [mode for _, _, group in given for mode in group]
     direction = np.repeat(np.arange(len(given)), [len(group) for _, _, group in given])
@@ -218,13 +218,15 @@ def age_mode(baseline: Mode, ratio: float, rule: StiffnessRule, stiffness_ratio:
     """
     if rule not in get_args(StiffnessRule):
         known = ", ".join(get_args(StiffnessRule))
-        raise ValueError(f"rule={rule!r} is not one of {known}. Choose how K changes with the natural frequency.")
+        raise ValueError(f"rule={rule!r} is not one of {known}. Choose how stiffness K changes with f1.")
     for name, value in (("ratio", ratio), ("stiffness_ratio", 1.0 if stiffness_ratio is None else stiffness_ratio)):
-        check_number(name, value, "is not a finite number > 0. Give new over old.")
+        check_number(name, value, "is not a finite number > 0. Give the new value divided by the old value.")
     if rule == "measured" and stiffness_ratio is None:
-        raise ValueError('rule="measured" needs stiffness_ratio. Give K of the new tap test over K of the baseline.')
+        raise ValueError(
+            'rule="measured" needs stiffness_ratio. Give stiffness K of the new tap test over that of the baseline.'
+        )
     if rule == "paper" and stiffness_ratio is not None:
-        raise ValueError(f'rule="paper" sets K itself. Leave stiffness_ratio={stiffness_ratio} out.')
+        raise ValueError(f'rule="paper" computes stiffness K. Leave stiffness_ratio={stiffness_ratio} out.')
     softer = ratio if rule == "paper" else 1.0 if stiffness_ratio is None else stiffness_ratio
     rule_text = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
     return baseline.scaled(ratio, softer, f"aged, {rule_text}")

@@ -108,7 +108,7 @@ def find_pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
     order = np.argsort(lobes.speed_rpm)
     most = np.broadcast_to(np.asarray(deepest, dtype=np.float64), lobes.speed_rpm.shape)[order]
     if not np.all(np.isfinite(most) & (most > 0)):
-        raise ValueError(f"deepest={deepest!r} m is not finite and > 0. Give the deepest cut of interest.")
+        raise ValueError(f"deepest={deepest!r} m is not finite and > 0. Give the largest depth of cut of interest.")
     speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
     padded = np.concatenate(([0.0], depth, [0.0]))
     tops = find_curve_peaks(padded, prominence=0.05 * depth.min()) - 1

@@ -29,7 +29,7 @@ def check_vector(name: str, values: ArrayLike, item: str, text: str = "", may_be
 
 def check_speeds(speed_rpm: ArrayLike) -> Floats:
     """Return spindle speeds (rpm) as a 1-D array; ValueError unless there is one and all are finite and > 0."""
-    text = "is not a finite speed > 0 rpm. Leave such speeds out."
+    text = "is not a finite speed > 0 rpm. Leave this speed out."
     return check_vector("speed_rpm", speed_rpm, "speed (rpm)", text)
 
 
@@ -114,7 +114,7 @@ class StabilityLobes:
         bad = np.flatnonzero(~(self.depth > 0))
         if bad.size:
             wrong = f"depth[{bad[0]}]={self.depth[bad[0]]} m"
-            raise ValueError(f"{wrong} is not > 0. Give inf if a cut is stable at any depth.")
+            raise ValueError(f"{wrong} is not > 0. Give inf for a cut that is stable at any depth.")
 
     @property
     def lobes(self) -> tuple[Lobe, ...]:
@@ -160,7 +160,7 @@ class StabilityLobes:
         outside = ~((wanted >= low) & (wanted <= high))
         if np.any(outside):
             chart = f"the chart ({low:g}..{high:g} rpm)"
-            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}. Compute lobes at that speed.")
+            raise ValueError(f"{wanted[outside].flat[0]:g} rpm is outside {chart}. Compute the lobes at this speed.")
         order = np.argsort(self.speed_rpm)
         speed, depth = self.speed_rpm[order], self.depth[order]
         right = np.searchsorted(speed, wanted)

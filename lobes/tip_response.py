@@ -45,12 +45,12 @@ class TipResponse:
 def check_modes(modes: Sequence[Mode], direction: str) -> None:
     """Reject an empty list of modes, and modes of no driving point."""
     if not modes:
-        raise ValueError(f"{direction} has no modes. Give at least one mode, or None if it is rigid.")
+        raise ValueError(f"{direction} has no modes. Give at least one mode, or None for a rigid direction.")
     for mode in modes:
         if not mode.is_driving_point:
             raise ValueError(
                 f"the mode at {mode.frequency:g} Hz of {direction} has a negative stiffness of {mode.stiffness:g} N/m. "
-                "Leave it out, or tap at the sensor (driving point)."
+                "Leave this mode out, or hit the tool at the sensor (driving point)."
             )
 
 
@@ -90,7 +90,7 @@ def common_grid(tips: Sequence[TipResponse]) -> Floats:
     low = max(tip.grid[0] for tip in tips)
     high = min(tip.grid[-1] for tip in tips)
     if not low < high:
-        ends = f"one ends at {high:g} Hz, the other begins at {low:g} Hz"
+        ends = f"one FRF ends at {high:g} Hz, the other begins at {low:g} Hz"
         raise ValueError(f"x and y have no common band: {ends}. Give FRFs that overlap.")
     if all(np.array_equal(tip.grid, tips[0].grid) for tip in tips[1:]):
         return tips[0].grid

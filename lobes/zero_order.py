@@ -96,8 +96,8 @@ def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
     if share >= MIN_NET_FORCE_RATIO:
         return ()
     text = (
-        f"limit may be much too high, because {100 * (1 - share):.0f} % of the force in {'xy'[axis]} (the only known "
-        "direction) cancels over a turn"
+        f"depth limit may be much too high, because {100 * (1 - share):.0f} % of the force in {'xy'[axis]} "
+        "(the only known direction) cancels over a turn"
     )
     return (Remark("force-cancels", "", text, MEAN_FORCE_REMEDY),)
 

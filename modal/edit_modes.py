@@ -107,31 +107,31 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
     place = _find_mode(state, frequency)
     if place is None:
         modes = ", ".join(f"{mode:.0f}" for band in state.bands for mode in band.fit.frequency) or "none"
-        raise ValueError(f"{request}: no mode within 1 %. Choose one of the modes (Hz): {modes}.")
+        raise ValueError(f"{request}: no mode within 1 % of this frequency. Choose one of the modes (Hz): {modes}.")
     band, i = place
     plan = _plan_for_band(band).without(i)
     if not plan.words:
         return replace_band(state, band, None)
     fitted = plan.fitted(state)
     if fitted is None:
-        raise ValueError(f"{request}: its neighbours cannot be fitted without it. Drop them too.")
+        raise ValueError(f"{request}: the neighbouring modes cannot be fitted without this mode. Drop them all.")
     return replace_band(state, band, fitted)
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    request, advice = f"add {frequency:g} Hz", "Check the figure, or fix its damping ratio as well."
+    request, advice = f"add {frequency:g} Hz", "Check the figure of the FRF, or also fix the damping ratio."
     plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):
-            raise ValueError(f"{request}: there is already a mode at {known[0]:.1f} Hz. Use fix or drop to change it.")
+            raise ValueError(f"{request}: a mode at {known[0]:.1f} Hz exists. Change this mode with fix or drop.")
     tries = [plan.with_mode(*start, ADDED_MODE).fitted(state) for start in _start_values(state, plan, frequency)]
     fits = [fitted for fitted in tries if fitted is not None and _is_added_mode_near(fitted, frequency)]
     if not fits:
-        raise ValueError(f"{request}: no mode fits there. {advice}")
+        raise ValueError(f"{request}: no mode fits at this frequency. {advice}")
     best = min(fits, key=lambda band: band.fit.sum_of_squares)
     if not are_modes(best.fit, best.data.frequency, best.height)[-1]:
         errors = best.fit.standard_error[1, -1] / best.fit.damping_ratio[-1], float(np.min(best.fit.size_error[:, -1]))
-        mode = f"{best.fit.frequency[-1]:.1f} Hz leaves zeta or K uncertain by {100 * max(errors):.0f} %"
+        mode = f"{best.fit.frequency[-1]:.1f} Hz has a standard error of {100 * max(errors):.0f} % in zeta or K"
         raise ValueError(f"{request}: the best fit at {mode}. {advice}")
     return replace_band(state, plan.band, best)
 
@@ -142,7 +142,7 @@ def _fix_mode(state: Extraction, frequency: float, zeta: float) -> Extraction:
     plan = _plan_for_band(place[0]).without(place[1]) if place else _plan_at_frequency(state, frequency, request)
     fitted = plan.with_mode(frequency, zeta, FIXED_MODE).fitted(state)
     if fitted is None or np.min(fitted.fit.size_error[:, -1]) > MAX_PEAK_FIT_ERROR:
-        raise ValueError(f"{request}: the FRF shows no such mode. Check the figure.")
+        raise ValueError(f"{request}: the FRF shows no mode with these values. Check the figure of the FRF.")
     return replace_band(state, plan.band, fitted)
 
 
@@ -162,7 +162,7 @@ def _plan_at_frequency(state: Extraction, frequency: float, request: str) -> _Ed
     """Return the plan of the band that holds a frequency, or of a new one around it."""
     f = state.frf.frequency
     if not f[0] < frequency < f[-1]:
-        raise ValueError(f"{request}: outside the measured band of {f[0]:g} to {f[-1]:g} Hz")
+        raise ValueError(f"{request}: outside the measured band. Give a frequency from {f[0]:g} to {f[-1]:g} Hz.")
     for band in state.bands:
         if band.data.frequency[0] <= frequency <= band.data.frequency[-1]:
             return _plan_for_band(band)

@@ -94,7 +94,8 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     ['500.0 Hz']
     """
     if hits and len(hits) != len(state.frfs):
-        raise ValueError(f"{len(hits)} lists of hits for {len(state.frfs)} FRFs. Give one list per FRF, even if empty.")
+        found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
+        raise ValueError(f"{found}. Give one list of hits per FRF, even an empty list.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
@@ -284,7 +285,7 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
     if records.ndim != 2 or records.shape[1] < 32:
         raise ValueError(f"decays have shape {records.shape}. Give (p, n) with n of at least 32 samples.")
     if not np.all(np.isfinite(records)) or not np.all(np.ptp(records, axis=1)):
-        raise ValueError("a decay is constant or has values that are not finite. Leave it out.")
+        raise ValueError("a decay is constant or has values that are not finite. Leave this decay out.")
     frequency = np.fft.rfftfreq(records.shape[1], 1 / sample_rate)
     return [from_accelerance(frequency, np.fft.rfft(record) / sample_rate) for record in records]
 

@@ -117,7 +117,7 @@ def mode_indicator(frfs: Sequence[Frf]) -> Floats:
     [0.0, 1.0]
     """
     if not frfs:
-        raise ValueError("no FRF given. Give one or more.")
+        raise ValueError("no FRF given. Give one or more FRFs.")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
         raise ValueError("the FRFs have different frequency lines. Measure or export all with the same settings.")
     receptance = np.array([frf.receptance for frf in frfs])

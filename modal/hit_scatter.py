@@ -145,9 +145,9 @@ def _add_linearity_remark(mode: Mode, peaks: Floats, change: Floats) -> Mode:
     if assess_trust(mode) is not Trust.TRUSTED or not is_felt or abs(slope) < sure * error:
         return mode
     per, words = 100 * 100 / mode.frequency, "softens" if slope < 0 else "stiffens"
-    shift = f"{per * slope:+.2g} ± {per * error:.1g} % per 100 N"
-    text = f"{words} with hit force: {shift} in frequency, from {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
-    return add_remark(mode, "force-dependent", text, "Check joints and clamping, and hit equally hard")
+    shift = f"frequency {per * slope:+.2g} ± {per * error:.1g} % (± standard error) per 100 N"
+    text = f"mode {words} with hit force: {shift}, hits of {np.min(peaks):.0f} to {np.max(peaks):.0f} N"
+    return add_remark(mode, "force-dependent", text, "Check joints and clamping, and give all hits the same force")
 
 
 def _fit_line(x: Floats, y: Floats) -> tuple[float, float]:

@@ -72,14 +72,14 @@ def check_inputs(inputs: Sequence[SensorInput]) -> None:
         if not 0 <= number < DIGITAL_INPUTS_CODE:
             raise ValueError(f"input={number} of a DATAQ device is not one of 0 to {DIGITAL_INPUTS_CODE - 1}")
     if not numbers or len(set(numbers)) < len(numbers):
-        raise ValueError(f"inputs {numbers} of a DATAQ device must be at least one, each used once")
+        raise ValueError(f"inputs {numbers} of a DATAQ device are invalid. Give one or more inputs, each once.")
 
 
 def choose_rate(wanted: float, dividend: int) -> RateSetting:
     """Return the setting nearest to a rate (Hz) with the least decimation. ValueError if it is out of reach."""
     fastest, slowest = dividend / SRATE_LIMITS[0], dividend / (SRATE_LIMITS[1] * DEC_LIMITS[1] * DECA_LIMITS[1])
     if not slowest <= wanted <= fastest:
-        raise ValueError(f"sample rate {wanted:g} Hz is outside the {slowest:.2g} to {fastest:g} Hz of this DAQ")
+        raise ValueError(f"sample rate {wanted:g} Hz is outside the range {slowest:.2g} to {fastest:g} Hz of this DAQ")
     dec = min(math.ceil(dividend / wanted / SRATE_LIMITS[1]), DEC_LIMITS[1])
     deca = min(math.ceil(dividend / wanted / SRATE_LIMITS[1] / dec), DECA_LIMITS[1])
     srate = round(dividend / wanted / dec / deca)
@@ -135,7 +135,7 @@ def encode_range(model: str, full_scale: float) -> int:
     """Return the code of a range (V) of a model. ValueError lists the ranges it has."""
     if full_scale not in DATAQ_RANGES[model]:
         has = ", ".join(f"{volts:g}" for volts in DATAQ_RANGES[model])
-        raise ValueError(f"range_v={full_scale:g} is not supported. The DI-{model} has ±{has} V.")
+        raise ValueError(f"range_v={full_scale:g} is not supported. The ranges of the DI-{model} are ±{has} V.")
     return DATAQ_RANGES[model].index(full_scale)
 
 
@@ -148,7 +148,7 @@ DATAQ_STOP_SILENCE = 0.2
 MAX_DRAIN_TIME = 1.0
 """Time that a device may go on sending before `stop` is sent again (s)."""
 CDC_HINT = (
-    "Set it to CDC mode: plug it in, press its button while the LED is green, release it when the LED is red. "
+    "Set the DATAQ device to CDC mode: plug it in, press its button while the LED is green, release it when red. "
     "The LED then blinks yellow"
 )
 
@@ -174,7 +174,7 @@ class DataqCommandLink:
             if self.drain():
                 return
         text = f"the device on {self._link.port} does not stop sending ({self._tries} tries)"
-        raise DeviceError(text, "Check that this is the port of the DAQ, then unplug it and plug it in again")
+        raise DeviceError(text, "Check that this is the port of the DAQ, then unplug the DAQ and plug it in again")
 
     def drain(self) -> bool:
         """Read until nothing more arrives. Return whether that happened in time."""
@@ -196,7 +196,7 @@ class DataqCommandLink:
             if maker.upper() != "DATAQ":
                 raise ValueError(f"maker {maker!r} is not DATAQ")
             if not serial:
-                raise ValueError("it reports no serial number")
+                raise ValueError("no serial number")
             return DeviceIdentity(f"DI-{parse_model(model)}", serial[:8], firmware), int(dividend)
         except ValueError as error:
             raise DeviceError(f"the device on {self._link.port} is not supported by this driver ({error})") from error

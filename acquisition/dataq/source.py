@@ -148,15 +148,16 @@ class DataqSource(ClosedOnExit):
         daq = f"the DAQ on {self._link.port}"
         if sends:
             text = f"the digital inputs of {daq} change, so lost bytes cannot be detected"
-            return DeviceError(text, "Leave them unconnected, or set loss_detection = false in [daq]")
+            return DeviceError(text, "Leave the digital inputs unconnected, or set loss_detection = false in [daq]")
         text = f"{daq} has sent no samples for {SILENCE_TIMEOUT:g} s"
-        return DeviceError(text, "Switch it off and on, then repeat the command")
+        return DeviceError(text, "Switch the DAQ off and on, then repeat the command")
 
     def _check_firmware(self) -> None:
         version = protocol.parse_firmware(self.identity.firmware)
         if version is not None and version < protocol.MIN_FIRMWARE_VERSION:
-            remedy = f"Install {protocol.MIN_FIRMWARE_VERSION} or newer with the upgrade tool of the manufacturer"
-            raise DeviceError(f"the {self.identity.model} on {self._link.port} has firmware {version:.2f}", remedy)
+            text = f"firmware {version:.2f} of the {self.identity.model} on {self._link.port} is too old"
+            remedy = f"Install version {protocol.MIN_FIRMWARE_VERSION} or newer with the upgrade tool of DATAQ"
+            raise DeviceError(text, remedy)
 
     def _configure(self, inputs: Sequence[SensorInput], wanted: float, dividend: int) -> float:
         """Configure the device and return the resulting sample rate (Hz)."""

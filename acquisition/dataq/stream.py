@@ -90,8 +90,8 @@ class DigitalClock:
 
 def _make_clock_error() -> DeviceError:
     low, high = CLOCK_PERIOD_LIMITS
-    text = f"digital input 0 of the DAQ has no regular square wave with a period of {low:g} to {high:g} scans"
-    return DeviceError(text, "Reconnect the generator, or remove digital_clock from [daq]")
+    text = f"digital input 0 of the DAQ has no regular square wave with a period of {low:g} to {high:g} samples"
+    return DeviceError(text, "Reconnect the clock generator, or remove digital_clock from [daq]")
 
 
 HELD_BACK_BYTES = 32

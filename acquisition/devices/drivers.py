@@ -109,9 +109,9 @@ EMULATED_CLOCK_FREQUENCY = 1000.0
 
 def _check_taps(settings: DeviceSettings) -> None:
     if not settings.loss_detection:
-        raise ValueError("loss_detection=false is not possible with a TAPS/1 device. Remove the key from [daq].")
+        raise ValueError("loss_detection=false is not possible with a TAPS/1 device. Remove loss_detection from [daq].")
     if settings.digital_clock:
-        raise ValueError("digital_clock=true is not possible with a TAPS/1 device. Remove the key from [daq].")
+        raise ValueError("digital_clock=true is not possible with a TAPS/1 device. Remove digital_clock from [daq].")
 
 
 def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:

@@ -193,7 +193,7 @@ def _make_scanned_port(driver: Driver, device: DeviceAddress) -> ScannedPort:
 
 def _scan_port(port: PortInfo, drivers: Sequence[Driver], remarks: list[Remark], named: bool) -> ScannedPort:
     if port.vendor is None and not named:
-        return ScannedPort(port, text="not probed, not a USB device")
+        return ScannedPort(port, text="not probed, because it is not a USB port")
     try:
         answer = probe_port(port.device, drivers, port.vendor, remarks)
     except DeviceError as error:

@@ -115,7 +115,8 @@ def _load_driver(name: str) -> Driver | Remark:
         return Remark("driver-not-known", "", text, "Correct the name, or install the package with this driver")
     if len(points) > 1:
         packages = " and ".join(map(get_package_name, points))
-        return make_unusable_remark(Driver, name, f"the packages {packages} both provide it", "Remove one of them")
+        text = f"the packages {packages} both provide this driver"
+        return make_unusable_remark(Driver, name, text, "Remove one of these packages")
     return load_plugin(points[0], Driver)
 
 
@@ -169,10 +170,10 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
     if driver.sensor_data is None:
         _check_sensors(driver, settings)
     elif settings.inputs:
-        cure = "Remove [[daq.channel]], or choose another driver, such as dataq."
-        raise ValueError(f"channel: {driver.title} describes its sensors itself. {cure}")
+        cure = "Remove every [[daq.channel]], or choose another driver, such as dataq."
+        raise ValueError(f"channel: {driver.title} reports its own sensors. {cure}")
     if settings.printing and not driver.prints_samples:
-        raise ValueError('printing: only driver = "lines" uses [daq.printing]. Remove the table.')
+        raise ValueError('printing: only driver = "lines" uses [daq.printing]. Remove the table [daq.printing].')
     with convert_driver_errors(driver.name, "checking [daq]", DataError):
         driver.check(settings)
 
@@ -181,14 +182,15 @@ def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
     quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
     if quantities.count("acceleration") == 0 or quantities.count("force") > 1:
         found = f'driver = "{driver.name}" has [[daq.channel]] for {", ".join(quantities) or "nothing"}'
-        cure = 'Give one of force and one of acceleration (with hammer = "none" in [tap] only acceleration).'
+        cure = 'Give one channel of force and one of acceleration (with hammer = "none" in [tap] only acceleration).'
         raise ValueError(f"{found}. {cure}")
     directions = [sensor.channel.direction for sensor in settings.inputs if sensor.channel.quantity == "acceleration"]
     named = sorted(filter(None, directions))
     if len(directions) > 1 and (not named or len(set(named)) < len(named)):
-        cure = 'Give each its own direction = "x" or "y" in [[daq.channel]].'
+        cure = 'Give each [[daq.channel]] of acceleration its own direction, "x" or "y".'
         raise ValueError(f"{len(directions)} channels of acceleration have directions {directions}. {cure}")
     numbers = [sensor.number for sensor in settings.inputs]
     for second, number in enumerate(numbers, 1):
         if (first := numbers.index(number) + 1) < second:
-            raise ValueError(f"channel {second}: input={number} is already used by channel {first}")
+            found = f"channel {second}: input={number} is already used by channel {first}"
+            raise ValueError(f"{found}. Give each channel its own input.")

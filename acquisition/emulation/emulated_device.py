@@ -147,7 +147,7 @@ class PtyWire:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
-            text = f"this system has no pseudo-terminal ({error}). Use TCP with EmulationSetup.tcp."
+            text = f"this system has no pseudo-terminal ({error}). Emulate the device on TCP with EmulationSetup.tcp."
             raise DataError(text) from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)

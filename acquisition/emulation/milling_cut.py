@@ -57,7 +57,8 @@ class MillingCut:
         if self.teeth < 1 or self.teeth != int(self.teeth):
             raise ValueError(f"teeth={self.teeth} is not a whole number >= 1")
         if not 0 <= self.entry_angle < self.exit_angle <= np.pi + 1e-9:
-            raise ValueError(f"angles {self.entry_angle} to {self.exit_angle} rad must be 0 <= entry < exit <= pi")
+            angles = f"entry_angle={self.entry_angle} and exit_angle={self.exit_angle} rad"
+            raise ValueError(f"{angles} must be 0 <= entry_angle < exit_angle <= pi")
         above = (self.tangential, self.depth, self.feed_per_tooth, self.speed_rpm)
         if not (min(above) > 0 and sum(above) < np.inf):
             text = f"tangential={self.tangential} Pa, depth={self.depth} m, feed_per_tooth={self.feed_per_tooth} m"
@@ -66,7 +67,7 @@ class MillingCut:
         if not (min(least) >= 0 and sum(least) < np.inf):
             raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and at least 0")
         if len(self.runout) not in (0, self.teeth):
-            raise ValueError(f"runout has {len(self.runout)} values. Give {self.teeth}, one per tooth, or none.")
+            raise ValueError(f"runout has {len(self.runout)} values. Give one per tooth ({self.teeth}), or no runout.")
         is_turn = abs(sum(self.pitch) - 2 * np.pi) < 1e-6
         if self.pitch and not (len(self.pitch) == self.teeth and min(self.pitch) > 0 and is_turn):
             cure = f"Give {self.teeth} values above 0, one per tooth, with the sum 2 pi."
@@ -95,7 +96,7 @@ class Passage:
 
     def __post_init__(self) -> None:
         if not (min(self.before, self.ramp, self.steady, self.after) >= 0 and self.cutting > 0):
-            raise ValueError(f"{self} is invalid. Times must not be below 0, and ramp or steady above 0.")
+            raise ValueError(f"{self} is invalid. Give times of 0 or more, and a ramp or steady time above 0.")
 
     def depth_at(self, time: Floats) -> Floats:
         """Return the share of the full depth.

@@ -122,7 +122,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     shapes = {(hit.force.size, hit.sample_rate) for hit in hits}
     if len(shapes) > 1:
         found = f"hits differ in length or sample rate: {sorted(shapes)}"
-        raise ValueError(f"{found}. Average only hits of one set-up.")
+        raise ValueError(f"{found}. Average only hits with the same record length and sample rate.")
     n = hits[0].force.size
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
@@ -231,7 +231,7 @@ class RunningMean:
         if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
             mean = f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz"
             found = f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot be averaged with hits of {mean}"
-            raise ValueError(f"{found}. Start a new test.")
+            raise ValueError(f"{found}. Start a new tap test.")
         if not hit.has_force:
             self.hits = (*self.hits, hit)
             return
@@ -256,7 +256,7 @@ class RunningMean:
         """
         others = self._others(hit)
         if not others:
-            raise ValueError("this is the only hit in the mean")
+            raise ValueError("this is the only hit in the mean, so no FRF is left without it")
         return estimate_frf(others)
 
     def remove(self, hit: Hit) -> None:

@@ -68,7 +68,7 @@ def encode_table_frf(frf: Frf, labels: ExportLabels) -> bytes:
 def encode_table_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode time, force and acceleration of one hit; raise DataError for several."""
     if len(hits) != 1:
-        raise DataError(f"a text table cannot hold {len(hits)} hits. Write .uff, .mat or .json, or write the FRF.")
+        raise DataError(f"a text table cannot hold {len(hits)} hits. Write .uff, .mat or .json, or only the FRF.")
     (hit,) = hits
     time = np.arange(hit.force.size) / hit.sample_rate
     return _encode_table({"time [s]": time, "force [N]": hit.force, "acceleration [m/s^2]": hit.acceleration}, labels)
@@ -96,7 +96,7 @@ def encode_mat_frf(frf: Frf, labels: ExportLabels) -> bytes:
 def encode_mat_hits(hits: Sequence[Hit], labels: ExportLabels) -> bytes:
     """Encode force (N) and acceleration (m/s^2), a row per hit, and the sample rate (Hz) as MATLAB v5."""
     if len({(hit.force.size, hit.sample_rate) for hit in hits}) > 1:
-        raise DataError("the hits differ in length or sample rate. Write them as .json.")
+        raise DataError("the hits differ in length or sample rate. Write the hits as .json.")
     rows = {name: np.stack([getattr(hit, name) for hit in hits]) for name in ("force", "acceleration")}
     return _encode_mat({**rows, "sample_rate": hits[0].sample_rate}, labels)
 
@@ -292,7 +292,7 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     path, out = Path(path), Path(out)
     writer = EXPORT_FORMATS.get(out.suffix.lower())
     if writer is None:
-        raise ValueError(f"{out}: {out.suffix!r} is not one of {', '.join(EXPORT_FORMATS)}")
+        raise ValueError(f"{out}: extension {out.suffix!r} is not one of {', '.join(EXPORT_FORMATS)}")
     if out.exists() and path.exists() and out.samefile(path):
         raise ValueError(f"{out}: this is also the input file. Give another output file.")
     recording = inspect_file(path, description).require_valid()
@@ -305,7 +305,7 @@ def convert(path: Path | str, out: Path | str, description: Description, *, hits
     elif recording.hits:
         content, amount = writer.encode_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"
     else:
-        raise DataError(f"{path}: the file has an FRF but no hits. Write it as {_FRF_EXTENSIONS}.")
+        raise DataError(f"{path}: the file has an FRF but no hits. Write the FRF as {_FRF_EXTENSIONS}.")
     atomic_write(out, content)
     return Conversion(out, writer.title, amount, writer.precision, recording)
 

@@ -118,15 +118,15 @@ def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
     """Read a file of `write_cut_signal`; raise DataError for another or a damaged file."""
     content = read_regular_file(path)
     if not hdf5_file.has_valid_checksum(content):  # HDF5 could hang on it
-        raise DataError(f"{path}: changed since it was written (SHA-256 differs). Restore it from a backup.")
+        raise DataError(f"{path}: content changed after writing (SHA-256 differs). Restore the file from a backup.")
     try:
         with hdf5_file.open_hdf5(io.BytesIO(content), "r") as file:
             if file.attrs.get("format") != CUT_FORMAT_NAME or int(file.attrs["version"]) > CUT_FORMAT_VERSION:
-                raise DataError(f"{path}: not a recorded cut that this version of lobewatch can read")
+                raise DataError(f"{path}: not a recorded cut of this version of lobewatch. Update lobewatch.")
             hdf5_file.check_unpacked_size(file, len(content), path)
             return _read_signal(file), json.loads(file["about"][()])
     except (OSError, KeyError) as error:
-        raise DataError(f"{path}: unreadable recorded cut ({error}). Restore it from a backup.") from error
+        raise DataError(f"{path}: unreadable recorded cut ({error}). Restore the file from a backup.") from error
 
 
 def _read_signal(file: h5py.File) -> CutSignal:

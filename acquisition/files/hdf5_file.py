@@ -36,7 +36,7 @@ def check_unpacked_size(file: h5py.File, packed: int, path: Path) -> None:
     try:
         file.visititems(lambda _, node: sizes.append(_measure_unpacked_size(node)))
     except (OSError, RuntimeError, TypeError, ValueError) as error:
-        raise DataError(f"{path}: unreadable HDF5 file ({error}). Restore it from a backup.") from error
+        raise DataError(f"{path}: unreadable HDF5 file ({error}). Restore the file from a backup.") from error
     check_unpacked_total(sum(sizes), packed, path)
 
 
@@ -50,7 +50,7 @@ def check_unpacked_total(unpacked: int, packed: int, path: Path) -> None:
     limit = get_unpacked_limit(packed)
     if unpacked > limit:
         sizes = f"{packed / 1e6:.3g} MB unpack to {unpacked / 1e6:.4g} MB (limit {limit / 1e6:.4g} MB)"
-        raise DataError(f"{path}: {sizes}. Export the recording again.")
+        raise DataError(f"{path}: {sizes}. Export the file again.")
 
 
 def _measure_unpacked_size(data: Any) -> int:

@@ -23,7 +23,7 @@ MIN_REGULAR_TURNS_SHARE = 0.8
 """Smallest share of turns that are as long as their neighbours."""
 NEIGHBOR_TURNS = 5
 """Number of turns on each side to compare with."""
-_TACHOMETER_ADVICE = "Check the tachometer and its column."
+_TACHOMETER_ADVICE = "Check the tachometer, the column and the number of pulses per turn."
 
 
 def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 1) -> Floats:
@@ -60,7 +60,7 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
     [3000.0]
     """
     if pulses < 1:
-        raise ValueError(f"{pulses} pulses per turn must be 1 or more")
+        raise ValueError(f"{pulses} pulses per turn are below 1")
     begins = _find_rising_edges(signal)
     marks = begins[::pulses]
     if marks.size < 3:
@@ -70,7 +70,7 @@ def compute_speed_from_pulses(signal: Floats, sample_rate: float, pulses: int = 
     usual = np.array([np.median(turn[max(i - NEIGHBOR_TURNS, 0) : i + NEIGHBOR_TURNS + 1]) for i in range(turn.size)])
     is_even = np.maximum(turn / usual, usual / turn) < MAX_TURN_RATIO
     if np.mean(is_even) < MIN_REGULAR_TURNS_SHARE:
-        raise ValueError(f"the {begins.size} pulses are irregular. {_TACHOMETER_ADVICE}")
+        raise ValueError(f"the {begins.size} tachometer pulses are irregular. {_TACHOMETER_ADVICE}")
     speed = np.full(signal.size, np.nan)
     edges = np.ceil(marks).astype(int)
     for first, last, time in zip(edges[:-1][is_even], edges[1:][is_even], turn[is_even], strict=True):
@@ -107,7 +107,7 @@ def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple
         report.add_missing(f"column of the spindle speed among {names}", "tacho", f' "{columns[0].name}"')
     rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
     if pulses is not None and not columns:
-        report.reject("pulses", pulses, "no tachometer column", "Give its name with Description.tacho")
+        report.reject("pulses", pulses, "no tachometer column", "Name the tachometer column with Description.tacho")
     return rest, columns[0] if columns else None
 
 
@@ -118,16 +118,17 @@ def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> F
     if unit is None or unit.quantity != "frequency":
         if signal.role == "speed":
             example = f' "speed [rpm]={signal.name}"'
-            raise report.add_missing(f"unit of the speed in {signal.name}", "columns", example)
+            raise report.add_missing(f"unit of the spindle speed in {signal.name}", "columns", example)
         try:
             return compute_speed_from_pulses(values, sample_rate, 1 if pulses is None else pulses)
         except ValueError as error:
             raise report.add_fault(f"{signal.name}: {error}") from error
     speed = np.abs(values) * (60 * unit.factor)
     if pulses is not None:
-        raise report.reject("pulses", pulses, f"{signal.name} is a speed in {signal.unit}", "Omit the option")
+        raise report.reject_useless("pulses", pulses, f"{signal.name} is a speed in {signal.unit}, not a pulse signal")
     if not np.any(speed > 0):
-        raise report.add_fault(f"{signal.name} is always 0 {signal.unit}", "Choose another column, or omit it")
+        cure = "Choose another column of the speed, or omit this column"
+        raise report.add_fault(f"spindle speed {signal.name} is always 0 {signal.unit}", cure)
     return np.where(speed > 0, speed, np.nan)
 
 
@@ -157,7 +158,7 @@ def read_cut_recording(path: Path | str, description: Description = EMPTY_DESCRI
         raise DataError(f"{path}: {report.format_problems()}")
     values, rate, speed = signals
     if not np.all(np.isfinite(values)):
-        raise DataError(f"{path}: the signal has infinite or missing values. Export it again.")
+        raise DataError(f"{path}: the signal has infinite or missing values. Export the file again.")
     return CutSignal(values, rate, sensor=description.sensor, speed_rpm=speed)
 
 

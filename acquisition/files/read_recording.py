@@ -93,7 +93,7 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     about = file_format.read_circumstances(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = ", ".join(description.list_signal_options())
-    problems = f"a {file_format.title} describes its contents itself. Omit {options}." if options else ""
+    problems = f"a {file_format.title} states its own signals and units. Omit {options}." if options else ""
     names = ("created", "tool", "direction", "operator", "device") if about else ()
     labels = {name: getattr(about, name) for name in names}
     conditions = about.conditions if about and about.machine else None
@@ -161,7 +161,7 @@ def read_hits(path: Path | str, description: Description = EMPTY_DESCRIPTION) ->
     """
     recording = read_recording(path, description)
     if isinstance(recording, Frf):
-        raise DataError(f"{path}: the file has an FRF but no hits")
+        raise DataError(f"{path}: the file has an FRF but no hits. Export the hits as signals over time.")
     return recording
 
 
@@ -209,7 +209,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     if frf is None:
-        raise DataError(f"{path}: no FRF, because no force was measured")
+        raise DataError(f"{path}: no FRF, because no force was measured. Tap with an instrumented hammer.")
     return frf
 
 
@@ -227,7 +227,8 @@ def detect_format(path: Path) -> Format:
             reason = format_exception_line(error)
             _log.warning("%r: format %r failed to check the file (%s)", str(path), file_format.name, reason)
     titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in list_formats())
-    raise DataError(join_sentences(f"{path}: unknown file format", f"Export it as {titles}", *_list_broken_formats()))
+    cure = f"Export the recording as {titles}"
+    raise DataError(join_sentences(f"{path}: unknown file format", cure, *_list_broken_formats()))
 
 
 def read_contents(file_format: Format, path: Path, description: Description) -> Contents | list[Hit] | Frf:
@@ -238,7 +239,7 @@ def read_contents(file_format: Format, path: Path, description: Description) -> 
             return file_format.read(path)
     option = f"{path}: Description.skip {skip}" if skip else f"{path}: Description.decimal {decimal}"
     if read_from is None:
-        raise DataError(f"{option}: a {file_format.title} has no lines of text. Omit the option.")
+        raise DataError(f"{option}: a {file_format.title} has no lines of text. Omit this option.")
     if decimal not in DECIMAL_SIGNS:
         raise DataError(f"{option} is not comma or point")
     with _convert_errors(file_format, path):
@@ -249,7 +250,7 @@ def _read_force_contents(path: Path, description: Description) -> Contents:
     file_format = detect_format(path)
     held = read_contents(file_format, path, description if file_format.read_from else EMPTY_DESCRIPTION)
     if not isinstance(held, Contents):
-        raise DataError(f"Description.force {path}: a {file_format.title} already has force and response")
+        raise DataError(f"Omit Description.force {path}: a {file_format.title} already has force and response")
     return held
 
 
@@ -264,7 +265,7 @@ def _convert_errors(file_format: Format, path: Path) -> Iterator[None]:
         raise
     except Exception as error:
         fault = f"unreadable as {file_format.title} ({type(error).__name__}: {error})"
-        raise DataError(f"{path}: {fault}. Export it in another format.") from error
+        raise DataError(f"{path}: {fault}. Export the recording in another format.") from error
 
 
 def _list_broken_formats() -> list[str]:
@@ -283,7 +284,7 @@ def _load_plugin_formats() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
         if not isinstance(plugin, Format):
             remarks.append(plugin)
         elif plugin.name in taken | formats.keys():
-            text = f"{get_package_name(point)} and another package both provide it"
+            text = f"{get_package_name(point)} and another package both provide this format"
             remarks.append(make_unusable_remark(Format, point.name, text))
         else:
             formats[plugin.name] = plugin

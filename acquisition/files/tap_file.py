@@ -132,7 +132,7 @@ def read_tap(path: Path | str) -> TapTest:
             tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
             return TapTest(tap_id, about, frf, hits, flags, _read_source(file))
         except KeyError as error:
-            raise DataError(f"{path}: incomplete tap file ({error}). Restore it from a backup.") from error
+            raise DataError(f"{path}: incomplete tap file ({error}). Restore the file from a backup.") from error
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
@@ -221,7 +221,7 @@ def read_hit_name(path: Path | str) -> str:
 def _open_tap_file(path: Path) -> h5py.File:
     content = read_regular_file(path)
     if hdf5_file.has_wrong_checksum(content):
-        raise DataError(f"{path}: changed since it was written (SHA-256 differs). Restore it from a backup.")
+        raise DataError(f"{path}: content changed after writing (SHA-256 differs). Restore the file from a backup.")
     with contextlib.ExitStack() as closed_on_error:
         try:
             file = closed_on_error.enter_context(hdf5_file.open_hdf5(io.BytesIO(content), "r"))
@@ -230,11 +230,12 @@ def _open_tap_file(path: Path) -> h5py.File:
                 raise DataError(f"{path}: {fault}")
             version, newest = int(file.attrs.get("version", TAP_FORMAT_VERSION)), TAP_FORMAT_VERSION_WITHOUT_FORCE
             if version > newest:
-                fault = f"tap file version {version} is newer than {newest}, the newest that this lobewatch reads"
+                fault = f"tap file version {version} is newer than {newest}, the newest readable version"
                 raise DataError(f"{path}: {fault}. Update lobewatch.")
             hdf5_file.check_unpacked_size(file, len(content), path)
         except (OSError, LookupError, RuntimeError) as error:
-            raise DataError(f"{path}: unreadable or truncated HDF5 file ({error})") from error
+            fault = f"unreadable or truncated HDF5 file ({error})"
+            raise DataError(f"{path}: {fault}. Restore the file from a backup.") from error
         closed_on_error.pop_all()
     return file
 

@@ -201,10 +201,11 @@ def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:
     """
     error, n = mean.random_error, mean.n_averages
     if error is None:
-        raise ValueError(f"the scatter of hits needs a mean of 3 or more hits with coherence, not of {n}")
+        raise ValueError(f"the mean has {n} hit(s). The scatter of hits needs a mean of 3 or more hits with coherence.")
     if not np.array_equal(frf.frequency, mean.frequency):
-        of_mean = f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz. Compare only hits of one set-up."
-        raise ValueError(f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean {of_mean}")
+        spans = [f"{response.frequency.size} lines up to {response.frequency[-1]:g} Hz" for response in (frf, mean)]
+        found = f"the hit has {spans[0]}, the mean {spans[1]}"
+        raise ValueError(f"{found}. Compare only hits with the same record length and sample rate.")
     reach = min(response.usable_band[1] if response.usable_band else np.inf for response in (frf, mean))
     used = mean.frequency <= reach
     hit, expected = frf.receptance[used], mean.receptance[used]
@@ -223,7 +224,7 @@ def _evaluate_overloads(hit: Hit) -> Findings:
     for i, flag in enumerate((HitFlags.OVERLOAD_FORCE, HitFlags.OVERLOAD_RESPONSE)):
         overload = find_overload(hit, i) if i or hit.has_force else None
         if overload is not None:
-            note = " (inferred from its flat top)" if overload.inferred else ""
+            note = " (inferred from the flat top of the signal)" if overload.inferred else ""
             findings |= _state(flag, level=overload.level, samples=overload.samples, note=note)
         elif hit.overload >> i & 1:
             findings |= _state(flag, "reported")

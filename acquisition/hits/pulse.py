@@ -61,7 +61,7 @@ def require_pulse(hit: Hit) -> Pulse:
     """Return the highest force pulse; raise ValueError if there is none."""
     pulse = find_pulse(hit)
     if pulse is None:
-        raise ValueError("a hit has no force pulse. Check hits with check_hit first.")
+        raise ValueError("a hit has no force pulse. Check all hits with check_hit first.")
     return pulse
 
 

@@ -90,9 +90,9 @@ def list_serial_ports() -> list[PortInfo]:
 
 
 NO_PORTS_REMEDIES = {
-    "linux": "Check the last lines of `sudo dmesg`. In a container or virtual machine, pass the device through.",
-    "darwin": "Look for /dev/cu.usbmodem*, and allow the accessory if macOS asks.",
-    "win32": "Look under Ports (COM & LPT) in the Device Manager.",
+    "linux": "Look for the DAQ at the end of `sudo dmesg`. In a container or virtual machine, pass the DAQ through.",
+    "darwin": "Look for a port /dev/cu.usbmodem*, and allow the accessory if macOS asks.",
+    "win32": "Look for the DAQ under Ports (COM & LPT) in the Device Manager.",
 }
 """Remedy by sys.platform."""
 
@@ -120,14 +120,14 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
     text = str(error)
     busy = "Close the other program that uses the port"
     if platform == "linux" and not port.startswith("socket:"):
-        busy += f" (find it with `sudo fuser -v {port}`). If it is ModemManager, wait half a minute"
-    missing = "Check the cable and the port name (list all with `acquisition.scan_ports`)"
+        busy += f" (find the program with `sudo fuser -v {port}`). If the program is ModemManager, wait half a minute"
+    missing = "Check the cable and the port name (list all ports with `acquisition.scan_ports`)"
     hints = {
         **dict.fromkeys(("lock", "busy"), busy),
         "Permission denied": busy if platform == "win32" else _explain_permission(port, platform),
         "Access is denied": busy,
         **dict.fromkeys(("No such file", "FileNotFound"), missing),
-        "refused": "Start the device or emulator first",
+        "refused": "Start the device or the emulator, then repeat the command",
     }
     cure = next((hint for word, hint in hints.items() if word in text), "Check the port name and the cable")
     number = (error.errno or 0) if isinstance(error, OSError) else 0
@@ -201,7 +201,7 @@ class SerialLink:
             self._serial.write(data)
         except serial.SerialTimeoutException as error:
             text = f"the DAQ on {self.port} does not accept commands"
-            raise DeviceError(text, "Switch it off and on, then repeat the command") from error
+            raise DeviceError(text, "Switch the DAQ off and on, then repeat the command") from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
 
@@ -257,7 +257,7 @@ class SerialLink:
 
     def _unplugged(self) -> DeviceError:
         text = f"the DAQ on {self.port} was unplugged or switched off"
-        return DeviceError(text, "Plug it in, then repeat the command")
+        return DeviceError(text, "Plug the DAQ in, then repeat the command")
 
 
 class _TcpPort:

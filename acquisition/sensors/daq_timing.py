@@ -87,7 +87,7 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     10240
     """
     if not (np.isfinite(seconds) and seconds > 0):
-        raise ValueError(f"seconds={seconds} is not above 0. Use about 5 s to measure a sample rate.")
+        raise ValueError(f"seconds={seconds} is not above 0. Give about 5 s to measure a sample rate.")
     arrived: list[float] = []
     scans: list[int] = []
     source.start()
@@ -99,9 +99,9 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     source.stop()
     elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
     if len(scans) < MIN_RATE_BLOCKS or elapsed < seconds:
-        needed = f"at least {MIN_RATE_BLOCKS} in {seconds:g} s are needed to measure its rate"
+        needed = f"but at least {MIN_RATE_BLOCKS} in {seconds:g} s are needed"
         text = f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s, {needed}"
-        raise DeviceError(text, "Check its sample rate and the cable")
+        raise DeviceError(text, "Check the sample rate and the cable of the DAQ")
     period, scatter = _fit_scan_period(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, USB_POLL_INTERVAL / np.sqrt(6) / n_scans) / period**2)
     return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
@@ -133,14 +133,14 @@ def check_rate(measured: MeasuredRate, nominal: float) -> None:
     acquisition.errors.DeviceError: the DAQ samples at 24000.00 ± 0.50 Hz, not 25600 Hz, so ...
     """
     if measured.std > MAX_RATE_STD * measured.rate:
-        rate = f"{measured.rate:.6g} Hz ± {measured.std / measured.rate:.2%}, limit ± {MAX_RATE_STD:.2%}"
-        text = f"the sample rate of the DAQ cannot be measured, because its data arrive too unevenly ({rate})"
-        raise DeviceError(text, "Close other programs and try again")
+        rate = f"{measured.rate:.6g} Hz, standard error {measured.std / measured.rate:.2%}, limit {MAX_RATE_STD:.2%}"
+        text = f"the sample rate of the DAQ cannot be measured, because data arrive too unevenly ({rate})"
+        raise DeviceError(text, "Close other programs and measure the sample rate again")
     off = nominal / measured.rate - 1
     if abs(measured.rate / nominal - 1) > RATE_TOLERANCE + (0 if measured.is_accurate else 2 * measured.std / nominal):
         error = f"so every frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}"
         text = f"the DAQ samples at {measured.rate:.2f} ± {measured.std:.2f} Hz, not {nominal:g} Hz, {error}"
-        raise DeviceError(text, "Correct the sample rate of the DAQ, or use the measured one")
+        raise DeviceError(text, "Correct the sample rate of the DAQ, or use the measured rate")
 
 
 def rate_remark(measured: MeasuredRate) -> Remark | None:
@@ -159,8 +159,8 @@ def rate_remark(measured: MeasuredRate) -> Remark | None:
     if measured.is_accurate:
         return None
     share = measured.std / measured.rate
-    text = f"the sample rate of the DAQ, and with it every frequency, has an uncertainty of ±{share:.2%}"
-    remedy = "Close other programs and measure it again with acquisition.measure_rate"
+    text = f"the sample rate of the DAQ, and so every frequency, has a standard error of {share:.2%}"
+    remedy = "Close other programs and measure the sample rate again with acquisition.measure_rate"
     return Remark("rate-not-sure", "", text, remedy)
 
 
@@ -277,7 +277,7 @@ def _fit_phase_slope(records: Floats, second: Floats) -> MeasuredSkew:
     if share < MIN_COHERENT_SHARE:
         shares = f"over {MIN_SKEW_COHERENCE:g} at {share:.0%} of the lines, required {MIN_COHERENT_SHARE:.0%}"
         text = f"the two channels do not record the same broad-band signal (coherence {shares})"
-        raise ValueError(f"{text}. Join both inputs with a T-piece and feed noise or taps.")
+        raise ValueError(f"{text}. Join both inputs with a T-piece and feed the same noise or taps into both.")
     omega = 2 * np.pi * np.fft.rfftfreq(SKEW_SEGMENT_SAMPLES)[counts]
     rough = _find_correlation_peak(np.where(counts, mean, 0.0))
     turned = cross[:, counts] * np.exp(-1j * omega * rough)
@@ -296,7 +296,7 @@ def _check_records(first: ArrayLike, second: ArrayLike) -> Floats:
     n_least = MIN_SKEW_SEGMENTS * SKEW_SEGMENT_SAMPLES
     for record, name in zip(records, ("first", "second"), strict=True):
         if record.ndim != 1 or record.size < n_least or not np.all(np.isfinite(record)):
-            raise ValueError(f"the {name} record of shape {record.shape} must have {n_least} or more finite samples")
+            raise ValueError(f"the {name} record has shape {record.shape}. Give {n_least} or more finite samples.")
     if records[0].size != records[1].size:
         raise ValueError(f"the records differ in length: {records[0].size} and {records[1].size} samples")
     return np.stack([record - np.mean(record) for record in records])

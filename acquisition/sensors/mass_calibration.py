@@ -76,7 +76,7 @@ class MassCalibration:
 
     def _find_faults(self) -> Iterator[Remark]:
         if abs(self.phase) > MAX_RIGID_PHASE:
-            text = f"the phase of {self.phase:+.1f} deg is too large for a rigid mass"
+            text = f"the phase of F/(m a), {self.phase:+.1f} deg, is too large for a rigid mass"
             cure = "Measure the channel skew, and hit in line with the accelerometer and the centre of the mass"
             yield Remark("phase-not-rigid", "", text, cure)
         if self.inverted:
@@ -88,8 +88,8 @@ class MassCalibration:
         much = f"{share:.1%} too large" if share < 1 else f"{1 + share:.4g} times too large"
         wrong = "large" if self.ratio > 1 else "small"
         small = "acceleration" if self.ratio > 1 else "force"
-        text = f"the {large} reads {much} compared with the {small}, so every stiffness K is too {wrong}"
-        cure = "Check that the mass is the total moving mass, with accelerometer and mount"
+        text = f"the {large} is {much} compared with the {small}, so every stiffness K is too {wrong}"
+        cure = "Check that the given mass is the total moving mass, with accelerometer and mount"
         yield Remark("sensitivities-disagree", "", text, cure)
         if mistake := unit_mistake_remark(self.ratio):
             yield mistake
@@ -98,15 +98,16 @@ class MassCalibration:
         """Return all results, one sentence per line."""
         low, high = self.band
         lines = [
-            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
-            f"{low:.0f} to {high:.0f} Hz, flat within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg",
+            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} (standard error) "
+            f"over {self.n_hits} hits on {self.mass:g} kg, {low:.0f} to {high:.0f} Hz, "
+            f"constant within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg",
             *map(str, self.remarks),
         ]
         if self.sizes_agree:
-            lines.append(f"Both sensitivities agree within {MAX_SENSITIVITY_DEVIATION:.0%}.")
+            lines.append(f"The sensitivities of hammer and accelerometer agree within {MAX_SENSITIVITY_DEVIATION:.0%}.")
         elif self.channels is not None:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
-            force = f"the hammer has {old[0] * self.ratio:.4g} mV/N instead of {old[0]:.4g}"
+            force = f"the hammer has {old[0] * self.ratio:.4g} mV/N instead of {old[0]:.4g} mV/N"
             response = f"the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 instead of {old[1]:.4g}"
             lines.append(f"If the accelerometer is right, {force}.")
             lines.append(f"If the hammer is right, {response}.")
@@ -158,7 +159,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     if not (np.isfinite(mass) and mass > 0):
         raise ValueError(f"mass={mass} kg is not above 0. Give the total moving mass, accelerometer included.")
     if len(hits) < 3:
-        raise ValueError(f"{len(hits)} good hits are too few. A standard error needs at least 3.")
+        raise ValueError(f"{len(hits)} good hits are too few. Hit the mass at least 3 times.")
     upper = (estimate_frf(hits).usable_band or (0.0, 0.0))[1]
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
     inside = (frequency >= MIN_CALIBRATION_FREQUENCY) & (frequency <= upper)
@@ -167,7 +168,7 @@ def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
     s_fa = mass * np.array([cross[inside] for _, _, cross in spectra])
     n = _count_flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
     if n < MIN_CALIBRATION_LINES:
-        lines = f"{n} lines from {MIN_CALIBRATION_FREQUENCY:g} Hz on, {MIN_CALIBRATION_LINES} are required"
+        lines = f"{n} FRF lines from {MIN_CALIBRATION_FREQUENCY:g} Hz on, {MIN_CALIBRATION_LINES} are required"
         cure = "Hang the mass on long thin threads, screw the accelerometer on, hit harder, or record longer."
         raise ValueError(f"force and acceleration have no constant ratio ({lines}). {cure}")
     f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]

@@ -50,13 +50,13 @@ def unit_mistake_remark(ratio: float) -> Remark | None:
     Examples
     --------
     >>> print(unit_mistake_remark(STANDARD_GRAVITY).text)
-    the ratio 9.807 is close to 9.81, a typical unit mistake
+    the ratio F/(m a) = 9.807 is close to 9.81, a typical unit mistake
     >>> unit_mistake_remark(1.05) is None
     True
     """
     for factor, (value, cure) in _UNIT_MISTAKES.items():
         if abs(ratio / factor - 1) < UNIT_MISTAKE_TOLERANCE:
-            text = f"the ratio {ratio:.4g} is close to {value}, a typical unit mistake"
+            text = f"the ratio F/(m a) = {ratio:.4g} is close to {value}, a typical unit mistake"
             return Remark("unit-mistake", "", text, cure)
     return None
 
@@ -86,7 +86,7 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
     per = "N" if channel.quantity == "force" else "m/s^2"
     text = f"a sensitivity of {channel.sensitivity:g} V per {per} is implausible ({usual})"
     limits = low / SENSITIVITY_SPREAD, high * SENSITIVITY_SPREAD
-    range_text = f"a range of ±{channel.full_scale:g} V is implausible (converters have 0.01 to 100 V)"
+    range_text = f"an input range of ±{channel.full_scale:g} V is implausible (converters have ±0.01 to ±100 V)"
     checks = (
         ("sensitivity-not-believed", text, abs(channel.sensitivity) * unit, limits),
         ("input-range-not-believed", range_text, channel.full_scale, FULL_SCALE_LIMITS),
@@ -100,8 +100,9 @@ def channel_remarks(channel: Channel) -> tuple[Remark, ...]:
 
 def _explain_slip(value: float, low: float, high: float) -> str:
     """Return the advice on a slip by 1000 that explains a value outside its limits. Empty if it does not."""
-    slips = {value / 1e3: "Check whether it is in mV", value * 1e3: "Check whether it was divided by 1000 twice"}
-    return next((words for corrected, words in slips.items() if low <= corrected <= high), "")
+    slips = {value / 1e3: "is in mV", value * 1e3: "was divided by 1000 twice"}
+    slip = next((words for corrected, words in slips.items() if low <= corrected <= high), "")
+    return f"Check whether the value {slip}" if slip else ""
 
 
 def stiffness_remark(stiffness: float) -> Remark | None:
@@ -126,7 +127,7 @@ def stiffness_remark(stiffness: float) -> Remark | None:
     if low <= abs(stiffness) <= high:
         return None
     shown = f"{stiffness:.0f} N/m" if abs(stiffness) < low else f"{stiffness / 1e6:.0f} N/um"
-    text = f"K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
+    text = f"stiffness K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
     cure = "Check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass"
     return Remark("stiffness-not-believed", "", text, cure)
 
@@ -157,17 +158,18 @@ def calibration_remark(channel: Channel, today: date, interval_months: float = 1
     """
     if not channel.calibration_date:
         text = "calibration date is missing"
-        return Remark("calibration-unknown", channel.name, text, "Enter it next to the sensitivity")
+        return Remark("calibration-unknown", channel.name, text, "Enter the date next to the sensitivity")
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
     except ValueError:
         text = f"calibration date {channel.calibration_date!r} is invalid"
-        return Remark("calibration-no-date", channel.name, text, "Give YYYY-MM-DD")
+        return Remark("calibration-no-date", channel.name, text, "Give the date as YYYY-MM-DD")
     if calibrated > today:
         text = f"calibration date {calibrated} is in the future (today is {today})"
-        return Remark("calibration-in-future", channel.name, text, "Correct it, or the clock of this computer")
+        cure = "Correct the calibration date, or the clock of this computer"
+        return Remark("calibration-in-future", channel.name, text, cure)
     months = (today - calibrated).days / DAYS_PER_MONTH
     if months <= interval_months:
         return None
-    text = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
-    return Remark("calibration-old", channel.name, text, "Check it with a known mass, or have it calibrated")
+    text = f"calibrated {calibrated}, {months:.0f} months ago (calibration interval {interval_months:g} months)"
+    return Remark("calibration-old", channel.name, text, "Check the sensor with a known mass, or have it calibrated")

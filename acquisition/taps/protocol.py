@@ -120,7 +120,7 @@ def encode_frame(frame: Frame) -> bytes:
     """
     raw = _FRAME_HEADER.pack(frame.type, frame.flags, frame.session, frame.seq) + frame.body
     if len(raw) + 4 > MAX_FRAME:
-        raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}. Send fewer scans per frame.")
+        raise ValueError(f"a frame of {len(raw) + 4} bytes is longer than {MAX_FRAME}. Send fewer samples per frame.")
     return bytes(cobs.encode(raw + struct.pack("<I", zlib.crc32(raw)))) + b"\x00"
 
 
@@ -198,7 +198,7 @@ _EVENT_BODY = struct.Struct("<BBBQ")
 _NO_CHANNEL = 0xFF
 
 _FAULT_TEXTS = {
-    EventKind.CABLE: "The cable of the {} sensor is broken or not plugged in. Check it at both ends.",
+    EventKind.CABLE: "The cable of the {} sensor is broken or not plugged in. Check both ends of the cable.",
     EventKind.SENSOR_BIAS: "The bias voltage of the {} sensor is out of range. Check the sensor, its cable and the "
     "IEPE switch.",
 }

@@ -192,8 +192,8 @@ class TapsSource(ClosedOnExit):
             if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
                 is_foreign = bool(self._stream.foreign)
                 silent = f"has sent no samples for {SILENCE_TIMEOUT:g} s"
-                text = f"the DAQ on {self._link.port} {'started another stream by itself' if is_foreign else silent}"
-                raise DeviceError(text, "Switch it off and on, then repeat the command")
+                text = f"the DAQ on {self._link.port} {'started another stream on its own' if is_foreign else silent}"
+                raise DeviceError(text, "Switch the DAQ off and on, then repeat the command")
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
@@ -209,7 +209,7 @@ class TapsSource(ClosedOnExit):
                     raise ValueError(f"{key} is empty")
         except (ValueError, KeyError, TypeError) as error:
             text = f"the DAQ on {self._link.port} sends invalid channel data ({type(error).__name__}: {error})"
-            raise DeviceError(text, "Update its firmware, which must send the INFO of TAPS/1") from error
+            raise DeviceError(text, "Update the firmware of the DAQ. It must send the INFO frame of TAPS/1") from error
         return info, channels
 
     def _configure(self, sample_rate: float | None) -> float:
@@ -272,7 +272,7 @@ def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:
     if not 2 <= info["adc_bits"] <= SAMPLE_BITS[-1]:
         raise ValueError(f"adc_bits={info['adc_bits']} is not between 2 and {SAMPLE_BITS[-1]}")
     if len({entry["i"] for entry in info["channels"]}) != len(info["channels"]):
-        raise ValueError("two channels have the same number i")
+        raise ValueError("two channels have the same number (key i)")
     return tuple(
         Channel(
             quantity=entry["quantity"],

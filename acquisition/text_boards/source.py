@@ -139,7 +139,7 @@ class TextBoardSource(ClosedOnExit):
             if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
                 wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
                 text = f"the board on {self._link.port} has printed no samples for {SILENCE_TIMEOUT:g} s"
-                remedy = f"Check its program and baud_rate. It must print counter,{wanted} or {wanted}"
+                remedy = f"Check baud_rate and the program of the board, which must print counter,{wanted} or {wanted}"
                 raise DeviceError(text, remedy)
 
     def _codes(self, values: Floats) -> Codes:
@@ -186,7 +186,7 @@ def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -
         raise ValueError('sample_rate_hz is missing for driver = "lines". Give the nominal number of lines per second.')
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
         given = ", ".join(str(sensor.number) for sensor in inputs)
-        raise ValueError(f"input: {given} must be 0 to {len(inputs) - 1}, each once. Correct [[daq.channel]].")
+        raise ValueError(f"input = {given} in [[daq.channel]] must be 0 to {len(inputs) - 1}. Use each number once.")
     return sample_rate
 
 

@@ -125,9 +125,10 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
     except library.PortAudioError as error:
         if error.args[1:2] == (PORTAUDIO_INVALID_RATE,):
-            text = f"sample_rate_hz={rate:g} is not supported by {entry['name']} ({error}). Try 48000."
+            text = f"sample_rate_hz={rate:g} is not supported by {entry['name']} ({error}). Try sample_rate_hz = 48000."
             raise ValueError(text) from error
-        raise DeviceError(f"{port} cannot be opened ({error})", "Check that no other program uses it") from error
+        cure = "Check that no other program uses the sound device"
+        raise DeviceError(f"{port} cannot be opened ({error})", cure) from error
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
 
 
@@ -180,7 +181,8 @@ def _find_sound_device(devices: Sequence[dict[str, Any]], wanted: str) -> dict[s
         return listed[0]
     names = ", ".join(f"{entry['index']}: {entry['name']}" for entry in listed or inputs) or "none"
     reason = f"{len(listed)} sound devices match" if listed else "no sound device matches"
-    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', "Plug it in, or give its number, as in audio:3")
+    cure = "Plug the sound device in, or give its number, as in audio:3"
+    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', cure)
 
 
 def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
@@ -193,9 +195,12 @@ def _calibrate_channel(channel: Channel, number: int, calibration: NameCalibrati
     scale = calibration.full_scales[number]
     if calibration.is_accelerometer:
         if channel.quantity == "force":
-            raise ValueError(f"input={number}: a {calibration.model} is an accelerometer and cannot measure force")
+            found = f"input={number}: a {calibration.model} is an accelerometer and cannot measure force"
+            raise ValueError(f"{found}. Correct [[daq.channel]].")
         scale *= abs(channel.sensitivity)
     if abs(channel.full_scale / scale - 1) > MAX_RANGE_DEVIATION:
-        text = f"range_v={channel.full_scale:g} differs from the calibration of {calibration.model} in its name"
+        text = (
+            f"range_v={channel.full_scale:g} differs from the calibration in the name of the {calibration.model} device"
+        )
         raise ValueError(f"{text}. Set range_v = {scale:.4g} for input {number}.")
     return replace(channel, adc_bits=24, full_scale=scale)

@@ -53,8 +53,8 @@ def convert_errors(errors: tuple[type[Exception], ...], failure: str, remedy: st
 def check_input_numbers(inputs: Sequence[SensorInput], count: int, device: str) -> None:
     for sensor in inputs:
         if sensor.number >= count:
-            text = f"input={sensor.number} does not exist, {device} has inputs 0 to {count - 1}"
-            raise ValueError(f"{text}. Correct [[daq.channel]].")
+            text = f"input={sensor.number} does not exist, because {device} has inputs 0 to {count - 1}"
+            raise ValueError(f"{text}. Correct input in [[daq.channel]].")
 
 
 class VoltageBlock(NamedTuple):
@@ -169,12 +169,12 @@ class LibraryDevice(ClosedOnExit):
                 scan, last_arrival = scan + block.volts.shape[1], time.monotonic()
             elif time.monotonic() - last_arrival > LIBRARY_SILENCE_TIMEOUT:
                 text = f"the DAQ {self.address} has sent no samples for {LIBRARY_SILENCE_TIMEOUT:g} s"
-                raise DeviceError(text, "Unplug it and plug it in again")
+                raise DeviceError(text, "Unplug the DAQ and plug it in again")
 
     def _codes(self, volts: Floats) -> Codes:
         rows = zip(self.channels, volts, strict=True)
         return np.array([channel.encode(row / channel.sensitivity) for channel, row in rows], np.int32)
 
     def _convert_errors(self) -> AbstractContextManager[None]:
-        remedy = "Check its cable and that no other program uses it"
+        remedy = "Check the cable of the DAQ, and that no other program uses the DAQ"
         return convert_errors(self.reader.errors, f"the DAQ {self.address} has failed", remedy)

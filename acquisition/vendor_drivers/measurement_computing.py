@@ -72,12 +72,12 @@ def open_mcc172(port: str, inputs: Sequence[SensorInput], sample_rate: float | N
     library = library_device.load_library("daqhats")
     address = port.removeprefix("mcc172:")
     if not address.isdigit():
-        raise ValueError(f"port={port!r} has no board address. Give 0 to 7 after mcc172:, as in mcc172:0.")
+        raise ValueError(f"port={port!r} has no board address. Give board 0 to 7, as in mcc172:0.")
     library_device.check_input_numbers(inputs, 2, "an MCC 172")
     for sensor in inputs:
         if sensor.channel.full_scale != MCC172_FULL_SCALE:
             scale = sensor.channel.full_scale
-            raise ValueError(f"range_v={scale:g} is not supported. An MCC 172 has only {MCC172_FULL_SCALE:g} V.")
+            raise ValueError(f"range_v={scale:g} is not supported. An MCC 172 has only ±{MCC172_FULL_SCALE:g} V.")
     with library_device.convert_errors((library.HatError,), f"{port} cannot be opened"):
         board = library.mcc172(int(address))
         for sensor in inputs:
@@ -105,7 +105,7 @@ class Mcc172Reader(LibraryReader):
         """Return the next block. A scan that has overrun its buffer has ended: DeviceError."""
         scan = self._board.a_in_scan_read_numpy(self._size, timeout)
         if scan.hardware_overrun or scan.buffer_overrun:
-            raise DeviceError("the MCC 172 lost scans and stopped", "Close other programs on this Raspberry Pi")
+            raise DeviceError("the MCC 172 lost samples and stopped", "Close other programs on this Raspberry Pi")
         volts = scan.data.reshape(-1, 2).T[self._numbers]
         return VoltageBlock(volts) if volts.size else None
 
@@ -185,9 +185,9 @@ def open_uldaq(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     listed = library.get_daq_device_inventory(library.InterfaceType.USB)
     entry = next((entry for entry in listed if entry.unique_id.casefold() == wanted.casefold()), None)
     if entry is None:
-        raise DeviceError(f"{wanted!r} is not plugged in", library_device.OPEN_REMEDY)
+        raise DeviceError(f"the DAQ {wanted!r} is not plugged in", library_device.OPEN_REMEDY)
     device = library.DaqDevice(entry)
-    errors, remedy = (library.ULException,), "Check that no other program uses it"
+    errors, remedy = (library.ULException,), "Check that no other program uses the DAQ"
     with library_device.convert_errors(errors, f"{port} cannot be opened", remedy), ExitStack() as cleanup:
         cleanup.callback(device.release)
         device.connect()
@@ -261,4 +261,4 @@ def _find_uldaq_range(library: Any, ranges: Sequence[Any], wanted: set[float]) -
         return getattr(library.Range, *volts.values())
     bipolar = sorted(name.removeprefix("BIP").removesuffix("VOLTS") for name in names if name.startswith("BIP"))
     given = " and ".join(f"{scale:g}" for scale in sorted(wanted))
-    raise ValueError(f"range_v={given} must be one of {', '.join(bipolar)} V, the same for all inputs")
+    raise ValueError(f"range_v={given} must be one of {', '.join(bipolar)} V, equal for all inputs")

@@ -110,7 +110,7 @@ class NidaqmxReader(StreamReader):
         if not stream.open_current_loop_chans_exist:
             return ""
         inputs = ", ".join(stream.open_current_loop_chans)
-        return f"The IEPE loop of {inputs} is open. Check the sensor and its cable."
+        return f"The IEPE supply of {inputs} has no current. Check the sensor and its cable."
 
 
 def _read_identity(device: Any) -> DeviceIdentity:

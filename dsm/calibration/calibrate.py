@@ -245,7 +245,7 @@ def _unreachable_error(spindle: Spindle, f: float, mode: int, chosen: Sequence[i
     low, high = (float(natural_frequencies(limit, mode)[-1]) for limit in _limit_spindles(spindle, chosen))
     return UnreachableFrequencyError(
         f"no bearing stiffness gives mode {mode} at {f:g} Hz, only {low:.1f} Hz (no bearings) to {high:.1f} Hz (rigid "
-        "bearings). Check the geometry and the mode number.",
+        "bearings). Check the geometry of the model and the mode number.",
         (low, high),
     )
 

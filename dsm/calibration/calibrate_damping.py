@@ -72,9 +72,9 @@ class DampingCalibration:
         """Return the report."""
         damping = format_with_error(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
         measured = format_with_error(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
-        other = f"{self.other_damping_ratio:.6g} without these dampers, loss factor {self.loss_factor:g}"
+        other = f"{self.other_damping_ratio:.6g} without the calibrated damping, loss factor {self.loss_factor:g}"
         return (
-            f"bearing damping  {damping} each on average\n"
+            f"bearing damping  {damping} per bearing on average\n"
             f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz\n"
             f"other damping    damping ratio {other}\n"
             f"sensitivity      1 % more bearing damping adds {self.sensitivity / 100:.3g} to the damping ratio"
@@ -207,8 +207,8 @@ def _start_dampers(spindle: Spindle, chosen: list[int]) -> Floats:
     damped = [bearing for bearing in bearings if bearing.damping > 0]
     if damped and len(damped) < len(chosen):
         raise ValueError(
-            f"only {len(damped)} of {len(chosen)} bearings to calibrate have damping. Give damping to all of them, or "
-            "to none to distribute it by stiffness."
+            f"only {len(damped)} of {len(chosen)} bearings to calibrate have a damping. Give a damping for every "
+            "bearing, or for none: it is then distributed in proportion to stiffness."
         )
     ratio = np.zeros(len(spindle.bearings))
     ratio[chosen] = [bearing.damping if damped else 1e-6 * bearing.stiffness for bearing in bearings]
@@ -221,7 +221,7 @@ def _find_damping(dampers: _Dampers, start: _DampingPoint, target: float) -> _Da
     if without_dampers >= target:
         raise UnreachableDampingError(
             f"damping_ratio={target:g} of mode {dampers.number} is not above {without_dampers:.6g}, the ratio without "
-            "these dampers. Reduce loss_factor or the damping of other bearings, or check the measurement.",
+            "the damping to calibrate. Reduce loss_factor or the damping of other bearings, or check the measurement.",
             without_dampers,
         )
     low, high = _bracket_target(dampers, start, target)
@@ -251,8 +251,8 @@ def _bracket_target(dampers: _Dampers, low: _DampingPoint, target: float) -> tup
             return low, top
         low, most = high, max(most, top.mode.damping_ratio)
     raise UnreachableDampingError(
-        f"damping_ratio={target:g} of mode {dampers.number} is above {most:.4g}, the maximum of these dampers. "
-        "Add other damping (loss_factor), or check the measurement.",
+        f"damping_ratio={target:g} of mode {dampers.number} is above {most:.4g}, the maximum with these bearings. "
+        "Increase loss_factor, or check the measurement.",
         most,
     )
 

@@ -167,8 +167,8 @@ class Calibration:
         if not self.is_open:
             return ()
         share = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} in the bearings"
-        text = f"stiffness not determined ({share}{', rigid bearings possible' if self._is_unbounded else ''})"
-        cure = "Measure another mode, and check whether the model is too soft or too stiff"
+        text = f"bearing stiffness not determined ({share}{', rigid bearings possible' if self._is_unbounded else ''})"
+        cure = "Measure another mode, and check whether the spindle model is too soft or too stiff"
         return (FitRemark("bearings-not-felt", "bearings", text, cure),)
 
     @cached_property
@@ -203,14 +203,14 @@ class Calibration:
         modal = self.modal_stiffness_before / 1e6, self.modal_stiffness_after / 1e6
         stiffness = format_with_error(self.bearing_stiffness, self.bearing_stiffness_std, 1e6, "N/um", percent=True)
         lines = [
-            ("bearing stiffness", f"{stiffness} each"),
+            ("bearing stiffness", f"{stiffness} per bearing"),
             (f"from mode {self.mode}", format_with_error(self.frequency, self.frequency_std, unit="Hz", percent=True)),
-            ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
+            ("start", f"{start:.5g} N/um per bearing, calibration factor {self.factor:.5f}"),
             ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in the bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
             ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (start -> calibrated)"),
             ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
-            ("theory", f"{self.spindle.theory} (equivalent stiffness, comparable within one model only)"),
+            ("theory", f"{self.spindle.theory} (stiffness comparable only within this beam theory)"),
         ]
         if self.bearing_stiffness_interval is not None:
             low, high = (end / 1e6 for end in self.bearing_stiffness_interval)

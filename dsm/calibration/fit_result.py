@@ -156,8 +156,8 @@ class StiffnessFit:
             scale, unit = (1.0, "N m/rad") if is_tilting(self.spindles, group) else (1e6, "N/um")
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
             start = f"start {stiffness / factor / scale:.5g} {unit}"
-            estimate = f"{format_with_error(stiffness, std, scale, unit, percent=True)} each on average"
-            known = f"{estimate}, {start}: factor {factor:.5f}"
+            estimate = f"{format_with_error(stiffness, std, scale, unit, percent=True)} per part on average"
+            known = f"{estimate}, {start}, calibration factor {factor:.5f}"
             text = f"not determined, {start}" if group in self.open_groups else known
             lines.append(f"stiffness {group:{width}}  {text}")
         return lines

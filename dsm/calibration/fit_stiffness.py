@@ -107,7 +107,7 @@ def fit_stiffness(
     if measured.frequency.size < len(names):
         raise ValueError(
             f"{measured.frequency.size} measured mode(s) are not enough for the stiffness of {len(names)} groups "
-            f"({', '.join(names)}). Measure more modes, or name fewer groups."
+            f"({', '.join(names)}). Measure more modes, or calibrate fewer groups."
         )
     problem = StiffnessProblem(spindles, names, measured)
     state, found = _search(problem, None if start is None else np.log(start))
@@ -189,7 +189,7 @@ def _collinear_group_remarks(problem: StiffnessProblem, state: Iterate) -> list[
         return []
     weakest = np.abs(np.linalg.svd(ratio)[2][-1])
     mixed = ", ".join(name for name, part in zip(problem.names, weakest, strict=True) if part > 0.3)
-    text = f"the measured modes can hardly separate their stiffnesses (condition number {condition:.2g})"
+    text = f"the measured modes hardly separate the stiffnesses of these groups (condition number {condition:.2g})"
     return [FitRemark("groups-alike", mixed, text, IDENTIFIABILITY_REMEDY)]
 
 
@@ -202,9 +202,9 @@ def _close_mode_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRe
         where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
         for low in range(1, frequency.size):
             if gap[low - 1] < CLOSE_MODE_SHARE and np.any((numbers == low) | (numbers == low + 1)):
-                text = f"only {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes, so "
-                text += "standard errors hold only for small changes"
-                pair, cure = f"modes {low} and {low + 1}{where}", "Check which of them was measured"
+                text = f"only {100 * gap[low - 1]:.2g} % apart in the fitted model, so their shapes mix "
+                text += "and the standard errors hold only for small changes"
+                pair, cure = f"modes {low} and {low + 1}{where}", "Check which of the two modes was measured"
                 remarks.append(FitRemark("modes-exchange-shapes", pair, text, cure))
     return remarks
 
@@ -214,7 +214,7 @@ def _misfit_remarks(problem: StiffnessProblem, state: Iterate) -> list[FitRemark
         return []
     worst = float(np.max(np.abs(state.fitted / problem.measured.frequency - 1)))
     text = f"the fitted frequencies are off by up to {100 * worst:.2g} %, more than the standard errors explain"
-    return [FitRemark("frequencies-misfit", "", text, "Check geometry, mode numbers and standard errors")]
+    return [FitRemark("frequencies-misfit", "", text, "Check geometry of the model, mode numbers and standard errors")]
 
 
 def _require_reachable(problem: StiffnessProblem) -> None:
@@ -230,7 +230,7 @@ def _require_reachable(problem: StiffnessProblem) -> None:
         if not low < frequency < high:
             raise UnreachableFrequencyError(
                 f"no stiffness of {', '.join(names)} gives mode {mode} at {frequency:g} Hz, only {low:.1f} to "
-                f"{high:.1f} Hz. Check the geometry and the mode number.",
+                f"{high:.1f} Hz. Check the geometry of the model and the mode number.",
                 (low, high),
             )
 
@@ -240,5 +240,5 @@ def _failure_text(result: StiffnessFit) -> str:
     residual = float(np.max(np.abs(result.residual)))
     return (
         f"no stiffness fits these frequencies: the best factors ({factors}) leave a residual of {residual:.3g} Hz. "
-        "Check the mode numbers, start from other stiffnesses, or name fewer groups."
+        "Check the mode numbers, start from other stiffnesses, or calibrate fewer groups."
     )

@@ -35,7 +35,7 @@ LOW_ENERGY_SHARE = 0.1
 """Energy share in every measured mode below which stiffness far from the fit is tried."""
 MAX_RIVALS = 8
 """Most solutions that are taken in turn, each as it fits better than the one before."""
-IDENTIFIABILITY_REMEDY = "Measure more or other modes, or leave the group out"
+IDENTIFIABILITY_REMEDY = "Measure more or other modes, or leave the group out of the calibration"
 
 
 class AllowedExcess(NamedTuple):
@@ -149,13 +149,15 @@ def identifiability_remarks(problem: StiffnessProblem, best: Iterate, around: Pr
     """
     remarks = []
     for index in np.flatnonzero(best.unfelt).tolist():
-        text = f"has at most {100 * np.max(best.share[:, index]):.2g} % of the strain energy of the measured modes"
+        text = (
+            f"group has at most {100 * np.max(best.share[:, index]):.2g} % of the strain energy of the measured modes"
+        )
         remarks.append(FitRemark("group-not-felt", problem.names[index], text, IDENTIFIABILITY_REMEDY))
     if around is None:
         return remarks
     others = _rival_text(problem, best, around)
     if others:
-        text = f"other factors fit as well: {others}"
+        text = f"other stiffness factors fit as well: {others}"
         return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, IDENTIFIABILITY_REMEDY)]
     for index in np.flatnonzero(~best.unfelt).tolist():
         text = _open_interval_text(problem, best, around, index)
@@ -197,11 +199,11 @@ def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: Profil
     allowed, way, var = AllowedExcess.of(problem, best), around.profiles[i], float(around.log_covariance[i, i])
     half = math.sqrt(allowed.rise * var)
     if not half < MAX_LOG_INTERVAL:
-        return f"uncertain by a factor of {math.exp(min(half, 50.0)):.3g} (standard error)"
+        return f"stiffness is uncertain by a factor of {math.exp(min(half, 50.0)):.3g} (standard error)"
     if half < MIN_PROFILE_WIDTH:
         return ""
     if way is None:
-        return "uncertain, because the model cannot be solved at the ends of its interval"
+        return "stiffness is uncertain, because the model cannot be solved at the ends of the interval"
     near = _interval_coverage([(end.cost - best.cost) / allowed.limit for end, *_ in way])
     beyond = [list(_likelihood_masses(best, side, i, allowed)) for side in way]
     mass = math.sqrt(2 * math.pi * var)
@@ -211,7 +213,8 @@ def _open_interval_text(problem: StiffnessProblem, best: Iterate, around: Profil
         return ""
     low, high = (_interval_reach(side, total * (1 - PROFILE_CONFIDENCE) / 2, half) for side in beyond)
     interval = f"{math.exp(-low):.3g} to {math.exp(high):.3g} times the fitted stiffness"
-    return f"may be {interval} (first-order interval: factor {math.exp(half):.4g}, covers only {100 * held:.0f} %)"
+    first = f"first-order interval: factor {math.exp(half):.4g}, covers only {100 * held:.0f} %"
+    return f"stiffness may be {interval} ({first})"
 
 
 def _likelihood_masses(

@@ -37,7 +37,7 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
         wanted = "with a group" if group is None else f"of group {group!r}"
         raise ValueError(f"no bearing {wanted} to calibrate. Choose one of the groups: {groups}.")
     for index in chosen:
-        _require_spring(spindle, index, "or the group '' to leave it rigid")
+        _require_spring(spindle, index, "or the group '' to leave the bearing rigid")
     return chosen
 
 
@@ -67,11 +67,11 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
         if name not in known_names:
             raise ValueError(f"unknown group {name!r}. Choose from: {listed}.")
         if names.count(name) > 1:
-            raise ValueError(f"group {name!r} is named {names.count(name)} times. Name it once.")
+            raise ValueError(f"group {name!r} is named {names.count(name)} times. Name each group once.")
     for spindle in spindles:
         for index, bearing in enumerate(spindle.bearings):
             if bearing.group in names:
-                _require_spring(spindle, index, f"or leave its group {bearing.group!r} out")
+                _require_spring(spindle, index, f"or leave the group {bearing.group!r} out")
     return names
 
 
@@ -147,5 +147,5 @@ def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:
 def _require_spring(spindle: Spindle, index: int, otherwise: str) -> None:
     """Raise ValueError for a rigid bearing, which no factor changes."""
     if math.isinf(spindle.bearings[index].stiffness):
-        remedy = f"Give a finite start value, {otherwise}."
+        remedy = f"Give a finite stiffness as start value, {otherwise}."
         raise ValueError(f"bearing {index + 1}: stiffness=inf cannot be calibrated. {remedy}")

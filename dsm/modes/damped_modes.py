@@ -120,7 +120,7 @@ class DampedShaft(NamedTuple):
             else:
                 raise ArithmeticError(
                     f"mode {number} cannot be followed beyond a damping ratio of {mode.damping_ratio:.3g}. "
-                    "Give smaller dampers."
+                    "Give less bearing damping."
                 )
         return mode
 

@@ -66,7 +66,7 @@ def whirling_modes(model: DynamicStiffness, w2: Floats, shape: Floats, count: in
     LinAlgError if it is not.
     """
     if np.any(w2 <= 0):
-        raise np.linalg.LinAlgError("the shaft has no support")
+        raise np.linalg.LinAlgError("the shaft has no support. Give at least two bearings.")
     gyroscopic = _reduced_term(model, shape.T, 1)
     n, still = w2.size, np.sqrt(w2)
     scaled = np.zeros((2 * n, 2 * n))

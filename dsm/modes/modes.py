@@ -99,7 +99,9 @@ class Modes:
             For a spinning shaft: its modes have no modal mass of 1 kg.
         """
         if self.spin:
-            raise ValueError(f"the shaft spins at {self.spin:g} rad/s. Shapes and stiffness need a shaft without spin.")
+            raise ValueError(
+                f"the shaft spins at {self.spin:g} rad/s. Mode shapes and stiffness need a shaft without spin."
+            )
         left = np.clip(np.searchsorted(self.position, places, side="right") - 1, 0, self.position.size - 2)
         slack = SAME_PLACE * self.spindle.length
         from_left, from_right = places - self.position[left], self.position[left + 1] - places

@@ -66,7 +66,7 @@ class Spindle:
         if self.theory not in get_args(Theory):
             raise ValueError(f"theory={self.theory!r} is not one of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
-            raise ValueError(f"{len(self.segments)} segments given. Give 1 to {MAX_SEGMENTS}.")
+            raise ValueError(f"the shaft has {len(self.segments)} segments. Give 1 to {MAX_SEGMENTS} segments.")
         require_numbers("", self, {"youngs_modulus": "Pa", "density": "kg/m^3"}, positive=True)
         if self.shear_modulus is not None:
             require_numbers("", self, {"shear_modulus": "Pa"}, positive=True)
@@ -117,7 +117,7 @@ class Spindle:
             part.check(where)
             for earlier, other in enumerate(parts[: number - 1], 1):
                 if abs(other.position - part.position) <= slack:
-                    same = f"the position of {kind} {earlier}. Combine both into one {kind}."
+                    same = f"the position of {kind} {earlier}. Combine the two into one {kind}."
                     raise ValueError(f"{where}position={part.position} m is {same}")
 
     def _check_joints(self) -> None:
@@ -131,7 +131,9 @@ class Spindle:
             for kind, parts in others:
                 for other, part in enumerate(parts, 1):
                     if abs(part.position - joint.position) <= slack:
-                        raise ValueError(f"{where}the position of {kind} {other}. Move the {kind} to its own side.")
+                        raise ValueError(
+                            f"{where}the position of {kind} {other}. Move the {kind} to its own side of the joint."
+                        )
 
 
 def require_support(spindle: Spindle) -> None:
@@ -139,8 +141,8 @@ def require_support(spindle: Spindle) -> None:
     tilting = any(bearing.rotational_stiffness > 0 for bearing in spindle.bearings)
     if len(spindle.bearings) + tilting < 2:
         raise ValueError(
-            f"the shaft has {len(spindle.bearings)} bearing(s) and can move freely. Give at least two, or one with a "
-            "rotational stiffness."
+            f"the shaft has {len(spindle.bearings)} bearing(s) and can move freely. Give at least two bearings, or one "
+            "with a rotational stiffness."
         )
 
 
@@ -236,6 +238,6 @@ def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
 def check_tool(tool: Spindle, theory: str) -> None:
     """Raise ValueError for a tool that does not fit into a spindle of a beam theory."""
     if tool.bearings:
-        raise ValueError(f"the tool has {len(tool.bearings)} bearing(s). Give it without bearings, as a free shaft.")
+        raise ValueError(f"the tool has {len(tool.bearings)} bearing(s). Give a free shaft, without bearings.")
     if tool.theory != theory:
         raise ValueError(f"the tool has theory={tool.theory!r}, the spindle {theory!r}. Use one theory for both.")

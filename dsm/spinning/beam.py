@@ -75,7 +75,7 @@ class SpinningBeam:
         for name in ("segments", "springs", "held"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.segments:
-            raise ValueError("the beam has no segments. Give at least one.")
+            raise ValueError("the beam has no segments. Give at least one segment.")
         for number, segment in enumerate(self.segments, 1):
             for name in ("length", "rigidity_xx", "rigidity_yy", "mass_per_length"):
                 require_number(f"segment {number}: {name}", getattr(segment, name), positive=True)
@@ -127,7 +127,7 @@ class SpinningBeam:
         self._check_place(where, spring.position)
         for dof, value in self.stiffness(spring):
             axis = "x" if dof == "u" else "y"
-            require_number(f"{where}stiffness_{axis}", value, note=". To make it rigid, hold the dof.")
+            require_number(f"{where}stiffness_{axis}", value, note=". For a rigid support, hold this dof.")
 
     def _check_place(self, where: str, position: float) -> None:
         if not 0 <= position <= self.length * (1 + 1e-9):

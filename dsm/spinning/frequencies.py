@@ -69,7 +69,7 @@ def _start_values(beam: SpinningBeam, count: int, spin: float, fineness: float) 
         if w.size >= count and w[-1] <= top:
             return chain, w, shape
         top = max(2 * top, 1.01 * np.max(w, initial=0.0))
-    raise np.linalg.LinAlgError(f"no frequency range holds all {count} modes")
+    raise np.linalg.LinAlgError(f"no frequency range contains all {count} modes")
 
 
 def _assemble_chain(beam: SpinningBeam, top: float, fineness: float) -> SpinningChain:
@@ -239,10 +239,10 @@ def spinning_frequencies(beam: SpinningBeam, count: int, speed_rpm: float) -> Fl
     [112.2, 212.2]
     """
     if count < 1:
-        raise ValueError(f"{count} modes requested. Request at least 1.")
+        raise ValueError(f"{count} modes requested. Request at least 1 mode.")
     spin = angular_speed(speed_rpm)
     if not beam.is_supported:
-        raise ValueError("the beam can move as a rigid body in one plane. Hold more dofs or add springs.")
+        raise ValueError("the beam can move as a rigid body in one plane. Hold more of the dof, or add springs.")
     if beam.is_round:
         return _round_beam_frequencies(beam, count, spin) / (2 * np.pi)
     w, proved, unstable = spinning_modes(beam, count, spin)

@@ -95,7 +95,7 @@ def program_limit(
         chatter_frequency=float(chatter[0]),
         kind=str(kind[0]),
         method="semi-discretisation",
-        detail=f"{number[worst]} pieces of order 16 per tooth period",
+        detail=f"{number[worst]} time steps of order 16 per tooth period",
         pieces=int(np.max(number)),
         cut=cuts[worst],
         limits=tuple(limit.tolist()),

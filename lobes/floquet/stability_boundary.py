@@ -176,13 +176,13 @@ def stability_boundary(
     ['1.11 mm, hopf', '1.53 mm, hopf', '2.12 mm, hopf', '0.96 mm, flip', '5.30 mm, flip']
     """
     system, speed = build_milling_system(x, y, vectors), check_speeds(speed_rpm)
-    check_number("max_depth", max_depth, "m is not a finite depth > 0. Give the deepest cut of interest.")
+    check_number("max_depth", max_depth, "m is not a finite depth > 0. Give the largest depth of cut of interest.")
     rows = rows_at_speeds(system, cut, speed)
     crossings, number = converged_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
     chatter, kind = chatter_at_limits(system, rows, depth, number)
     low, high = int(np.min(number)), int(np.max(number))
-    detail = f"{low if low == high else f'{low} to {high}'} pieces of order 16 per tooth period"
+    detail = f"{low if low == high else f'{low} to {high}'} time steps of order 16 per tooth period"
     return StabilityLobes(speed, depth, chatter, kind, crossings, "semi-discretisation", detail=detail)
 
 

@@ -170,7 +170,7 @@ def _reweight(state: Extraction) -> Extraction:
 def _limit_to_common_band(frfs: Sequence[Frf]) -> list[Frf]:
     """Give all FRFs the narrowest usable band."""
     if not frfs:
-        raise ValueError("no FRF given. Give one or more, with the driving point first.")
+        raise ValueError("no FRF given. Give one or more FRFs, with that of the driving point first.")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
         raise ValueError("the FRFs have different frequency lines. Measure or export all with the same settings.")
     usable = [frf.usable_band for frf in frfs if frf.usable_band is not None]

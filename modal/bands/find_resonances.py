@@ -78,14 +78,16 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     """
     n = frf.frequency.size
     if n < MIN_FRF_LINES:
-        raise ValueError(f"{n} lines are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines.")
+        raise ValueError(
+            f"{n} lines of the FRF are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines."
+        )
     if not np.any(frf.receptance):
-        raise ValueError("the FRF is zero on every line: no response was measured. Check the sensor and its cable.")
+        raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
     frf = remove_drift(frf)
     peaks = _find_peaks_at_all_scales(frf)
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
-            "the FRF is real on every line: its phase is missing. "
+            "the FRF is real on every line, so the phase is missing. "
             "Export real and imaginary part, or magnitude and phase."
         )
     _check_phase(frf, peaks)

@@ -125,7 +125,7 @@ class FixedPoleFit:
         triangle = np.linalg.qr(self.jacobian.T / norm, mode="r")
         left, singular, right = np.linalg.svd(triangle)
         if not np.min(singular, initial=np.inf) > MIN_SINGULAR_VALUE_SHARE * np.max(singular, initial=0.0):
-            raise np.linalg.LinAlgError("the unknowns of the fit are linearly dependent")
+            raise np.linalg.LinAlgError("the unknowns of the mode fit are linearly dependent")
         return norm, (right.T / singular) @ left.T
 
     def gain(self, rows: Floats) -> float:

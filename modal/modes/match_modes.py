@@ -41,10 +41,10 @@ def mac(a: ArrayLike, b: ArrayLike) -> float:
     """
     x, y = np.asarray(a), np.asarray(b)
     if x.shape != y.shape or x.ndim != 1:
-        raise ValueError(f"mode shapes have {x.shape} and {y.shape} points. Give both over the same points.")
+        raise ValueError(f"mode shapes have {x.shape} and {y.shape} points. Give both shapes over the same points.")
     size = float(np.vdot(x, x).real * np.vdot(y, y).real)
     if not size > 0:
-        raise ValueError("a mode shape is zero or not finite. Leave it out.")
+        raise ValueError("a mode shape is zero or not finite. Leave this mode out.")
     return float(np.abs(np.vdot(x, y)) ** 2 / size)
 
 
@@ -103,15 +103,16 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     """
     near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
     if not near or not _is_same_mode(last, near[0]):
-        nearest = f", nearest at {near[0].frequency:.1f} Hz" if near else ""
+        nearest = f", nearest mode at {near[0].frequency:.1f} Hz" if near else ""
         text = f"followed mode not found again{nearest}"
         return ModeMatch(None, (mode_remark(last, "no-mode-to-follow", text),))
     first = _match_distance(last, near[0])
     if len(near) > 1 and _match_distance(last, near[1]) < MIN_RIVAL_DISTANCE_RATIO * max(first, 0.5):
-        text = f"followed mode is ambiguous: {near[1].frequency:.1f} Hz fits {_values_text(last)} nearly as well"
+        rival = f"{near[1].frequency:.1f} Hz fits the last test ({_values_text(last)}) nearly as well"
+        text = f"followed mode is ambiguous: {rival}"
         return ModeMatch(near[0], (mode_remark(near[0], "rival-mode", text),))
     if first > DOUBTFUL_MATCH_DISTANCE:
-        text = f"may be another mode: {_values_text(last)} before, now {_values_text(near[0])}"
+        text = f"may be another mode: {_values_text(last)} in the last test, now {_values_text(near[0])}"
         return ModeMatch(near[0], (mode_remark(near[0], "large-change", text),))
     return ModeMatch(near[0], ())
 
@@ -124,7 +125,7 @@ def _is_same_mode(last: Mode, mode: Mode) -> bool:
 
 
 def _values_text(mode: Mode) -> str:
-    return f"{mode.frequency:.1f} Hz" + (f" with {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else "")
+    return f"{mode.frequency:.1f} Hz" + (f" with K {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else "")
 
 
 def _match_distance(a: Mode, b: Mode) -> float:

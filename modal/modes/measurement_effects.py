@@ -64,8 +64,8 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     decay = mode.damping_ratio * size - 1 / time_constant
     if decay <= 0:
         raise ValueError(
-            f"the mode at {mode.frequency:.1f} Hz decays at {decay + 1 / time_constant:.3g}/s, no faster than its "
-            f"window ({1 / time_constant:.3g}/s). Check the time constant."
+            f"the mode at {mode.frequency:.1f} Hz decays at {decay + 1 / time_constant:.3g}/s, no faster than the "
+            f"window ({1 / time_constant:.3g}/s). Check the time constant of the window."
         )
     w = float(np.hypot(decay, size * np.sqrt(1 - mode.damping_ratio**2)))
     left = float(np.exp(-delay / time_constant))

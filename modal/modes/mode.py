@@ -125,7 +125,7 @@ class Mode:
         if not self.degrees_of_freedom > 0:
             yield f"degrees_of_freedom={self.degrees_of_freedom} is not a number > 0"
         if self.jackknife is not None and self.n_hits < 2:
-            yield f"n_hits={self.n_hits} is not at least 2, as a jackknife needs"
+            yield f"n_hits={self.n_hits} is below 2, the least for a jackknife covariance"
 
     @property
     def has_stiffness(self) -> bool:

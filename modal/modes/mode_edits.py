@@ -41,7 +41,7 @@ class ModeEdits:
         for frequency, zeta in self.fix:
             if not 0 < zeta < 1:
                 finding = f"fix {frequency:g}:{zeta:g}: damping ratio {zeta:g} is not between 0 and 1"
-                raise ValueError(f"{finding}. Give 3 % as 0.03.")
+                raise ValueError(f"{finding}. Give a damping ratio of 3 % as 0.03.")
         named: dict[float, str] = {}
         for name, (frequency, *_) in self._edits():
             if frequency in named:

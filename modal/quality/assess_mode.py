@@ -78,7 +78,8 @@ def assess_mode(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode
     )
     mode = with_truncation_error(figures)
     word = band.edits[i] if band.edits else ""
-    text = "frequency and zeta fixed by hand, without uncertainty" if word == FIXED_MODE else f"{word} by hand"
+    held = "frequency and zeta fixed by the operator, without uncertainty"
+    text = held if word == FIXED_MODE else f"mode {word} by the operator"
     by_hand = (mode_remark(mode, "by-hand", text),) if word else ()
     of_value = *_value_remarks(band, i, mode), *_error_remarks(mode)
     return replace(mode, remarks=(*by_hand, *_position_remarks(state, band, i, mode), *of_value))
@@ -94,22 +95,22 @@ def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
 def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     f, half_width = state.frf.frequency, mode.damping_ratio * mode.frequency
     if mode.edge_distance is not None and mode.edge_distance < 1:
-        text = f"peak cut off at the edge of the band ({f[0]:.0f}..{f[-1]:.0f} Hz)"
+        text = f"peak cut off at the edge of the fitted band ({f[0]:.0f}..{f[-1]:.0f} Hz)"
         yield mode_remark(mode, "cut-by-edge", text, "Widen the band")
     error = 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
     reported = np.clip(error, MIN_REMAINING_DECAY, REPORTED_REMAINING_DECAY)
     if mode.remaining_decay is not None and mode.remaining_decay > reported:
-        text = f"vibration is still {100 * mode.remaining_decay:.0f} % of its start when the record ends"
-        yield mode_remark(mode, "still-ringing", text, "Record longer")
+        text = f"vibration is still {100 * mode.remaining_decay:.0f} % of the initial vibration when the record ends"
+        yield mode_remark(mode, "still-ringing", text, "Use a longer record")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
             yield mode_remark(mode, "overlaps", f"overlaps with the mode at {other:.1f} Hz")
     if _has_unfitted_neighbour(state, band, i):
-        text = "a much stronger mode next to it distorts the fit, so zeta and K may be off by more than their errors"
+        text = "a much stronger neighbouring mode distorts the fit: zeta and stiffness K are less certain than stated"
         yield mode_remark(mode, "bent-by-neighbour", text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.close_frequencies):
         where = " and ".join(f"{suspect:.0f}" for suspect in band.close_frequencies)
-        text = f"may be several modes near {where} Hz, and K then their sum (too noisy to separate)"
+        text = f"may be several modes near {where} Hz, too noisy to separate (stiffness K then combines all of them)"
         yield mode_remark(mode, "several-modes", text, "Average more hits")
 
 
@@ -128,23 +129,25 @@ def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool
 def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     width, share = mode.half_power_damping, mode.misfit_share or 0.0
     if not mode.is_driving_point:
-        cure = "Mount the sensor at the hit point, or change the sign of one channel if it is there"
-        yield mode_remark(mode, "not-driving-point", "K is negative: sensor and hammer move in opposite phase", cure)
+        cure = "Mount the sensor at the hit point. If the sensor is there, change the sign of one channel"
+        text = "stiffness K is negative: sensor and hammer move in opposite phase"
+        yield mode_remark(mode, "not-driving-point", text, cure)
     error = band.fit.size_error[0, i]
     if error > MAX_PEAK_FIT_ERROR:
-        text = f"hardly moves at the driving point, K uncertain by {100 * error:.0f} %"
+        text = f"mode hardly moves at the driving point, standard error of stiffness K {100 * error:.0f} %"
         yield mode_remark(mode, "near-node", text, "Tap at a point with more motion")
     elif relative_error(mode) > REPORTED_MODE_ERROR or "uncertain" in dict(trust_rules(mode)):
-        text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
+        text = f"standard error of zeta or stiffness K is {100 * relative_error(mode):.0f} %"
         yield mode_remark(mode, "uncertain", text, "Average more hits")
     if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
-        text = f"fit residual is {mode.misfit:.1f} times the noise, {100 * share:.0f} % of the peak"
+        text = f"fit residual is {mode.misfit:.1f} times the noise and {100 * share:.0f} % of the peak"
         yield mode_remark(mode, "misfit", text)
     is_near = np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
     is_wide = np.sum(is_near) >= MIN_HALF_POWER_LINES
     differs = width is not None and abs(width / mode.damping_ratio - 1) > MAX_HALF_POWER_DIFFERENCE
     if width is not None and differs and is_wide and band.height.size == 1:
-        yield mode_remark(mode, "half-power-width", f"half-power width gives another zeta: {100 * width:.2g} %")
+        text = f"half-power width gives zeta {100 * width:.2g} % instead of {100 * mode.damping_ratio:.2g} %"
+        yield mode_remark(mode, "half-power-width", text)
 
 
 def _error_remarks(mode: Mode) -> Iterator[Remark]:
@@ -152,12 +155,12 @@ def _error_remarks(mode: Mode) -> Iterator[Remark]:
         text = f"zeta {100 * mode.damping_ratio:.0f} % without a clear peak: probably a sum of several modes"
         yield mode_remark(mode, "heavy-damping", text)
     if mode.coherence is not None and mode.coherence < MIN_GOOD_COHERENCE:
-        text = f"coherence {mode.coherence:.2f} at the peak is below {MIN_GOOD_COHERENCE:g}: the hits disagree"
-        yield mode_remark(mode, "low-coherence", text, "Hit one point in one direction")
+        text = f"coherence {mode.coherence:.2f} at the peak is below {MIN_GOOD_COHERENCE:g}: the hits differ in FRF"
+        yield mode_remark(mode, "low-coherence", text, "Hit the same point in the same direction each time")
     scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
     if scatter > MAX_HIT_SCATTER_RATIO:
-        text = f"scatter from hit to hit is {scatter:.1f} times that of the fit"
-        yield mode_remark(mode, "scatter", text, "Hit one point in one direction, equally hard")
+        text = f"scatter from hit to hit is {scatter:.1f} times the standard error of the fit"
+        yield mode_remark(mode, "scatter", text, "Hit the same point in the same direction, equally hard")
 
 
 def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
@@ -169,8 +172,9 @@ def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
 def _add_phase_remark(mode: Mode, expected: float) -> Mode:
     if abs(mode.phase_deg - expected) <= max(MAX_CONSTANT_PHASE_DEG, 3 * mode.phase_deg_std):
         return mode
-    text = f"phase of the modal constant is off by {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}°"
-    cure = "Check the clamping, modes close to it, and the delay between the channels"
+    phase = f"{mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}°"
+    text = f"phase of the modal constant is {phase} (± standard error) instead of 0°"
+    cure = "Check the clamping, close modes, and the delay between the channels"
     return add_remark(mode, "complex-mode", text, cure)
 
 
@@ -180,8 +184,8 @@ def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
     narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
     if not any(narrow) or not is_smoothed(frf):
         return [*modes]
-    effect = "zeta is a few percent too large, K too small"
-    text = f"half-width below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines in a smoothed FRF: {effect}"
-    cure = "Export the FRF without smoothing or window"
+    effect = "zeta is a few percent too large, stiffness K too small"
+    text = f"half-width of the peak is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines of a smoothed FRF: {effect}"
+    cure = "Export the FRF again without smoothing or window"
     pairs = zip(modes, narrow, strict=True)
     return [add_remark(mode, "smoothed-lines", text, cure) if is_narrow else mode for mode, is_narrow in pairs]

@@ -141,14 +141,16 @@ def relative_error(mode: Mode) -> float:
 
 
 REJECTION_REASONS = {
-    "heavy-damping": "no clear peak, may be drift",
+    "heavy-damping": "no clear peak, may be sensor drift",
     "misfit": "poor fit",
     "uncertain": "damping or stiffness too uncertain",
 }
 """Text for each rule of `trust_rules` that rejects a mode."""
 MAX_NEGATIVE_PEAK_SHARE = 0.1
 """Peak of a mode with negative stiffness over the largest, below which it is left out; chosen."""
-REJECTED_MODE_REMEDY = "Check it with modal.synthesize_frf. If it is drift, let the sensor settle or change its cable"
+REJECTED_MODE_REMEDY = (
+    "Check the peak with modal.synthesize_frf. Against drift, let the sensor settle or change its cable"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,8 +202,8 @@ def select_credible_modes(modes: Sequence[Mode]) -> CredibleModes:
 
 
 def _opposed_mode_remark(mode: Mode, largest: float) -> Remark:
-    text = f"left out, because K is negative and its peak only {100 * mode.peak / largest:.1g} % of the largest"
-    cure = "If it is a mode of the machine, hit and measure at one point in one direction"
+    text = f"mode left out: stiffness K is negative, peak only {100 * mode.peak / largest:.1g} % of the largest peak"
+    cure = "If the mode belongs to the machine, hit and measure at the same point in the same direction"
     return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 
 
@@ -211,7 +213,7 @@ def _rejection_remark(mode: Mode) -> Remark | None:
     stiffness = stiffness_remark(mode.stiffness) if mode.has_stiffness else None
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
-        reasons.append("peak cut off at the edge of the band")
+        reasons.append("peak cut off at the edge of the fitted band")
     if reasons:
         text = f"mode not used, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, REJECTED_MODE_REMEDY)

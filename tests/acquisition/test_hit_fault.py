@@ -18,7 +18,7 @@ def test_each_flag_has_one_fault_with_its_own_words() -> None:
 
 def test_a_sentence_states_the_limit_of_its_fault() -> None:
     fault = HIT_FAULTS[HitFlags.TOO_SOFT]
-    assert fault.state("range", peak=3.0, full=500.0) == "Peak of 3 N is below 2% of the range of 500 N"
+    assert fault.state("range", peak=3.0, full=500.0) == "Force peak of 3 N is below 2% of the range of 500 N"
 
 
 def test_an_unknown_case_is_an_error() -> None:

@@ -129,14 +129,15 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
         return signals
     if len(columns) < len(signals) and not any("=" in text for text in columns):
         fault = f"{len(columns)} of {len(signals)} columns are named ({format_signal_names(signals)})"
-        report.reject("columns", None, fault, 'Name all in their order ("-" to skip one), or each as in "real=2"')
+        cure = 'Name all columns in the order of the file ("-" skips a column), or name each by number, as in "real=2"'
+        report.reject("columns", None, fault, cure)
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = report.attempt(_select_signal, signals, name.strip(), number)
         word, unit = split_heading(heading.strip())
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
-            report.reject("columns", repr(text), f"{word!r} is not one of {', '.join(COLUMN_ROLES)}")
+            report.reject("columns", repr(text), f"heading {word!r} is not one of {', '.join(COLUMN_ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = infer_decibel_unit(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
@@ -162,7 +163,7 @@ def find_column(signals: Sequence[Signal], name: str, field_name: str, report: I
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
         fault = f"{len(meant)} columns have the name {name!r}"
-        raise report.reject(field_name, None, fault, f"Give a column number, {numbers}")
+        raise report.reject(field_name, None, fault, f"Give the number of the column instead ({numbers})")
     raise report.reject(field_name, None, f"no column {name!r} in the file, only {format_signal_names(signals)}")
 
 

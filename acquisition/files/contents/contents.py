@@ -125,7 +125,7 @@ class ImportReport:
 
     def add_missing(self, fact: str, field_name: str, example: str = "") -> UnresolvedError:
         """Add a fact that is missing, and the field of the description that states it, with an example."""
-        self.missing.append(f"{fact} (Description.{field_name}{example})")
+        self.missing.append(f"{fact} (for example Description.{field_name}{example})")
         return UnresolvedError()
 
     def add_fault(self, fault: str, cure: str = "") -> UnresolvedError:
@@ -135,7 +135,11 @@ class ImportReport:
 
     def reject(self, field_name: str, value: object, fault: str, cure: str = "") -> UnresolvedError:
         """Add the fault of a field of the description and its value; None leaves the value out."""
-        return self.add_fault(f"Description.{field_name}{'' if value is None else f' {value}'}: {fault}", cure)
+        return self.add_fault(f"{_format_field(field_name, value)}: {fault}", cure)
+
+    def reject_useless(self, field_name: str, value: object, reason: str) -> UnresolvedError:
+        """Add the fault of a field of the description that must be omitted; None leaves the value out."""
+        return self.add_fault(f"Omit {_format_field(field_name, value)}: {reason}")
 
     def attempt(self, resolve: Callable[..., Result], *arguments: object) -> Result | None:
         """Return the result of a function of these arguments and this report; None if it cannot be resolved."""
@@ -152,7 +156,7 @@ class ImportReport:
 
     def add_contradiction(self, field_name: str, given: object, in_file: object) -> UnresolvedError:
         """Add the fault of a field that differs from the file."""
-        return self.reject(field_name, given, f"the file states {in_file}", "Omit the option")
+        return self.reject_useless(field_name, given, f"the file states {in_file}")
 
     def add_flaws(self, used: Sequence["Signal"], first: int = 0) -> None:
         """Add a fault for each column with a flaw from this index on."""
@@ -175,6 +179,10 @@ class ImportReport:
         """Return all faults and missing facts; empty if there are none."""
         missing = f"{'Missing' if self.faults else 'missing'} {' and '.join(self.missing)}" if self.missing else ""
         return join_sentences(*self.faults, missing)
+
+
+def _format_field(name: str, value: object) -> str:
+    return f"Description.{name}{'' if value is None else f' {value}'}"
 
 
 FrfRole = Literal["frf", "real", "imag", "magnitude", "phase", "coherence"]
@@ -255,7 +263,7 @@ def cut_to_shortest(
         return list(used), list(axes)
     n, longest = _count_values(by_size[0]), _count_values(by_size[-1])
     if longest > n:
-        report.add_fact("rows", f"{n} of {longest}, because {by_size[0].name} ends there", "default")
+        report.add_fact("rows", f"{n} of {longest}, because {by_size[0].name} has no more rows", "default")
     cut = [[replace(column, values=column.values[:n]) for column in columns] for columns in (used, axes)]
     return cut[0], cut[1]
 

@@ -69,7 +69,8 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
     frf, hits = (None, []) if report.faults else _resolve_frf_or_hits(contents, report)
     if len(contents.machines) > 1:
         machines = ", ".join(contents.machines)
-        report.add_fault(f"the file has {len(contents.machines)} machines ({machines})", "Export each to its own file")
+        found = f"the file has {len(contents.machines)} machines ({machines})"
+        report.add_fault(found, "Export each machine to its own file")
     window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
     if window:
         report.add_fact("window", window)
@@ -84,7 +85,7 @@ def _resolve_frf_or_hits(contents: Contents, report: ImportReport) -> tuple[Frf 
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
     if find_frf_candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _reject_useless_fields(("rate", "full_scale", "force"), "an FRF", report)
+        _reject_useless_fields(("rate", "full_scale", "force"), "an FRF, not signals over time", report)
         return resolve_frf(contents, report), []
     if not signals:
         report.add_fault("the file has no columns of numbers")
@@ -92,8 +93,8 @@ def _resolve_frf_or_hits(contents: Contents, report: ImportReport) -> tuple[Frf 
         example = FRF_COLUMNS_EXAMPLE if over_frequency else ANY_COLUMNS_EXAMPLE
         report.add_missing(f"meaning of the columns {format_signal_names(signals)}", "columns", example)
     else:
-        _reject_useless_fields(("averages",), "single hits", report)
-        _reject_useless_fields(("spacing", "start"), "signals over time", report)
+        _reject_useless_fields(("averages",), "single hits, not an averaged FRF", report)
+        _reject_useless_fields(("spacing", "start"), "signals over time, not an FRF", report)
         return None, resolve_hits(contents, report)
     return None, []
 
@@ -105,4 +106,4 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
 def _reject_useless_fields(names: Sequence[str], content: str, report: ImportReport) -> None:
     for name in names:
         if getattr(report.description, name) not in ((), None):
-            report.reject(name, None, f"the file has {content}", "Omit the option")
+            report.reject_useless(name, None, f"the file has {content}")

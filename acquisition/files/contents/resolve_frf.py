@@ -78,7 +78,7 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     first, second = parts[0], parts[1] if len(parts) > 1 else None
     if first.role == "frf":
         if not np.iscomplexobj(first.values):
-            report.add_fault(f"column {first.name} has real numbers, but an FRF is complex")
+            report.add_fault(f"column {first.name} has real numbers, but the values of an FRF are complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
         fact = f"{'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
@@ -86,13 +86,13 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     if first.role == "real":
         if second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
             units = f"{first.name} in {first.unit!r} and {second.name} in {second.unit!r}"
-            raise report.add_fault(f"columns {units} must have the same unit")
+            raise report.add_fault(f"columns {units} differ in unit. Real and imaginary part must have the same unit")
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLE_UNITS.get(second.unit.lower(), "")
     if not angle:
         raise report.add_missing("unit of the phase", "columns", ' "frequency,magnitude,phase [deg]"')
     if not is_decibel(first.unit) and np.any(first.values < 0):
-        fact = f"unit of {first.name}, probably dB because of negative values"
+        fact = f"unit of {first.name}, probably dB because it has negative values"
         raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
@@ -113,18 +113,18 @@ def _resolve_frequency(
         return _make_even_frequency(contents.signals, frf, report)
     report.add_flaws([axis])
     if report.description.spacing is not None or report.description.start is not None:
-        fault = f"the file has its own frequencies ({axis.name})"
-        raise report.add_fault(f"Description.spacing, Description.start: {fault}", "Omit these options")
+        reason = f"the file has its own frequencies ({axis.name})"
+        raise report.add_fault(f"Omit Description.spacing and Description.start: {reason}")
     if not axis.unit and _is_angular(axis):
         example = f' "frequency [rad/s]={axis.name},..."'
         raise report.add_missing(f"unit of {axis.name}, Hz or rad/s", "columns", example)
     unit = parse_unit(axis.unit or "Hz")
     if unit is None or unit.quantity != "frequency":
-        raise report.add_fault(f"frequency unit {axis.unit!r} is not one of Hz, kHz, rad/s")
+        raise report.add_fault(f"unit {axis.unit!r} of frequency {axis.name} is not one of Hz, kHz, rad/s")
     values = np.asarray(axis.values, dtype=np.float64) * unit.factor
     report.add_fact("lines", _format_lines(values.size, *(axis.values[[0, -1]] * unit.factor)))
     if not axis.unit:
-        report.add_fact("frequency", "in Hz", "default")
+        report.add_fact("frequency", "unit Hz assumed", "default")
     return values
 
 
@@ -148,7 +148,7 @@ def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], repor
         if axis is None:
             raise report.add_missing(fact, by_spacing)
         columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
-        raise report.add_missing(fact, "columns", f' "{columns}", or in [rad/s], or Description.{by_spacing}')
+        raise report.add_missing(fact, "columns", f' "{columns}", with [rad/s] for rad/s, or Description.{by_spacing}')
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         fault = "the spacing must be above 0 Hz, the start at least 0 Hz"
         raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)
@@ -182,7 +182,7 @@ def _resolve_coherence(signal: Signal | None, report: ImportReport) -> Floats | 
     values = np.asarray(signal.values.real, dtype=np.float64)
     invalid = ~((values >= 0) & (values <= 1 + 1e-9))
     if np.mean(invalid) > MAX_INVALID_COHERENCE_SHARE:
-        report.add_fact("coherence", f"{signal.name} omitted, because it is outside 0 to 1 at {invalid.sum()} lines")
+        report.add_fact("coherence", f"{signal.name} omitted (outside 0 to 1 at {invalid.sum()} lines)")
         return None
     taken = f", set to 0 at {invalid.sum()} lines outside 0 to 1" if invalid.any() else ""
     report.add_fact("coherence", f"{signal.name}{taken}")
@@ -199,5 +199,5 @@ def _resolve_averages(contents: Contents, report: ImportReport) -> int:
         report.add_fact("averages", str(averages), "option" if in_file is None else "file")
         return averages
     else:
-        report.add_fact("averages", "1 (Description.averages)", "default")
+        report.add_fact("averages", "1 (change with Description.averages)", "default")
     return 1

@@ -17,9 +17,9 @@ from acquisition.hits.capture_hits import split_record
 
 HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]"'
 """Example of the columns of hits."""
-NO_FORCE_ADVICE = "If no force was measured, use hammer none"
+NO_FORCE_ADVICE = 'If no force was measured, set hammer = "none" in [tap] of machine.toml, or use --hammer none'
 """Advice for a file without a force."""
-FEW_DIGITS = "its time has few digits, so missing samples cannot be detected"
+FEW_DIGITS = "the times in the file have few digits, so missing samples cannot be detected"
 """Note on a time that cannot show missing samples."""
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
@@ -45,7 +45,7 @@ def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
         report.facts += record_report.facts if not hits else []
         parts = split_record(hit)
         if len(parts) > 1:
-            report.add_fact("hits", f"{len(parts)} in one record, each of {parts[0].acceleration.size} samples")
+            report.add_fact("hits", f"{len(parts)} in one record, {parts[0].acceleration.size} samples per hit")
         hits += parts
     return hits
 
@@ -54,7 +54,7 @@ def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:
     scaled = report.attempt(resolve_unit.convert_to_sensor_units, apply_full_scale(signals, report))
     if scaled is None:
         if sum(signal.role != "time" for signal in signals) > 2 and report.description.response is None:
-            report.add_missing("number of the response", "response", " 1")
+            report.add_missing("number of the response channel", "response", " 1")
         resolve_rate(signals, (), report)
         raise UnresolvedError
     forces, responses = _split_by_kind(scaled, report)
@@ -111,7 +111,7 @@ def _split_by_kind(signals: Sequence[Signal], report: ImportReport) -> tuple[lis
     names = format_signal_names(channels)
     if len(channels) < 1 + needs_force:
         needed = "a force and a response" if needs_force else "a response"
-        cure = f"Give the file with the force by Description.force. {NO_FORCE_ADVICE}" if needs_force else ""
+        cure = f"Name the file of the force with Description.force. {NO_FORCE_ADVICE}" if needs_force else ""
         report.add_fault(f"a hit needs {needed}, but the file has {names or 'no signals'} over time", cure)
         return [], []
     if unclear and ((needs_force and not forces) or not responses):
@@ -120,7 +120,7 @@ def _split_by_kind(signals: Sequence[Signal], report: ImportReport) -> tuple[lis
     if needs_force and not forces:
         report.add_fault(f"no force channel among {names}", NO_FORCE_ADVICE)
     if needs_force and len(forces) > 1:
-        fact = f"force for each response ({format_signal_names(forces)})"
+        fact = f"choice of one force channel ({format_signal_names(forces)})"
         report.add_missing(fact, "columns", HIT_COLUMNS_EXAMPLE)
     if not responses:
         report.add_fault(f"no response channel among {names}")
@@ -142,7 +142,7 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
     used, times = cut_to_shortest(used, times, report)
     of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
     if len({signal.values.size for signal in of_one_length}) > 1:
-        report.add_fault(f"the channels differ in length ({format_signal_names(of_one_length)})")
+        report.add_fault(f"the channels differ in number of samples ({format_signal_names(of_one_length)})")
         return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
@@ -160,14 +160,15 @@ def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> fl
         return None
     size = times[0].values.size
     if size < 8:
-        report.add_fault(f"{size} samples are too few. A hit needs at least 8")
+        report.add_fault(f"{size} samples are too few for a hit. Record at least 8 samples")
         return None
     steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), report) for time in times]
     if not all(steps):
         return None
     starts = [time.values[0] for time in times]
     if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * size > steps[0]:
-        report.add_fault(f"the time axes differ (start {starts}, step {steps})")
+        begin, step = (" and ".join(f"{value:.6g}" for value in values) for values in (starts, steps))
+        report.add_fault(f"the time columns differ (start {begin}, step {step})")
         return None
     unit = parse_unit(times[0].unit)
     return 1 / (steps[0] * unit.factor) if unit is not None and unit.quantity == "time" else None
@@ -180,7 +181,7 @@ def _resolve_step(time: Floats, report: ImportReport) -> float:
         return step
     printed = infer_printed_step(time) if step > 0 else None
     if printed is None:
-        remedy = "If only the time is wrong, omit it from Description.columns and give Description.rate"
+        remedy = "If only the time is wrong, omit the time column from Description.columns and give Description.rate"
         report.add_fault(fault, remedy)
         return 0.0
     if not any(fact.value == FEW_DIGITS for fact in report.facts):
@@ -194,17 +195,17 @@ def measure_step(time: Floats) -> tuple[float, str]:
     The axis is evaluated as a whole, because single steps of a printed time are never quite the same.
     """
     if time.size < 2 or not np.all(np.isfinite(time)):
-        return 0.0, "the time has empty or infinite values"
+        return 0.0, "the time column has empty or infinite values"
     step = float(time[-1] - time[0]) / (time.size - 1)
     if step <= 0:
-        return 0.0, f"the time does not increase (from {time[0]:g} to {time[-1]:g}). Sort the rows"
+        return 0.0, f"the time does not increase (from {time[0]:g} to {time[-1]:g}). Sort the rows by time"
     deviation = (time - time[0]) / step - np.arange(time.size)
     distance = np.abs(deviation - (deviation.max() + deviation.min()) / 2)
     worst = int(np.argmax(distance))
     if distance[worst] <= MAX_TIME_DEVIATION:
         return step, ""
-    place = f"sample {worst + 1} is off by {distance[worst]:.2g} steps (limit {MAX_TIME_DEVIATION:g})"
-    return step, f"the time steps are uneven, {place}. Samples may be missing, repeated or out of order"
+    place = f"sample {worst + 1} is {distance[worst]:.2g} steps from an even time axis (limit {MAX_TIME_DEVIATION:g})"
+    return step, f"the time steps are uneven: {place}. Samples may be missing, repeated or out of order"
 
 
 def infer_printed_step(time: Floats) -> float | None:
@@ -237,7 +238,7 @@ def _agree_on_rate(in_file: float | None, report: ImportReport) -> float:
         report.add_fact("sample rate", f"{rate:.8g} Hz", "option" if in_file is None else "file")
         return rate
     elif not report.faults:
-        report.add_missing("sample rate or unit of time", "rate", " 51200")
+        report.add_missing("sample rate, or unit of the time column", "rate", " 51200")
     return 0.0
 
 
@@ -246,17 +247,17 @@ def _check_gravity_offset(responses: Sequence[Signal], report: ImportReport) -> 
     for signal in responses:
         offset = abs(float(np.median(signal.values))) if signal.values.size else 0.0
         if signal.unit.lower() == "g" and abs(offset - STANDARD_GRAVITY) < 0.5:
-            found = f"column {signal.name} has the unit g, but its idle value is {offset:.2f}, gravity in m/s^2"
-            report.add_fault(found, "Give its unit with Description.columns")
+            found = f"column {signal.name} has the unit g, but its idle value is {offset:.2f}, that of gravity in m/s^2"
+            report.add_fault(found, "Give the correct unit of the column with Description.columns")
 
 
 def apply_full_scale(signals: Sequence[Signal], report: ImportReport) -> list[Signal]:
-    """Convert values that are shares of a full scale to their unit."""
+    """Convert values that are fractions of full scale to their unit."""
     shares, full_scale = [signal for signal in signals if signal.per_full_scale], report.description.full_scale
     if full_scale and not shares:
-        report.reject("full_scale", None, "the values are not shares of a full scale", "Omit the option")
+        report.reject_useless("full_scale", None, "the values are not fractions of full scale (-1 to 1)")
     elif len(full_scale) != len(shares):
-        fact = f"full scale of the {len(shares)} channels, in their order and units"
+        fact = f"full scale of {len(shares)} channel(s), in the order of the file, each in its own unit"
         report.add_missing(fact, "full_scale", " 500,50")
     elif shares:
         report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in full_scale), "option")

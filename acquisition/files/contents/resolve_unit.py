@@ -21,10 +21,10 @@ def convert_to_sensor_units(signals: Sequence[Signal], report: ImportReport) -> 
     given = report.description.sensitivity
     if not wired:
         if given:
-            report.reject("sensitivity", None, "no channel is in volts", "Omit the option")
+            report.reject_useless("sensitivity", None, "no channel is in volts")
         return list(signals)
     if len(given) != len(wired):
-        fact = f"sensitivity of each of {format_signal_names(wired)}, in their order"
+        fact = f"sensitivity of each channel in volts, in the order {format_signal_names(wired)}"
         raise report.add_missing(fact, "sensitivity", _SENSITIVITY_EXAMPLE)
     sensors = [report.attempt(_parse_sensitivity, text) for text in given]
     report.add_fact("sensitivity", ", ".join(given), "option")
@@ -48,7 +48,7 @@ def _resolve_voltage_frf_unit(unit: str, report: ImportReport) -> tuple[str, flo
     ratio, sensitivity = _VOLTAGE_RATIO_PATTERN.fullmatch(unit), report.description.sensitivity
     if ratio is None or not is_voltage(ratio[1]):
         if sensitivity:
-            report.reject("sensitivity", None, "the FRF is not in volts", "Omit the option")
+            report.reject_useless("sensitivity", None, "the FRF is not in volts")
         return unit, 1.0
     over_volts = is_voltage(ratio[2])
     whose, example = ("hammer and sensor", _SENSITIVITY_EXAMPLE) if over_volts else ("the sensor", ' "10.2 mV/g"')
@@ -76,7 +76,8 @@ def _parse_sensitivity(text: str, report: ImportReport) -> tuple[float, str]:
     """Return the volts per unit, and the unit."""
     match = _SENSITIVITY_PATTERN.fullmatch(text)
     if match is None or parse_unit(match[3]) is None or not is_voltage(match[2]) or not float(match[1]):
-        raise report.reject("sensitivity", repr(text), f"not volts per unit of the sensor, as in{_SENSITIVITY_EXAMPLE}")
+        found, cure = "not in volts per unit of the sensor", f"Give sensitivities as in{_SENSITIVITY_EXAMPLE}"
+        raise report.reject("sensitivity", repr(text), found, cure)
     return float(match[1]) * VOLTAGE_UNITS[match[2].lower()], match[3]
 
 
@@ -84,11 +85,11 @@ def choose_signal(signals: Sequence[Signal], noun: str, report: ImportReport) ->
     """Return the signal of the response that the description chooses, or the only one; noun: for people."""
     response = report.description.response
     if response is not None and not 1 <= response <= len(signals):
-        raise report.reject("response", response, f"the file has {len(signals)} {noun}")
+        raise report.reject("response", response, f"the file has only {len(signals)} {noun}")
     if response is None and len(signals) > 1:
         names = ", ".join(f"{i} {signal.name}" for i, signal in enumerate(signals[:12], 1))
         more = f" and {len(signals) - 12} more" if len(signals) > 12 else ""
-        raise report.add_missing(f"choice among {len(signals)} {noun}: {names}{more}", "response", " 1")
+        raise report.add_missing(f"choice of one of {len(signals)} {noun}: {names}{more}", "response", " 1")
     signal = signals[(response or 1) - 1]
     report.add_fact("response", signal.name, "file" if response is None else "option")
     return signal
@@ -100,7 +101,7 @@ def resolve_frf_unit(signal: Signal, report: ImportReport) -> tuple[str, float]:
     text, scale = _resolve_voltage_frf_unit(in_file or report.description.unit, report)
     stated = (text, report.description.unit) if in_file else ("", text)
     wanted = ("receptance", "mobility", "accelerance", *MOTION_QUANTITIES)
-    unit, origin = _resolve_unit(*stated, wanted, ("unit", "m/N, um/N, g/N", signal.name), report)
+    unit, origin = _resolve_unit(*stated, wanted, ("unit", "m/N, um/N or g/N", signal.name), report)
     force, quantity = report.attempt(_resolve_frf_force, unit), get_motion(unit.quantity)
     _check_quantity(quantity, signal, report)
     if force is None:
@@ -111,7 +112,7 @@ def resolve_frf_unit(signal: Signal, report: ImportReport) -> tuple[str, float]:
 
 def resolve_response_unit(signal: Signal, report: ImportReport) -> tuple[str, float]:
     """Return the quantity of a response over time, and the factor to SI."""
-    given, texts = report.description.unit, ("unit", "m/s^2, g", signal.name)
+    given, texts = report.description.unit, ("unit", "m/s^2 or g", signal.name)
     unit, origin = _resolve_unit(signal.unit, given, MOTION_QUANTITIES, texts, report)
     _check_quantity(unit.quantity, signal, report)
     report.add_fact("unit", f"{signal.unit or given} ({unit.quantity})", origin)
@@ -120,7 +121,7 @@ def resolve_response_unit(signal: Signal, report: ImportReport) -> tuple[str, fl
 
 def resolve_force_unit(signal: Signal, report: ImportReport) -> float:
     """Return the factor to N of a force over time."""
-    given, texts = report.description.force_unit, ("force_unit", "N, lbf", signal.name)
+    given, texts = report.description.force_unit, ("force_unit", "N or lbf", signal.name)
     unit, origin = _resolve_unit(signal.unit, given, ("force",), texts, report)
     report.add_fact("force", f"{signal.name}, {signal.unit or given}", origin)
     return unit.factor
@@ -135,12 +136,12 @@ def _resolve_unit(
     if given and (given_unit is None or given_unit.quantity not in wanted):
         raise report.reject(field_name, given, f"not a unit of {name}", f"Give a unit such as {examples}")
     if in_file and (file_unit is None or file_unit.quantity not in wanted):
-        cure = f"Give its meaning with Description.columns, with a unit such as {examples}"
+        cure = f"Give the meaning of the column with Description.columns, and a unit such as {examples}"
         raise report.add_fault(f"unit {in_file!r} of {name} is unknown or of another quantity", cure)
     if file_unit is not None and given_unit is not None and file_unit != given_unit:
         raise report.add_contradiction(field_name, given, in_file)
     if file_unit is None and given_unit is None:
-        raise report.add_missing(f"unit of {name}", field_name, f", such as {examples}")
+        raise report.add_missing(f"unit of {name}", field_name, f" {examples}")
     return (file_unit, "file") if file_unit is not None else (cast(Unit, given_unit), "option")
 
 
@@ -149,11 +150,11 @@ def _resolve_frf_force(unit: Unit, report: ImportReport) -> float:
     given = report.description.force_unit
     if unit.quantity not in MOTION_QUANTITIES:
         if given:
-            report.reject("force_unit", given, "the unit of the FRF includes the unit of the force", "Omit the option")
+            report.reject_useless("force_unit", given, "the unit of the FRF already includes the unit of the force")
         return 1.0
     force = parse_unit(given)
     if force is None or force.quantity != "force":
-        raise report.add_missing("unit of the force in the FRF", "force_unit", " N, or both as Description.unit g/N")
+        raise report.add_missing("unit of the force in the FRF", "force_unit", " N, or Description.unit g/N")
     return force.factor
 
 
@@ -165,4 +166,4 @@ def _check_quantity(by_unit: str, signal: Signal, report: ImportReport) -> None:
     if given and given != by_unit:
         raise report.reject("quantity", given, f"{unit} is a unit of {by_unit}")
     if signal.quantity and signal.quantity != by_unit:
-        raise report.add_fault(f"the file calls {signal.name} {signal.quantity}, but {unit} is a unit of {by_unit}")
+        raise report.add_fault(f"{signal.name} is {signal.quantity} in the file, but {unit} is a unit of {by_unit}")

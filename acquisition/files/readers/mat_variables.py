@@ -37,7 +37,7 @@ def read_mat_variables(path: Path) -> dict[str, Any]:
         patience = READ_TIMEOUT_FACTOR * _compute_cpu_limit(path.stat().st_size)
         content = run_in_subprocess(__name__, str(path), patience=patience)
     except subprocess.SubprocessError as error:
-        raise DataError(f"{path}: damaged, it crashes or hangs its reader. Export it again.") from error
+        raise DataError(f"{path}: damaged file, crashes or hangs the reader. Export the file again.") from error
     answer: dict[str, Any] | str = msgspec.msgpack.decode(content, ext_hook=_decode_array)
     if isinstance(answer, str):
         raise DataError(answer)
@@ -63,7 +63,7 @@ def _encode_answer(path: Path) -> bytes:
     except DataError as error:
         return encode(str(error))
     except Exception as error:  # noqa: BLE001 - whatever a damaged file leads to
-        return encode(f"{path}: damaged or truncated ({type(error).__name__}: {error}). Export it again.")
+        return encode(f"{path}: damaged or truncated file ({type(error).__name__}: {error}). Export the file again.")
 
 
 def _compute_cpu_limit(size: int) -> float:

@@ -59,7 +59,7 @@ def _remove_thousands(word: str, sign: str, use: SignUse) -> str:
         raise ValueError("not a number")
     if use == "doubtful":
         either = f"{word.replace(sign, '.')} or {word.replace(sign, '')}"
-        raise ValueError(f"either {either} (Description.decimal comma or Description.decimal point)")
+        raise ValueError(f"which may be {either} (choose Description.decimal comma or Description.decimal point)")
     return word.replace(sign, "")
 
 

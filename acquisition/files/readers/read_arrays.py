@@ -57,7 +57,8 @@ def read_numpy(path: Path) -> Contents:
         with path.open("rb") as file:
             return _read_numpy_file(file, path)
     except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise DataError(f"{path}: unreadable ({error}). Save arrays of numbers, without Python objects.") from error
+        fault = f"unreadable NumPy file ({error})"
+        raise DataError(f"{path}: {fault}. Save arrays of numbers, without Python objects.") from error
 
 
 def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
@@ -98,7 +99,7 @@ def read_sep005(path: Path) -> Contents:
     try:
         channels = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise DataError(f"{path}: damaged or truncated ({error})") from error
+        raise DataError(f"{path}: damaged or truncated JSON file ({error}). Export the file again.") from error
     return parse_sep005(str(path), channels)
 
 
@@ -110,7 +111,7 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         missing = [key for key in _SEP005_KEYS if key not in channel]
         missing += [] if {"fs", "time"} & channel.keys() else ["fs"]
         if missing:
-            raise DataError(f"{where} lacks {', '.join(missing)}, which SEP005 requires")
+            raise DataError(f"{where} lacks {', '.join(missing)}, which SEP005 requires. Add these keys.")
         record = groups.setdefault(str(channel.get("group", "")), len(groups))
         try:
             values = np.asarray(channel["data"], dtype=np.float64).ravel()
@@ -119,7 +120,7 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         except (TypeError, ValueError) as error:
             raise DataError(f"{where}: {error}") from error
         if rate is not None and not rate > 0:
-            raise DataError(f"{where}: fs={rate} Hz is not above 0")
+            raise DataError(f"{where}: sample rate fs={rate} Hz is not above 0")
         name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         signals.append(Signal(name, values, infer_role(name, unit), unit, rate=rate, record=record))
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]

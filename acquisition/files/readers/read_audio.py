@@ -40,7 +40,7 @@ def _read_wav(path: Path) -> tuple[float, Floats]:
             warnings.filterwarnings("ignore", message="Chunk .non-data. not understood", category=Warning)
             rate, values = scipy.io.wavfile.read(io.BytesIO(content))
     except Exception as error:
-        raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
+        raise DataError(f"{path}: damaged, truncated or unsupported audio file ({error}). Export WAV.") from error
     columns = np.atleast_2d(values.T)
     if values.dtype.kind == "u":
         columns = columns.astype(np.float64) - 128
@@ -53,12 +53,12 @@ def _read_flac_or_mp3(path: Path) -> tuple[float, Floats]:
     try:
         import soundfile
     except ImportError as error:
-        cure = 'Export WAV, or run pip install "lobewatch[sound]".'
+        cure = 'Export WAV, or install the package with pip install "lobewatch[sound]".'
         raise DataError(f"{path}: FLAC and MP3 need the package soundfile. {cure}") from error
     try:
         values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
     except Exception as error:
-        raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
+        raise DataError(f"{path}: damaged, truncated or unsupported audio file ({error}). Export WAV.") from error
     return float(rate), values.T
 
 

@@ -31,7 +31,7 @@ def read_lvm(path: Path) -> Contents:
     lines = text.splitlines()
     ends = [i for i, line in enumerate(lines) if line.startswith(_LVM_HEADER_END)]
     if len(ends) < 2:
-        raise DataError(f"{path}: incomplete LVM file, {len(ends)} of at least 2 header ends")
+        raise DataError(f"{path}: incomplete LVM file, {len(ends)} of at least 2 header ends. Export the file again.")
     pairs = (re.split("[\t,;]", line, maxsplit=1) for line in lines[: ends[0]])  # its separator is in one of them
     head = {pair[0]: pair[1].strip() for pair in pairs if len(pair) == 2}
     starts = [*ends[1:], len(lines)]
@@ -39,7 +39,7 @@ def read_lvm(path: Path) -> Contents:
     for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False)):
         signals += _read_lvm_segment(path, lines, places, head, number)
     if not text.endswith("\n"):
-        raise DataError(f"{path}: truncated file, its last line has no line end. Export it again.")
+        raise DataError(f"{path}: truncated file, the last line has no line end. Export the file again.")
     return Contents(tuple(signals), created=_parse_lvm_date(head))
 
 
@@ -70,7 +70,7 @@ def _read_lvm_segment(
         if samples[i]:
             n_there = found.values.size
             if n_there < samples[i]:
-                raise DataError(f"{path}: truncated file, {n_there} of {samples[i]} samples. Export it again.")
+                raise DataError(f"{path}: truncated file, {n_there} of {samples[i]} samples. Export the file again.")
             name, by_name = split_heading(names[i] or f"channel {i + 1}")
             unit = units[i] or by_name
             rate, role = 1 / steps[i] if steps[i] > 0 else None, infer_role(name, unit)
@@ -98,7 +98,7 @@ def read_tdms(path: Path) -> Contents:
     try:
         from nptdms import TdmsFile
     except ImportError as error:
-        raise DataError(f'{path}: TDMS needs the package npTDMS. Run pip install "lobewatch[tdms]".') from error
+        raise DataError(f'{path}: TDMS files need the package npTDMS. Run pip install "lobewatch[tdms]".') from error
     try:
         file = TdmsFile.read(path)
         groups = file.groups()
@@ -106,7 +106,8 @@ def read_tdms(path: Path) -> Contents:
         machines = list_distinct_names(group.name for group, signals in zip(groups, held, strict=True) if signals)
         created = [_get_tdms_start(channel) for group in groups for channel in group.channels()]
     except Exception as error:
-        raise DataError(f"{path}: damaged or truncated ({type(error).__name__}: {error}). Export it again.") from error
+        fault = f"damaged or truncated file ({type(error).__name__}: {error})"
+        raise DataError(f"{path}: {fault}. Export the file again.") from error
     return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), machines=machines)
 
 

@@ -48,7 +48,7 @@ def read_table(path: Path, skip: int = 0, decimal_sign: str = "") -> Contents:
         columns = layout.read_columns(rows, form, str(path), decimal_sign)
         signals += _name_columns(columns, heading, record)
         extras = [word for i, word in enumerate(form.split(rows.texts[-1])) if word and i not in form.columns]
-        notes += [f"ignored {word!r} next to the columns in the last row" for word in extras]
+        notes += [f"ignored {word!r} outside the columns in the last row" for word in extras]
     _check_complete(path, keys, rows, columns, text)
     notes += [f"ignored {line!r} below the rows" for line in footer]
     return replace(_make_table_contents(path, tuple(signals), keys), machines=machines, notes=tuple(notes))
@@ -142,7 +142,7 @@ def _reject_broken_row(path: Path, above: NumberedLines, form: layout.RowLayout,
     numbers = sum(map(is_number, words))
     may_be_row = len(words) == width and 2 * numbers >= len(form.columns) and not _LEADING_WORD.match(above.texts[-1])
     if may_be_row and not layout.is_unit_line(above.texts[-2:-1], form, width):
-        cure = f"Correct it, or skip the lines above the table with Description.skip {above.numbers[-1]}."
+        cure = f"Correct this line, or skip the lines above the table with Description.skip {above.numbers[-1]}."
         place = f"{path}: line {above.numbers[-1]}"
         raise DataError(f"{place}: {above.texts[-1].strip()[:60]!r} is not a row of numbers. {cure}")
 
@@ -153,11 +153,11 @@ def _check_complete(
     """Raise DataError where the last row is cut short, or a table of lobewatch differs from its heading."""
     last, has_end = f"{path}: truncated at line {rows.numbers[-1]}", text.endswith(("\n", "\r"))
     if not has_end and any(column.values.size == len(rows.texts) - 1 for column in columns):
-        raise DataError(f"{last}, an incomplete row. Export the file again, or remove that line.")
+        raise DataError(f"{last}, an incomplete row. Export the recording again, or remove this line.")
     rows_written = keys.get("rows")
     if rows_written is None or keys.get("written by") != "lobewatch":
         return  # of another program, or of our first versions
-    cure = "Convert it again, or remove the line that begins with # rows."
+    cure = "Convert the recording again, or remove the line that begins with # rows."
     if rows_written != str(len(rows.texts)):
         raise DataError(f"{path}: {len(rows.texts)} of {rows_written} rows, truncated or edited. {cure}")
     if not has_end:
@@ -188,14 +188,14 @@ def read_pulse(path: Path) -> Contents:
         is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
         form, sign = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
     except (KeyError, ValueError) as error:
-        raise DataError(f"{path}: no rows, or the header lacks {error}. Export it again.") from error
+        raise DataError(f"{path}: no rows, or the header lacks {error}. Export the file again.") from error
     signals = list[Signal]()
     for record, (first, after) in enumerate(blocks):
         columns = layout.read_columns(lines[first:after], form, str(path), sign)
         n_there = min(column.values.size for column in columns)
         if n_there != n:
             place = f"{path}: line {lines.numbers[after - 1]}"
-            raise DataError(f"{place}: truncated file, {n_there} of {n} rows. Export it again.")
+            raise DataError(f"{place}: truncated file, {n_there} of {n} rows. Export the file again.")
         axis, *parts = (column.values for column in columns)
         function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
         flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}

@@ -87,7 +87,7 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
     for _ in range(12):
         end = content.find(b"\n", ends[-1])
         if end < 0:
-            raise DataError(f"{place}: truncated header, {len(ends) - 1} of 12 lines. Export it again.")
+            raise DataError(f"{place}: truncated header, {len(ends) - 1} of 12 lines. Export the file again.")
         ends.append(end + 1)
     lines = [decode_utf8_or_latin1(content[a:b]).rstrip("\r\n") for a, b in pairwise(ends)]
     try:
@@ -97,7 +97,8 @@ def read_function(place: str, content: bytes, begin: int) -> tuple[UffFunction, 
         if n < 1:
             raise ValueError(n)
     except (ValueError, KeyError) as error:
-        raise DataError(f"{place}: line 7 of the header is invalid ({lines[7].strip()!r})") from error
+        fault = f"line 7 of the header is invalid ({lines[7].strip()!r})"
+        raise DataError(f"{place}: {fault}. Export the file again.") from error
     even, width = bool(spacing), per_value + (0 if spacing else 1)
     if lines[0].split()[0] == "58":
         numbers, after = _read_text_values(place, content, ends[-1], n * width)
@@ -152,9 +153,9 @@ def _read_text_values(place: str, content: bytes, begin: int, n: int) -> tuple[F
     numbers = _NUMBER_TOKEN.findall(body)
     strays = _NUMBER_TOKEN.sub(b"", body).split()
     if strays:
-        raise DataError(f"{place}: {strays[0][:20]!r} is not a number")
+        raise DataError(f"{place}: {strays[0][:20]!r} is not a number. Export the file again.")
     if len(numbers) != n or end < 0:
-        raise DataError(f"{place}: truncated or damaged, {len(numbers)} of {n} numbers. Export it again.")
+        raise DataError(f"{place}: truncated or damaged, {len(numbers)} of {n} numbers. Export the file again.")
     return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in numbers]), begin + len(body)
 
 
@@ -172,7 +173,7 @@ def _read_binary_values(
     row = np.dtype(value if even else [("abscissa", f"{sign}f{size}"), *value])
     body = content[begin : begin + n * row.itemsize]
     if len(body) < n * row.itemsize:
-        raise DataError(f"{place}: truncated, {len(body)} of {n * row.itemsize} bytes of values. Export it again.")
+        raise DataError(f"{place}: truncated, {len(body)} of {n * row.itemsize} value bytes. Export the file again.")
     table = np.frombuffer(body, row)
     parts = [table["value"]] if even else [table["abscissa"][:, None], table["value"]]
     return np.hstack(parts).astype(np.float64).ravel(), begin + len(body)
@@ -235,13 +236,14 @@ def _read_data_sets(path: Path, content: bytes) -> UffDataSets:
             models |= {name: None} if name not in ("", "NONE") else {}
         closing = _DATA_SET_MARK.match(content, at)
         if closing is None:
-            raise DataError(f"{path}: truncated or damaged, the last data set has no end (-1). Export it again.")
+            raise DataError(f"{path}: truncated or damaged, the last data set has no end (-1). Export the file again.")
         if kind == [b"164"]:
             code = re.match(rb"[^\n]*\n\s*(\d+)", content[begin:])
             system = _UNIT_SYSTEMS.get(int(code[1])) if code else None
         at = closing.end()
     if content[at:].strip():
-        raise DataError(f"{path}: damaged, {content[at:].strip()[:20]!r} follows the last data set. Export it again.")
+        rest = content[at:].strip()[:20]
+        raise DataError(f"{path}: damaged, {rest!r} follows the last data set. Export the file again.")
     return UffDataSets(functions, system, tuple(models))
 
 

@@ -131,7 +131,7 @@ def _check_widths(rows: NumberedLines, words: Sequence[Sequence[str]], form: Row
         if is_short or goes_on:
             n = sum(map(is_number, row))
             found = f"{place}: line {rows.numbers[i]}: {n} numbers, but the other rows have {width}"
-            skip = f"Skip it with Description.skip {rows.numbers[0]}"
+            skip = f"Skip this line with Description.skip {rows.numbers[0]}"
             raise DataError(join_sentences(found, "" if i else f"{skip}, and give Description.columns"))
 
 

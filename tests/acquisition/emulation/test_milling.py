@@ -234,7 +234,7 @@ def test_a_cut_among_others_is_the_same_as_alone() -> None:
     ],
 )
 def test_what_is_no_cut_is_rejected(change: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"teeth|angles|depth|radial|runout|rigid"):
+    with pytest.raises(ValueError, match=r"teeth|angle|depth|radial|runout|rigid"):
         replace(cut_of(HALF_UP, 7000.0, 1e-3), **change)
 
 

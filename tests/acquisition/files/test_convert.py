@@ -112,7 +112,7 @@ def test_a_tap_file_becomes_each_format(tmp_path: Path) -> None:
         assert (back.direction, back.tool, back.created) == ("y", "cutter", WHEN)
     with pytest.raises(DataError, match=r"FRF.*\.uff, \.unv, \.csv, \.mat"):
         convert(tap, tmp_path / "out.json", NOTHING)
-    with pytest.raises(ValueError, match=r"out\.xyz: '\.xyz' .*\.uff, \.unv, \.csv, \.mat, \.json"):
+    with pytest.raises(ValueError, match=r"out\.xyz: .*'\.xyz' .*\.uff, \.unv, \.csv, \.mat, \.json"):
         convert(tap, tmp_path / "out.xyz", NOTHING)
     with pytest.raises(ValueError, match="input file"):
         convert(tmp_path / "out.csv", tmp_path / "out.csv", NOTHING)
@@ -143,7 +143,7 @@ def test_sep005_in_g_is_converted_and_without_a_unit_asked_for(tmp_path: Path) -
     assert read_hits(path)[0].acceleration == pytest.approx(hit.acceleration * 9.80665)
     channels[1]["unit_str"] = ""
     path.write_text(json.dumps(channels))
-    assert "unit of acc (Description.unit" in inspect_file(path).problems
+    assert "unit of acc (for example Description.unit" in inspect_file(path).problems
     del channels[1]["fs"]
     path.write_text(json.dumps(channels))
     with pytest.raises(DataError, match=r"channel 2 .*fs"):

@@ -64,7 +64,7 @@ def test_a_good_hit_has_no_reason() -> None:
 def test_a_double_hit_is_reported_with_its_time_and_size(start: float, when: str) -> None:
     verdict = evaluate_hit(hit((200, 0, 0.6e-3), (36, start, 0.6e-3)))
     assert verdict.flags == HitFlags.DOUBLE_HIT
-    told = re.fullmatch(rf".*\b{when} .*\((\d+) %\).*", verdict.text)
+    told = re.fullmatch(rf".*\b{when} .*\((\d+) % .*", verdict.text)
     assert told is not None
     assert int(told[1]) == pytest.approx(18, abs=1)
 
@@ -150,7 +150,7 @@ def test_overload_is_certain_by_codes_and_inferred_by_shape() -> None:
 
 def test_lost_scans_are_counted_in_the_reason() -> None:
     verdict = evaluate_hit(replace(hit((200, 0, 0.6e-3)), lost_scans=7))
-    assert verdict.text.startswith("7 scans ")
+    assert verdict.text.startswith("7 samples ")
 
 
 def test_a_band_that_the_force_does_not_reach_is_narrow() -> None:

@@ -94,7 +94,7 @@ def test_a_force_sensitivity_believed_too_small_reads_the_force_too_large(true_h
     assert found.ratio == pytest.approx(1.2, rel=1e-3)
     assert not found.agrees
     assert found.force_sensitivity == pytest.approx(2.25e-3, rel=1e-3)
-    assert "force reads 20.0%" in str(found)
+    assert "force is 20.0%" in str(found)
     assert re.search(r"2\.25 mV/N .*1\.875", str(found))
 
 
@@ -102,7 +102,7 @@ def test_an_acceleration_sensitivity_believed_too_small_reads_the_acceleration_t
     found = calibrate_by_mass(misread(true_hits, acceleration=1 / 1.1), MASS)
     assert found.ratio == pytest.approx(1 / 1.1, rel=1e-3)
     assert found.acceleration_sensitivity == pytest.approx(1.02e-3, rel=1e-3)
-    assert "acceleration reads 10.0%" in str(found)
+    assert "acceleration is 10.0%" in str(found)
     assert re.search(r"1\.02 mV per m/s\^2 .*0\.9273", str(found))
 
 
@@ -144,7 +144,7 @@ def test_the_foot_of_a_mounts_resonance_does_not_bend_the_ratio() -> None:
 
 
 def test_a_soft_mount_leaves_no_band() -> None:
-    with pytest.raises(ValueError, match=r"\d+ lines from 50 Hz .*20 "):
+    with pytest.raises(ValueError, match=r"\d+ FRF lines from 50 Hz .*20 "):
         calibrate_by_mass(hits_on(hung_mass(MASS, mount=200.0)), MASS)
 
 

@@ -134,7 +134,7 @@ def test_a_stall_of_the_host_changes_nothing() -> None:
 def test_chaos_is_rejected() -> None:
     arrival = even(25600.0)
     chaos = measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
-    with pytest.raises(DeviceError, match=r"± \d+\.\d\d%.* ± 0\.20%"):
+    with pytest.raises(DeviceError, match=r" \d+\.\d\d%.* limit 0\.20%"):
         check_rate(chaos, 25600.0)
 
 
@@ -255,7 +255,7 @@ def test_what_the_first_versions_kept_without_a_checksum_is_known(folder: Machin
 @pytest.mark.parametrize("content", [b"{", b'[{"model": 1}]', b"\xff"])
 def test_a_damaged_memory_is_reported(folder: MachineFolder, content: bytes) -> None:
     (folder.path / "daq.json").write_bytes(content)
-    with pytest.raises(DataError, match=r"daq\.json: .*Delete"):
+    with pytest.raises(DataError, match=r"daq\.json: .*Delete this file"):
         check(folder, Stream(even(25600.0)))
 
 
@@ -300,7 +300,7 @@ def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(fo
     assert check_device_rate(folder, stream, clock=stream.clock, remarks=remarks) == 25600.0
     assert stream.starts == 3
     assert [remark.code for remark in remarks] == ["rate-not-sure"]
-    assert re.search(r"±0\.\d\d%", remarks[0].text)
+    assert re.search(r" 0\.\d\d%", remarks[0].text)
     assert not (folder.path / "daq.json").exists()
     quiet = Stream(even(25600.0))
     assert check_device_rate(folder, quiet, clock=quiet.clock, remarks=remarks) == 25600.0

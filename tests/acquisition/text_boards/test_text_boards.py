@@ -234,8 +234,8 @@ def test_an_unplugged_board_is_a_device_error() -> None:
     ("driver", "settings", "reason"),
     [
         ("lines", DeviceSettings(None, INPUTS), "sample_rate_hz"),
-        ("lines", DeviceSettings(RATE, (INPUTS[0], SensorInput(2, ACCELERATION))), "input: 0, 2 .*0 to 1"),
-        ("lines", DeviceSettings(RATE, (SensorInput(1, ACCELERATION),)), "input: 1 .*0 to 0"),
+        ("lines", DeviceSettings(RATE, (INPUTS[0], SensorInput(2, ACCELERATION))), "input = 0, 2 .*0 to 1"),
+        ("lines", DeviceSettings(RATE, (SensorInput(1, ACCELERATION),)), "input = 1 .*0 to 0"),
         ("dataq", DeviceSettings(RATE, INPUTS, printing=OutputFormat()), r"\[daq\.printing\]"),
     ],
 )

@@ -132,7 +132,7 @@ def test_lost_scans_are_counted(name: str, lost: int, plugged: Any, wiring: Wiri
     ("name", "fault", "reason"),
     [
         ("nidaqmx", "overrun", "no longer available"),
-        ("mcc172", "overrun", "lost scans"),
+        ("mcc172", "overrun", "MCC 172 lost"),
         ("nidaqmx", "unplugged", "cDAQ1Mod1 .*Device is not available"),
         ("mcc172", "unplugged", "mcc172:0 .*Addr 0: Incorrect response"),
         ("uldaq", "unplugged", "UL Error: 9"),

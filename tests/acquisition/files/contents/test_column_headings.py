@@ -73,8 +73,8 @@ def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path
 def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "".join(SPELLINGS["numpy"](h) + "\n" for h in H))
     said = complaint(path)
-    assert "column 1 (Description.unit" in said
-    assert "(Description.spacing 0.5 Description.start 0 in Hz)" in said
+    assert "column 1 (for example Description.unit" in said
+    assert "(for example Description.spacing 0.5 Description.start 0 in Hz)" in said
     assert is_h(read_frf(path, Description(unit="m/N", spacing=1.0, start=1.0)))
     two = put(tmp_path / "b.txt", rows(H.real, H.imag))
     assert is_h(read_frf(two, Description(columns=("real [m/N]", "imag"), spacing=1.0, start=1.0)))
@@ -85,7 +85,7 @@ def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -
 
 def test_a_spacing_is_rejected_where_the_file_has_an_axis(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
-    assert "Description.spacing, Description.start: the file has its own frequencies (Freq)" in complaint(
+    assert "Description.spacing and Description.start: the file has its own frequencies (Freq)" in complaint(
         path, spacing=1.0
     )
     hit = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g\n" + rows(TIME, FORCE, RESPONSE))
@@ -116,7 +116,7 @@ def test_columns_that_are_not_all_named_or_called_the_same_are_rejected(tmp_path
     assert '"-"' in said
     twice = put(tmp_path / "b.txt", "No.\tx\tx\tx\n" + text)
     said = complaint(twice, columns=("frequency=x", "real [m/N]=3", "imag=4"))
-    assert re.search("Description.columns: 3 .*'x'.* 2, 3, 4", said)
+    assert re.search("Description.columns: 3 .*'x'.*2, 3, 4", said)
     assert is_h(read_frf(twice, Description(columns=("frequency [Hz]=2", "real [m/N]=3", "imag=4"))))
 
 
@@ -146,7 +146,7 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
     volts = accelerance * 0.0102
     text = rows(F, volts.real, volts.imag, separator=",")
     path = put(tmp_path / "a.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + text)
-    assert re.search(r'sensor, .* V/N \(Description\.sensitivity "10\.2 mV/g"\)$', complaint(path))
+    assert re.search(r'sensor, .* V/N \(for example Description\.sensitivity "10\.2 mV/g"\)$', complaint(path))
     assert is_h(read_frf(path, Description(sensitivity=("10.2 mV/g",))))
     assert "Description.sensitivity 2.25 mV/N: " in complaint(path, sensitivity=("2.25 mV/N",))
     both = put(

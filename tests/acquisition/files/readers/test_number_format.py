@@ -112,7 +112,7 @@ def test_what_another_number_shows_is_not_uncertain(
 def test_a_person_says_which_sign_is_the_decimal_one(tmp_path: Path, force: str, said: str, value: float) -> None:
     whole = "".join(f"{place};{force if place else 7};{place % 7}\n" for place in range(len(HIT)))
     path = put(tmp_path / "a.csv", "Time (ms);Force (N);Acc (g)\n" + whole)
-    remedy = "Description.decimal comma or Description.decimal point"
+    remedy = "choose Description.decimal comma or Description.decimal point"
     fault = rf"Force .*'1,234' in line 3, .*1\.234 or 1234 \({remedy}\)"
     assert re.search(fault, complaint(path)) if "," in force else complaint(path) == ""
     assert read_hits(path, Description(decimal=said))[0].force[1:] == pytest.approx(value, rel=1e-12)

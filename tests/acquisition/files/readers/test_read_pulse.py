@@ -39,7 +39,7 @@ def test_a_file_a_channel(tmp_path: Path) -> None:
     assert names in complaint(response, force=force)
     for spoilt in (TIME + 0.1, 2 * TIME):
         put(force, rows(spoilt, FORCE))
-        assert "time axes differ" in complaint(response, force=force, columns=columns)
+        assert "time columns differ" in complaint(response, force=force, columns=columns)
     put(force, rows(TIME[:-3], FORCE[:-3]))
     assert "(column 2 of impact.txt [N] (397), column 2 [m/s^2] (400))" in complaint(
         response, force=force, columns=columns

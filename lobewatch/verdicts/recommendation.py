@@ -108,7 +108,8 @@ NEW_TOOL_REMEDIES = "Use a shorter stick-out and tap again", "Use a thicker tool
 CUT_REMEDIES = (*NEW_TOOL_REMEDIES, "Reduce the radial depth")
 """Measures that make an unsafe cut safe, for verdicts."""
 TOOL_DATA_REMEDY = "Set tool_material and cutting_speed_m_min in the [[tool]] if the tool allows other speeds"
-TOOL_SPEED_REMEDIES = ("Use a smaller diameter", TOOL_DATA_REMEDY)
+SLOWER_SPINDLE_REMEDY = "Reduce low_rpm in [speed] if the spindle can run slower"
+TOOL_SPEED_REMEDIES = ("Use a smaller diameter", SLOWER_SPINDLE_REMEDY, TOOL_DATA_REMEDY)
 """Measures if the spindle is too fast for the tool."""
 MAX_SPEED_REMEDIES = ("Use a tool or holder with a higher speed limit", "Correct max_speed_rpm in the [[tool]]")
 """Measures if max_speed_rpm limits the speed."""
@@ -195,7 +196,7 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     edge_text = "" if edge is None else f" ({edge.high:.0f} m/min)"
     is_capped = limits.high_rpm == limits.tool.max_speed_rpm
     why, cures = (" (max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
-    text = f"the tool allows {reach.high_rpm:g} rpm{why}, below the lowest spindle speed of {speed.low_rpm:g} rpm"
+    text = f"the speed limit of the tool is {reach.high_rpm:g} rpm{why}, below the lowest speed of {speed.low_rpm:g} rpm"
     return (text, *cures)
 
 

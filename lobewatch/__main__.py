@@ -1,5 +1,6 @@
-"""Run the command line with `python -m lobewatch`."""
+"""Run the command line by `python -m lobewatch`."""
 
 from lobewatch.cli import main
 
-main()
+if __name__ == "__main__":
+    main()

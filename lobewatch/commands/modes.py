@@ -82,7 +82,7 @@ def modes(
 
     if beside is not None and len(beside) == 1:
         raise ValueError(
-            f"--beside {beside[0]} confirms no mode, because two files may agree by chance. Give two or more --beside."
+            f"--beside {beside[0]} confirms no mode, two files may agree by chance. Give two or more --beside."
         )
     edits = parse_mode_edits(add, drop, fix)
     taken_off = Window.from_options(window, window_start, hit_at)

@@ -196,7 +196,7 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     edge_text = "" if edge is None else f" ({edge.high:.0f} m/min)"
     is_capped = limits.high_rpm == limits.tool.max_speed_rpm
     why, cures = (" (max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
-    text = f"the speed limit of the tool is {reach.high_rpm:g} rpm{why}, below the lowest speed of {speed.low_rpm:g} rpm"
+    text = f"the tool limit is {reach.high_rpm:g} rpm{why}, below the lowest spindle speed of {speed.low_rpm:g} rpm"
     return (text, *cures)
 
 

@@ -25,8 +25,8 @@ FORECAST_ASSUMPTIONS = (
     "One forecast in three or four misses a drop that slows down or grows exponentially."
 )
 """Note below every table of forecast dates."""
-TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")
-"""Codes of remarks that the trend of a machine contains."""
+SERIES_CODES, PROGRAM_CODES = ("frequency-alarm", "frequency-warn", "decay"), ("program-not-stable", "program-doubtful")
+"""Codes of remarks that the trend of a machine contains, and those that its table of dates contains."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
 
@@ -84,7 +84,12 @@ def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: Remaini
 
 def trend_remarks(outlook: MachineForecast) -> list[Remark]:
     """Return the remarks on a machine that its trend in words does not contain."""
-    return [remark for remark in outlook.status.remarks if remark.code not in TREND_CODES]
+    status = outlook.status
+    acknowledged = {(alarm.code, alarm.about) for alarm in status.alarms if alarm.is_acknowledged(status.time)}
+    shown = SERIES_CODES if no_dates_text(outlook) else SERIES_CODES + PROGRAM_CODES
+    return [
+        remark for remark in status.remarks if remark.code not in shown or (remark.code, remark.about) in acknowledged
+    ]
 
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:

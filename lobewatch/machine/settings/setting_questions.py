@@ -120,7 +120,10 @@ def find_template_bearings(machine: Machine) -> ImplausibleSetting | None:
 
 
 def hash_programs(machine: Machine) -> dict[str, str]:
-    """Return the SHA-256 of all settings that decide the verdict on each program, besides `Machine.settings_hash`."""
+    """Return the SHA-256 of all settings that decide the verdict on each program, besides `Machine.settings_hash`.
+
+    The sources of the cutting coefficients are part of it: another text there makes stored verdicts unknown.
+    """
     hashes = {}
     for program in machine.program:
         questions = [question.statement for question in find_program_questions(machine, program, on_model=True)]

@@ -1,1 +1,1 @@
-"""Estimation of averaged FRFs from hits, and their correction."""
+"""Estimation and correction of averaged FRFs from hits."""

@@ -85,7 +85,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     >>> evaluate_hit(hit).flags == HitFlags.OK
     True
     >>> print(evaluate_hit(hit, band=(200.0, 4000.0)).text)
-    The force reaches 2220 Hz (-20 dB) of the required 4000 Hz. Use a harder hammer tip.
+    The force spectrum reaches 2220 Hz (-20 dB) of the required 4000 Hz. Use a harder hammer tip.
     """
     findings = _evaluate_overloads(hit)
     if hit.lost_scans:

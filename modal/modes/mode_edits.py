@@ -23,7 +23,7 @@ class ModeEdits:
     >>> ModeEdits(fix=((1500.0, 1.5),))
     Traceback (most recent call last):
         ...
-    ValueError: fix 1500:1.5: damping ratio 1.5 is not between 0 and 1. Give 3 % as 0.03.
+    ValueError: fix 1500:1.5: damping ratio 1.5 is not between 0 and 1. Give a damping ratio of 3 % as 0.03.
     """
 
     add: tuple[float, ...] = ()

@@ -180,7 +180,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",
-        "Hit the same spot in the same direction as before.",
+        "Hit the same spot in the same direction as in the other hits.",
         {"": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),

@@ -114,7 +114,7 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
         return replace_band(state, band, None)
     fitted = plan.fitted(state)
     if fitted is None:
-        raise ValueError(f"{request}: the neighbouring modes cannot be fitted without this mode. Drop them all.")
+        raise ValueError(f"{request}: the neighbouring modes cannot be fitted without this mode. Drop all these modes.")
     return replace_band(state, band, fitted)
 
 

@@ -119,7 +119,7 @@ def mode_indicator(frfs: Sequence[Frf]) -> Floats:
     if not frfs:
         raise ValueError("no FRF given. Give one or more FRFs.")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
-        raise ValueError("the FRFs have different frequency lines. Measure or export all with the same settings.")
+        raise ValueError("the FRFs have different frequency lines. Export all FRFs with the same settings.")
     receptance = np.array([frf.receptance for frf in frfs])
     size = np.abs(receptance)
     energy = np.sum(size**2, axis=0)

@@ -1,1 +1,1 @@
-"""Estimation of averaged FRFs from hits, and correction of the FRFs."""
+"""Estimation and correction of averaged FRFs from hits."""

@@ -98,9 +98,10 @@ class MassCalibration:
         """Return all results, one sentence per line."""
         low, high = self.band
         lines = [
-            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} (standard error) "
-            f"over {self.n_hits} hits on {self.mass:g} kg, {low:.0f} to {high:.0f} Hz, "
-            f"constant within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg",
+            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} (standard error), "
+            f"{self.n_hits} hits on {self.mass:g} kg",
+            f"F/(m a) is constant within {abs(self.flatness):.1%} from {low:.0f} to {high:.0f} Hz, "
+            f"phase {self.phase:+.1f} deg",
             *map(str, self.remarks),
         ]
         if self.sizes_agree:

@@ -240,4 +240,4 @@ def check_tool(tool: Spindle, theory: str) -> None:
     if tool.bearings:
         raise ValueError(f"the tool has {len(tool.bearings)} bearing(s). Give a free shaft, without bearings.")
     if tool.theory != theory:
-        raise ValueError(f"the tool has theory={tool.theory!r}, the spindle {theory!r}. Use one theory for both.")
+        raise ValueError(f"the tool has theory={tool.theory!r}, the spindle {theory!r}. Use the same theory for both.")

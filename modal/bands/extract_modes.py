@@ -172,7 +172,7 @@ def _limit_to_common_band(frfs: Sequence[Frf]) -> list[Frf]:
     if not frfs:
         raise ValueError("no FRF given. Give one or more FRFs, with that of the driving point first.")
     if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
-        raise ValueError("the FRFs have different frequency lines. Measure or export all with the same settings.")
+        raise ValueError("the FRFs have different frequency lines. Export all FRFs with the same settings.")
     usable = [frf.usable_band for frf in frfs if frf.usable_band is not None]
     common = (max(low for low, _ in usable), min(high for _, high in usable)) if usable else None
     return [replace(frf, usable_band=common) for frf in frfs]

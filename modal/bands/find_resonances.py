@@ -130,7 +130,7 @@ def _check_phase(frf: Frf, peaks: list[Resonance]) -> None:
     if rising > falling and np.sum(phase_step) > 0:
         raise ConjugateError(
             "the phase rises through the resonances, so the FRF is the complex conjugate of response over force. "
-            "Conjugate it (numpy.conj)."
+            "Conjugate the FRF (numpy.conj)."
         )
 
 

@@ -1,1 +1,1 @@
-"""Least-squares fit of a few neighbouring modes in one FRF, or in several with common poles."""
+"""Least-squares fit of a few neighbouring modes in one FRF, or in several FRFs with common poles."""

@@ -1,1 +1,1 @@
-"""Modes as plain data: synthesized FRFs, matching, measurement effects, edits by hand."""
+"""Modes as plain data: synthesized FRFs, matching, measurement effects, edits by the operator."""

@@ -98,7 +98,7 @@ def test_a_package_that_cannot_be_loaded_is_named_and_disables_nothing(trial: Pa
     (broken / "entry_points.txt").write_text("[lobewatch.drivers]\nbroken = no_such_module:DRIVER\n", "utf-8")
     said = run("emulate", "broken", "trial", plugin=broken.parent)
     reason = "the package broken-daq cannot be loaded (ModuleNotFoundError: No module named 'no_such_module')"
-    assert (said.returncode, said.stderr) == (2, f"error: driver 'broken': {reason}. Update or remove that package.\n")
+    assert (said.returncode, said.stderr) == (2, f"error: driver 'broken': {reason}. Update or remove the package.\n")
     listed = run("ports", "--json", plugin=broken.parent)
     assert listed.returncode == 0, listed.stderr
     assert json.loads(listed.stdout)["remarks"] == [
@@ -106,7 +106,7 @@ def test_a_package_that_cannot_be_loaded_is_named_and_disables_nothing(trial: Pa
             "code": "package-not-loaded",
             "about": "driver 'broken'",
             "text": reason,
-            "cure": "Update or remove that package",
+            "cure": "Update or remove the package",
         }
     ]
 

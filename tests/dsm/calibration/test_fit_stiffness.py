@@ -188,7 +188,7 @@ def test_report() -> None:
     noisy = MODES[:5] + np.array([1.0, -1.0, 0.5, 1.0, -0.5])
     text = str(fit_stiffness(surrogate(dict.fromkeys(TRUTH, 6e8)), noisy, np.full(5, 1.0)))
     assert "stiffness front   " in text
-    assert "start 600 N/um: factor 1.49968" in text
+    assert "start 600 N/um, calibration factor 1.49968" in text
     assert "correlation front-middle" in text
     assert f"{noisy[0]:.1f} ± 1.0 Hz" in text
     assert "holder 6" in text

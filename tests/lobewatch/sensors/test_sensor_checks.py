@@ -178,7 +178,7 @@ def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors) 
     """The wrong mass stands for a wrong sensitivity: F/(m a) cannot tell them apart, and the text says so."""
     code, out, err = sensors(hung_mass(1.1 * MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
     assert code == 0, err
-    assert "force reads 10.0%" in out
+    assert "force is 10.0%" in out
     assert re.search(r"2\.475 mV/N .*2\.25\b", out)
     factor = re.search(r"sens_V_per_EU of the force channel by (\S+),", out)
     assert factor is not None

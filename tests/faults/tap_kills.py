@@ -95,7 +95,7 @@ class Kills:
         return about | {"wrong": self._wrong(said, [int(peak) for peak in peaks])}
 
     def _run(self, lines: int, delay: float) -> tuple[str, int]:
-        process, pipe = self._start(["tap", str(self._path), "--port", self._port])
+        process, pipe = self._start(["tap", str(self._path), "--port", self._port, "--accept", "emulated-device"])
         with os.fdopen(pipe, "rb") as stream:
             said = b""
             for _, line in zip(range(lines), stream, strict=False):

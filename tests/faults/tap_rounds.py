@@ -209,7 +209,7 @@ class Rounds:
         """Return an error unless a failing call ended the test in one clear sentence or did not matter."""
         if fault in ERRORS and not told.saved:
             text = told.error
-            if "\n" in text or "Errno" in text or str(self._work) not in text or ";" not in text:
+            if "\n" in text or "Errno" in text or str(self._work) not in text or ". " not in text:
                 yield f"no clear error: {text!r}"
 
     def _lost(self, told: Told) -> list[str]:

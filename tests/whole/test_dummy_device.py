@@ -69,7 +69,7 @@ def test_ports_and_a_whole_tap_test(trial: Path, monkeypatch: pytest.MonkeyPatch
     with emulated("--fast") as port:
         seen = run("ports", "--port", port)
         assert "dummy: DUMMY-1, serial number 0042, firmware 1.0" in seen.stdout, seen.stderr
-        assert 'with driver = "dummy" in [daq] of its machine.toml' in seen.stdout
+        assert 'driver = "dummy" in [daq] of machine.toml' in seen.stdout
         tapped = run("tap", "trial", "--port", port, "--details")
     assert tapped.returncode == 0, tapped.stderr
     assert "DUMMY-1, 25600 Hz" in tapped.stderr

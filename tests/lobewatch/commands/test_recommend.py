@@ -162,7 +162,7 @@ def test_a_tool_that_was_never_tapped_is_predicted_and_reported_to_be_doubtful(s
     ("words", "facts"),
     [
         (["--material", "42CrMo"], ["'42CrMo'", "'42CrMo4'"]),
-        (["--save", "A"], ["--save A", "machine.toml"]),
+        (["--save", "A"], ["'A'", "machine.toml"]),
         (["--depth", "21"], ["--depth 21", "diameter"]),
         (["--radial", "-4"], ["--radial -4", "above 0"]),
         (["--radial", "30"], ["radial_depth_mm=30", "tool_diameter_mm=20"]),

@@ -74,15 +74,10 @@ def test_a_replay_on_a_cluster_finds_the_same_though_a_worker_is_killed(cluster:
     assert killer.killed
     assert len(found[0]) == 8
     assert found[0] == found[1]
-    assert (
-        refused[0]
-        == refused[1]
-        == {
-            files[
-                4
-            ]: "Real holds 'x' in line 3, which is no number; mend it there, or leave Real out of Description.columns"
-        }
-    )
+    assert refused[0] == refused[1]
+    ((refused_file, reason),) = refused[0].items()
+    assert refused_file == files[4]
+    assert all(fact in reason for fact in ("'x'", "line 3", "Real", "Description.columns"))
 
 
 def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCluster, tmp_path: Path) -> None:
@@ -95,7 +90,7 @@ def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCl
     histories = []
     for options in ([], ["--scheduler", cluster.scheduler_address]):
         said = CliRunner().invoke(app, ["rebuild", str(plant), *options], catch_exceptions=False).stdout
-        assert re.search(r"a: history\.rows: .*2 tap test\(s\)", said)
+        assert re.search(r"a: history\.rows: .*2 tap tests", said)
         assert "2 of 2 machines" in said
         histories.append([repr(row) for name in ("a", "b") for row in Logbook.open(plant / name).history.rows])
     assert len(histories[0]) == 3

@@ -77,7 +77,7 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     ...     unclear = inspect_file(f"{folder}/frf.csv")
     ...     clear = inspect_file(f"{folder}/frf.csv", Description(unit="m/N"))
     >>> print(unclear.problems)
-    missing unit of real (for example Description.unit m/N, um/N or g/N)
+    missing unit of real (give Description.unit, for example m/N, um/N or g/N)
     >>> clear.problems, clear.frf.frequency.size
     ('', 100)
     """

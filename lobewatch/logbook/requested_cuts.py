@@ -79,7 +79,7 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
         return RequestedVerdicts([logbook.verdict_for(requested)], [])
     if not machine.all_programs:
         fields = "ProgramTable.speed_rpm, ProgramTable.depth_mm, ProgramTable.tool and ProgramTable.material"
-        text = f"no [[program]] to check. Add a [[program]] for each cut of the shop, or give {fields}."
+        text = f"no [[program]] to check. Add a [[program]] for each of your cuts, or give {fields}."
         raise DataError(f"{logbook.folder.toml}: {text}")
     by_name = {table.name: table for table in machine.all_programs}
     chosen = [requested_cut.find_by_name(by_name, name).name for name in names] or list(by_name)

@@ -125,7 +125,8 @@ class ImportReport:
 
     def add_missing(self, fact: str, field_name: str, example: str = "") -> UnresolvedError:
         """Add a fact that is missing, and the field of the description that states it, with an example."""
-        self.missing.append(f"{fact} (for example Description.{field_name}{example})")
+        example = f", for example{example}" if example else ""
+        self.missing.append(f"{fact} (give Description.{field_name}{example})")
         return UnresolvedError()
 
     def add_fault(self, fault: str, cure: str = "") -> UnresolvedError:

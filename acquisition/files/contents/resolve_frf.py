@@ -143,12 +143,12 @@ def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], repor
     """Return the frequencies of the lines by the spacing in the description (Hz)."""
     n, step, start = frf[0].values.size, report.description.spacing, report.description.start or 0.0
     if step is None:
-        fact, by_spacing = "frequencies of the lines", "spacing 0.5 Description.start 0 in Hz"
+        fact, spacing = "frequencies of the lines", " 0.5 Description.start 0 in Hz"
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         if axis is None:
-            raise report.add_missing(fact, by_spacing)
+            raise report.add_missing(fact, "spacing", spacing)
         columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
-        raise report.add_missing(fact, "columns", f' "{columns}", with [rad/s] for rad/s, or Description.{by_spacing}')
+        raise report.add_missing(fact, "columns", f' "{columns}", with [rad/s] for rad/s, or Description.spacing{spacing}')
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         fault = "the spacing must be above 0 Hz, the start at least 0 Hz"
         raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)

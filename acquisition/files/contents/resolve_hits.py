@@ -257,8 +257,9 @@ def apply_full_scale(signals: Sequence[Signal], report: ImportReport) -> list[Si
     if full_scale and not shares:
         report.reject_useless("full_scale", None, "the values are not fractions of full scale (-1 to 1)")
     elif len(full_scale) != len(shares):
-        fact = f"full scale of {len(shares)} channel(s), in the order of the file, each in its own unit"
-        report.add_missing(fact, "full_scale", " 500,50")
+        several = f"full scale of {len(shares)} channels in the order of the file", " 500,50"
+        fact, example = several if shares[1:] else ("full scale of the channel", " 500")
+        report.add_missing(fact, "full_scale", example)
     elif shares:
         report.add_fact("full scale", ", ".join(f"{factor:g}" for factor in full_scale), "option")
     if not shares or len(full_scale) != len(shares):

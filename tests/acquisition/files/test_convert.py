@@ -143,7 +143,7 @@ def test_sep005_in_g_is_converted_and_without_a_unit_asked_for(tmp_path: Path) -
     assert read_hits(path)[0].acceleration == pytest.approx(hit.acceleration * 9.80665)
     channels[1]["unit_str"] = ""
     path.write_text(json.dumps(channels))
-    assert "unit of acc (for example Description.unit" in inspect_file(path).problems
+    assert "unit of acc (give Description.unit" in inspect_file(path).problems
     del channels[1]["fs"]
     path.write_text(json.dumps(channels))
     with pytest.raises(DataError, match=r"channel 2 .*fs"):

@@ -16,8 +16,8 @@ DATA = Path(__file__).parents[2] / "data"
 
 def test_an_analysers_mat_file_with_frf_and_coherence() -> None:
     path = DATA / "vibrationtesting" / "case1.mat"
-    missing = re.findall(r"\S+ \(for example Description.*?\)", inspect_file(path).problems)
-    assert missing == ["Hf_chan_2 (for example Description.unit m/N, um/N or g/N)"]
+    missing = re.findall(r"\S+ \(give Description.*?\)", inspect_file(path).problems)
+    assert missing == ["Hf_chan_2 (give Description.unit, for example m/N, um/N or g/N)"]
     frf = read_frf(path, Description(unit="m/s^2/N", averages=10))
     raw = scipy.io.loadmat(path, squeeze_me=True)
     assert frf.frequency == pytest.approx(raw["Freq_domain"][1:])
@@ -38,7 +38,7 @@ def test_the_hit_next_to_it_is_taken_by_its_names() -> None:
 def test_receptances_of_several_points_in_big_endian() -> None:
     path = DATA / "vibrationtesting" / "mckiddat.mat"
     said = inspect_file(path).problems
-    assert "3 FRFs: 1 Recep:1, 2 Recep:2, 3 Recep:3 (for example Description.response 1)" in said
+    assert "3 FRFs: 1 Recep:1, 2 Recep:2, 3 Recep:3 (give Description.response, for example 1)" in said
     assert "Description.unit" in said
     frf = read_frf(path, Description(response=2, unit="m/N"))
     assert frf.receptance == pytest.approx(scipy.io.loadmat(path)["Recep"][:, 1])
@@ -110,12 +110,12 @@ def test_lvm_with_a_time_column_for_each_channel(tmp_path: Path) -> None:
 def test_lvm_with_empty_channels_and_several_responses(tmp_path: Path) -> None:
     path = tmp_path / "empty.lvm"
     path.write_text(lengthened("with_empty_fields.lvm", 10), encoding="latin-1")
-    assert "columns Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1 (for example Description.columns" in inspect_file(path).problems
+    assert "columns Dev0/Ai0, Dev0/Ai2, Dev0/Ai0 1 (give Description.columns" in inspect_file(path).problems
     (hit,) = read_hits(path, Description(columns=("acceleration [g]", "force [N]", "-")))
     assert hit.force[0] == pytest.approx(7.254639)
     three = tmp_path / "three.lvm"
     three.write_text(lengthened("no_decimal_separator.lvm", 10), encoding="latin-1")
-    assert "1 ax, 2 ay, 3 az (for example Description.response 1)" in inspect_file(three).problems
+    assert "1 ax, 2 ay, 3 az (give Description.response, for example 1)" in inspect_file(three).problems
     columns = ("force [N]=ax", "acceleration [g]=az")
     assert read_hits(three, Description(columns=columns))[0].acceleration[0] == pytest.approx(0.021503 * 9.80665)
 

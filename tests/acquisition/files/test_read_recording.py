@@ -94,7 +94,7 @@ def test_swapped_columns_are_rejected(tmp_path: Path) -> None:
 def test_an_frf_table_without_a_unit_is_asked_for_it(tmp_path: Path) -> None:
     frequency = np.arange(1.0, 50.0)
     path = table(tmp_path / "frf.txt", "Freq Real Imag", frequency, 1e-6 / frequency, -2e-6 / frequency, separator=" ")
-    with pytest.raises(DataError, match=r"unit of Real \(for example Description.unit m/N, um/N or g/N\)$"):
+    with pytest.raises(DataError, match=r"unit of Real \(give Description.unit, for example m/N, um/N or g/N\)$"):
         read_frf(path)
     frf = read_frf(path, Description(unit="m/N"))
     assert frf.receptance == pytest.approx((1e-6 - 2e-6j) / frequency)

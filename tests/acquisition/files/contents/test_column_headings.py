@@ -65,7 +65,7 @@ def test_headings_that_name_the_frf_in_brackets(tmp_path: Path, heading: str, un
 
 def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "w,re,im\n" + rows(2 * np.pi * F, H.real, H.imag, separator=","))
-    assert 'Description.columns "frequency [Hz]=w,real=re,imag=im"' in complaint(path)
+    assert 'Description.columns, for example "frequency [Hz]=w,real=re,imag=im"' in complaint(path)
     answer = ("frequency [rad/s]=w", "real=re", "imag=im")
     assert is_h(read_frf(path, Description(columns=answer, unit="m/N")))
 
@@ -73,8 +73,8 @@ def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path
 def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "".join(SPELLINGS["numpy"](h) + "\n" for h in H))
     said = complaint(path)
-    assert "column 1 (for example Description.unit" in said
-    assert "(for example Description.spacing 0.5 Description.start 0 in Hz)" in said
+    assert "column 1 (give Description.unit" in said
+    assert "(give Description.spacing, for example 0.5 Description.start 0 in Hz)" in said
     assert is_h(read_frf(path, Description(unit="m/N", spacing=1.0, start=1.0)))
     two = put(tmp_path / "b.txt", rows(H.real, H.imag))
     assert is_h(read_frf(two, Description(columns=("real [m/N]", "imag"), spacing=1.0, start=1.0)))
@@ -146,7 +146,7 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
     volts = accelerance * 0.0102
     text = rows(F, volts.real, volts.imag, separator=",")
     path = put(tmp_path / "a.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + text)
-    assert re.search(r'sensor, .* V/N \(for example Description\.sensitivity "10\.2 mV/g"\)$', complaint(path))
+    assert re.search(r'sensor, .* V/N \(give Description\.sensitivity, for example "10\.2 mV/g"\)$', complaint(path))
     assert is_h(read_frf(path, Description(sensitivity=("10.2 mV/g",))))
     assert "Description.sensitivity 2.25 mV/N: " in complaint(path, sensitivity=("2.25 mV/N",))
     both = put(

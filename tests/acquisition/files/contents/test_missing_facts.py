@@ -60,9 +60,9 @@ def test_all_that_is_missing_is_reported_in_one_message(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r'Description.columns "frequency \[Hz\],real \[m/N\],imag"'):
         read_recording(path)
     said = complaint(path, columns=("frequency", "real", "imag"))
-    assert "for example Description.unit m/N" in said
+    assert "give Description.unit, for example m/N" in said
     assert complaint(path, columns=("frequency", "real", "imag"), unit="g").endswith(
-        "(for example Description.force_unit N, or Description.unit g/N)"
+        "(give Description.force_unit, for example N, or Description.unit g/N)"
     )
     assert not complaint(path, columns=("frequency [Hz]", "real [um/N]", "imag"))
     hit = put(tmp_path / "hit.csv", "time\tforce\tacc\n" + rows(F, F, F))
@@ -83,10 +83,10 @@ def test_magnitude_and_phase_and_decibel(tmp_path: Path) -> None:
     assert read_frf(in_db).receptance == pytest.approx(H, rel=1e-6)
     assert re.search("Description.unit m/N: .*1 um/N", complaint(in_db, unit="m/N"))
     path = put(tmp_path / "c.csv", "f (Hz);Mag (dB);Phase (rad)\n" + rows(F, level, phase, separator=";"))
-    assert "unit of Mag (for example Description.unit" in complaint(path)
+    assert "unit of Mag (give Description.unit" in complaint(path)
     assert read_frf(path, Description(unit="um/N")).receptance == pytest.approx(H, rel=1e-6)
     no_phase = put(tmp_path / "d.csv", "f (Hz);Mag (dB);Phase\n" + rows(F, level, phase, separator=";"))
-    assert "phase (for example Description.columns" in complaint(no_phase, unit="um/N")
+    assert "phase (give Description.columns" in complaint(no_phase, unit="um/N")
 
 
 def test_options_that_the_file_contradicts_are_rejected(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_hit_before_the_structure_is_at_rest_is_none_of_its_own(tmp_path: Path
 def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> None:
     time, force, response = tapped([0.3], 1.2)
     path = put(tmp_path / "a.txt", "time_s\tforce_V\tacc_mV", time, 2.25e-3 * force, 1e3 * 10e-3 / 9.80665 * response)
-    assert 'force [V], acc [mV] (for example Description.sensitivity "' in inspect_file(path).problems
+    assert 'force [V], acc [mV] (give Description.sensitivity, for example "' in inspect_file(path).problems
     assert "Description.sensitivity" in inspect_file(path, Description(sensitivity=("2.25 mV/N",))).problems
     said = Description(sensitivity=("2.25 mV/N", "10 mV/g"))
     (hit,) = read_hits(path, said)

@@ -151,7 +151,7 @@ def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
     top = 1 if kind is np.float32 else -float(np.iinfo(kind).min)
     scipy.io.wavfile.write(tmp_path / "a.wav", 48000, (shares * top).astype(kind))
     assert (
-        "Description.full_scale 500,50"
+        "Description.full_scale, for example 500,50"
         in inspect_file(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).problems
     )
     said = Description(columns=("force [N]", "acceleration [m/s^2]"), full_scale=(500.0, 50.0))

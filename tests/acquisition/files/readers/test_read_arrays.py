@@ -46,8 +46,8 @@ def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> 
     np.save(tmp_path / "H.npy", H)
     said = complaint(tmp_path / "H.npy")
     assert re.findall(r"\(.*?\)", said) == [
-        "(for example Description.unit m/N, um/N or g/N)",
-        "(for example Description.spacing 0.5 Description.start 0 in Hz)",
+        "(give Description.unit, for example m/N, um/N or g/N)",
+        "(give Description.spacing, for example 0.5 Description.start 0 in Hz)",
     ]
     assert is_h(read_frf(tmp_path / "H.npy", Description(unit="m/N", spacing=1.0, start=1.0)))
 
@@ -56,7 +56,7 @@ def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> 
 def test_of_several_frfs_one_is_chosen(tmp_path: Path, shape: tuple[int, ...]) -> None:
     rows = np.array([H, 2 * H, 3 * H])
     np.save(tmp_path / "H.npy", rows.T if shape[0] == 59 else rows.reshape(shape))
-    assert "3 FRFs: 1 array:1, 2 array:2, 3 array:3 (for example Description.response 1)" in complaint(
+    assert "3 FRFs: 1 array:1, 2 array:2, 3 array:3 (give Description.response, for example 1)" in complaint(
         tmp_path / "H.npy"
     )
     said = Description(unit="m/N", spacing=1.0, start=1.0, response=2)
@@ -68,7 +68,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
     hit = np.zeros(400, [("t", "f8"), ("force", "f4"), ("acc", "f4")])
     hit["t"], hit["force"][20:24], hit["acc"][22:] = time, 50.0, np.sin(np.arange(378))
     np.save(tmp_path / "hit.npy", hit)
-    assert "unit of force (for example Description.force_unit" in complaint(tmp_path / "hit.npy")
+    assert "unit of force (give Description.force_unit" in complaint(tmp_path / "hit.npy")
     said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
     assert read_hits(tmp_path / "hit.npy", said)[0].sample_rate == pytest.approx(4000)
     np.save(tmp_path / "rows.npy", np.stack([hit["force"], hit["acc"]]))
@@ -79,7 +79,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
 @pytest.mark.parametrize("make", [npz, hdf5])
 def test_names_that_are_known_need_a_unit_alone(tmp_path: Path, make: Any) -> None:
     path = make(tmp_path / ("a.npz" if make is npz else "a.h5"), freq=F, H=H, coherence=np.full(59, 0.9))
-    assert re.findall(r"\S+ \(.*?\)", complaint(path)) == ["H (for example Description.unit m/N, um/N or g/N)"]
+    assert re.findall(r"\S+ \(.*?\)", complaint(path)) == ["H (give Description.unit, for example m/N, um/N or g/N)"]
     frf = read_frf(path, Description(unit="m/N"))
     assert is_h(frf)
     assert frf.coherence == pytest.approx(0.9)
@@ -97,7 +97,7 @@ def test_data_sets_of_hdf5_by_path(tmp_path: Path, suffix: str) -> None:
     )
     said = complaint(path)
     assert "2 FRFs: 1 test/points/p1, 2 test/points/p2" in said
-    assert 'Description.columns "frequency [Hz]=test/lines,frf=test/points/p1"' in said
+    assert 'Description.columns, for example "frequency [Hz]=test/lines,frf=test/points/p1"' in said
     columns = ("frequency [Hz]=test/lines", "frf [m/N]=test/points/p2")
     assert is_h(read_frf(path, Description(columns=columns)), 2 * H)
     content = path.read_bytes()
@@ -111,25 +111,25 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"H21": np.stack([H.real, H.imag], axis=1), "df": 1.0})
     said = complaint(path)
-    assert "columns H21:1, H21:2 (for example Description.columns" in said
+    assert "columns H21:1, H21:2 (give Description.columns" in said
     assert "Description.spacing" in said
     columns = ("real [m/N]=H21:1", "imag=H21:2")
     assert is_h(read_frf(path, Description(columns=columns, spacing=1.0, start=1.0)))
     scipy.io.savemat(path, {"FRF": np.stack([2 * np.pi * F, H], axis=1)})  # an axis of complex type
     said = complaint(path)
-    assert "unit of FRF:2 (for example Description.unit" in said
-    assert 'Description.columns "frequency [Hz]=FRF:1,frf=FRF:2"' in said
+    assert "unit of FRF:2 (give Description.unit" in said
+    assert 'Description.columns, for example "frequency [Hz]=FRF:1,frf=FRF:2"' in said
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=FRF:1", "frf [m/N]=FRF:2"))))
 
 
 def test_what_stands_next_to_signals_over_time_can_be_named(tmp_path: Path) -> None:
     path, time = tmp_path / "a.mat", np.arange(200.0)
     scipy.io.savemat(path, {"t": time, "u": time, "y": time, "w": 2 * np.pi * F, "ts": H, "fs": 1.0, "k": np.eye(2)})
-    assert 'Description.columns "frequency [Hz]=w,frf=ts"' in complaint(path)
+    assert 'Description.columns, for example "frequency [Hz]=w,frf=ts"' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=ts"))))
     poles = np.array([-1 + 9j, -1 - 9j])
     scipy.io.savemat(path, {"fs": 1.0, "u": time, "y": time, "poles": poles})
-    assert "columns u (200), y (200), poles (2) (for example Description.columns" in complaint(path)
+    assert "columns u (200), y (200), poles (2) (give Description.columns" in complaint(path)
     scipy.io.savemat(path, {"fs": 1.0, "u": time, "force": time, "w": 2 * np.pi * F, "ts": H})
     said = complaint(path)
     assert f"u (200), force (200), w ({F.size}), ts ({F.size})" in said
@@ -146,7 +146,7 @@ def test_siglab_has_volts_over_volts_and_the_units_next_to_them(tmp_path: Path) 
     channels[:] = [dict(zip(("label", "euscale_fac", "eu_string", "eu_on_off"), row, strict=True)) for row in named]
     measured = {"xcmeas": cells, "scmeas": channels, "fdxvec": F, "navg": 5}
     scipy.io.savemat(path, {"SampleRate": 2560, "SLm": measured}, appendmat=False)
-    assert "1 sensor over hammer, 2 laser over hammer (for example Description.response 1)" in complaint(path)
+    assert "1 sensor over hammer, 2 laser over hammer (give Description.response, for example 1)" in complaint(path)
     frf = read_frf(path, Description(response=1))
     assert frf.accelerance == pytest.approx(H * 100 / 40)
     assert frf.coherence == pytest.approx(0.3)
@@ -170,7 +170,7 @@ def test_names_of_python_users_that_are_known(tmp_path: Path) -> None:
     (hit,) = read_hits(path, said)
     assert hit.sample_rate == pytest.approx(2000)
     two = npz(tmp_path / "two.npz", fs=2000, force=np.stack([force, force]), acc=np.stack([response, response]))
-    assert "(force:1, force:2) (for example Description.columns" in complaint(two)
+    assert "(force:1, force:2) (give Description.columns" in complaint(two)
     columns = ("force [N]=force:2", "acceleration [g]=acc:2")
     assert len(read_hits(two, Description(columns=columns, rate=2000))) == 1
 
@@ -194,7 +194,7 @@ def test_what_is_in_cells_has_numbers(tmp_path: Path) -> None:
     path, cells = tmp_path / "a.mat", np.empty(2, dtype=object)
     cells[:] = [H, 2 * H]
     scipy.io.savemat(path, {"H": cells, "w": 2 * np.pi * F})
-    assert "2 FRFs: 1 H:1, 2 H:2 (for example Description.response" in complaint(path)
+    assert "2 FRFs: 1 H:1, 2 H:2 (give Description.response" in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=w", "frf [m/N]=H:2"))), 2 * H)
     axis = {"start_value": 1.0, "increment": 1.0, "quantity": {"label": "Hz"}}
     cells[:] = [{"x_values": axis, "y_values": {"values": k * H, "quantity": {"label": "m/N"}}} for k in (1, 2)]

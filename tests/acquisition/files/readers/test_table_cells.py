@@ -83,7 +83,7 @@ def test_numbers_next_to_the_first_rows_are_notes_where_all_rows_have_as_many_ce
 def test_a_response_that_is_not_chosen_may_end_early_and_have_gaps(tmp_path: Path) -> None:
     text = cells_of(",", (7, 3, ""), ends=(400, 400, 400, 50)).replace("Temp", "Acc y (g)")
     path = put(tmp_path / "a.csv", text)
-    assert complaint(path).endswith("2 responses: 1 Acc, 2 Acc y (for example Description.response 1)")
+    assert complaint(path).endswith("2 responses: 1 Acc, 2 Acc y (give Description.response, for example 1)")
     assert read_hits(path, Description(response=1))[0].acceleration == pytest.approx(RESPONSE, abs=1e-7)
     assert "Acc y is empty in line 9" in complaint(path, response=2)
 

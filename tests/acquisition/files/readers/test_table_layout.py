@@ -70,7 +70,7 @@ def test_separators_behind_the_last_column(tmp_path: Path, end: str) -> None:
 
 def test_headings_of_another_width_are_no_hindrance_where_columns_are_named(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "Freq\tReal\n" + rows(F, H.real, H.imag))
-    assert "columns column 1, column 2, column 3 (for example Description.columns" in complaint(path)
+    assert "columns column 1, column 2, column 3 (give Description.columns" in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency", "real [m/N]", "imag"))))
 
 

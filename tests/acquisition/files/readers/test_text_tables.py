@@ -79,7 +79,7 @@ def test_a_level_says_what_it_is_a_multiple_of(tmp_path: Path, unit: str, refere
 @pytest.mark.parametrize("unit", ["dB", "dBMag", "dB (rms)", "dB re 1"])
 def test_a_level_of_nothing_known_asks_for_its_unit(tmp_path: Path, unit: str) -> None:
     path = put(tmp_path / "a.txt", f"Frequency (Hz)\tMag [{unit}]\tPhase (deg)\n" + rows(F, LEVEL, DEGREES))
-    assert "unit of Mag (for example Description.unit" in complaint(path)
+    assert "unit of Mag (give Description.unit" in complaint(path)
     assert is_h(read_frf(path, Description(unit="m/N")))
 
 
@@ -96,13 +96,13 @@ def test_a_name_says_that_a_column_is_in_db(tmp_path: Path, name: str, unit: flo
 def test_a_magnitude_below_zero_is_no_magnitude_but_a_level(tmp_path: Path) -> None:
     text = "Freq (Hz),Magnitude (m/N),Phase (deg)\n" + rows(F, LEVEL, DEGREES, separator=",")
     path = put(tmp_path / "a.csv", text)
-    assert 'Description.columns "frequency,db,' in complaint(path)
+    assert 'Description.columns, for example "frequency,db,' in complaint(path)
     assert is_h(read_frf(path, Description(columns=("frequency", "db", "phase [deg]"))))
 
 
 def test_one_real_column_called_frf_is_asked_about(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "Frequency (Hz),FRF (m/N)\n" + rows(F, np.abs(H), separator=","))
-    assert "columns Frequency [Hz], FRF [m/N] (for example Description.columns" in complaint(path)
+    assert "columns Frequency [Hz], FRF [m/N] (give Description.columns" in complaint(path)
 
 
 @pytest.mark.parametrize("label", ["Unit", "Units", "Einheit:", "単位"])

@@ -20,7 +20,8 @@ class HelpCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments, and apply --quiet and --verbose."""
-        self.params = [*self.params, *make_verbosity_options()]
+        if all(parameter.name != "quiet" for parameter in self.params):
+            self.params = [*self.params, *make_verbosity_options()]
         rest = super().parse_args(ctx, args)
         apply_verbosity(ctx, **{name: ctx.params.pop(name) for name in ("quiet", "verbose")})
         return rest

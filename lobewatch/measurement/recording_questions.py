@@ -1,5 +1,6 @@
 """Questions on implausible tap tests, and their answers."""
 
+import functools
 import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Circumstances, DeviceIdentity, Frf, Remark
+from acquisition import Circumstances, DataError, DeviceIdentity, Frf, Remark
 from acquisition.files.tap_file import read_circumstances
 from dsm import format_rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
@@ -220,8 +221,17 @@ def find_device_questions(folder: MachineFolder, device: Circumstances | DeviceI
     """Return the code of the question about an emulated device in a machine with real tap tests."""
     if not device.is_emulated:
         return ()
-    has_real = any(not read_circumstances(folder.path / tap.file).is_emulated for tap in reversed(folder.taps()))
+    has_real = any(_is_real(folder.path / tap.file) for tap in reversed(folder.taps()))
     return (EMULATED_DEVICE.code,) if has_real else ()
+
+
+@functools.lru_cache(maxsize=10_000)
+def _is_real(path: Path) -> bool:
+    """Return whether a tap file, which never changes, is readable and from a real device."""
+    try:
+        return not read_circumstances(path).is_emulated
+    except (DataError, OSError):
+        return False
 
 
 def find_clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

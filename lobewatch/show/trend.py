@@ -19,14 +19,15 @@ from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
 from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
 from lobewatch.show.terminal.sentences import capitalize, wrap_lines
+from lobewatch.show.terminal.status_labels import status_label
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "
     "One forecast in three or four misses a drop that slows down or grows exponentially."
 )
 """Note below every table of forecast dates."""
-SERIES_CODES, PROGRAM_CODES = ("frequency-alarm", "frequency-warn", "decay"), ("program-not-stable", "program-doubtful")
-"""Codes of remarks that the trend of a machine contains, and those that its table of dates contains."""
+TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")
+"""Codes of remarks that the trend of a machine with forecast dates contains."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
 
@@ -79,14 +80,15 @@ def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: Remaini
     dates = new_table("~program or limit", "~doubtful", "~not stable", rows=forecast_date_rows(outlook))
     why_none = no_dates_text(outlook)
     texts += [why_none] if why_none else [dates, *wrap_lines([FORECAST_ASSUMPTIONS], "")]
-    return [*texts, *wrap_lines([f"Next: {outlook.status.next_step}"], "")]
+    status = outlook.status
+    return [*texts, *wrap_lines([f"{status_label(status.status, status.is_early)}  Next: {status.next_step}"], "")]
 
 
 def trend_remarks(outlook: MachineForecast) -> list[Remark]:
     """Return the remarks on a machine that its trend in words does not contain."""
     status = outlook.status
     acknowledged = {(alarm.code, alarm.about) for alarm in status.alarms if alarm.is_acknowledged(status.time)}
-    shown = SERIES_CODES if no_dates_text(outlook) else SERIES_CODES + PROGRAM_CODES
+    shown = () if no_dates_text(outlook) else TREND_CODES
     return [
         remark for remark in status.remarks if remark.code not in shown or (remark.code, remark.about) in acknowledged
     ]

@@ -85,7 +85,7 @@ def string_sentences(file: Path) -> Iterator[Sentence]:
         text = "".join(str(value.value) if isinstance(value, ast.Constant) else "CODE" for value in values)
         text = text.partition("\nExamples\n---")[0]
         if " " in text.strip() and len(re.findall(r"[A-Za-z]{2,}", text)) >= MIN_WORDS:
-            yield from split_sentences(f"{file.relative_to(ROOT)}:{node.lineno}", text)
+            yield from split_sentences(f"{file.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}", text)
 
 
 BLOCKS = {

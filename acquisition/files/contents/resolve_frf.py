@@ -148,7 +148,8 @@ def _make_even_frequency(signals: Sequence[Signal], frf: Sequence[Signal], repor
         if axis is None:
             raise report.add_missing(fact, "spacing", spacing)
         columns = ",".join([f"frequency [Hz]={axis}", *(f"{part.role}={part.name}" for part in frf)])
-        raise report.add_missing(fact, "columns", f' "{columns}", with [rad/s] for rad/s, or Description.spacing{spacing}')
+        example = f' "{columns}", with [rad/s] for rad/s, or Description.spacing{spacing}'
+        raise report.add_missing(fact, "columns", example)
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         fault = "the spacing must be above 0 Hz, the start at least 0 Hz"
         raise report.reject("spacing", f"{step:g}, Description.start {start:g}", fault)

@@ -13,7 +13,7 @@ from lobewatch.monitoring import threshold_dates
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
 from lobewatch.show.terminal.output import JsonObject, align_columns, count_noun, format_csv, make_printable
 from lobewatch.show.terminal.sentences import wrap_lines
-from lobewatch.show.terminal.status_labels import status_label
+from lobewatch.show.terminal.status_labels import status_label, status_name
 
 SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
 """Codes of reasons that have columns of their own."""
@@ -97,7 +97,7 @@ def due_text(days_left: float) -> str:
 
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
+    light = f"{'early ' if row['is_early'] else ''}{status_name(row['light'])}"
     drop = "" if row["fall"] is None else format_with_error(row["fall"], row["fall_std"])
     drop = "first test" if row["fall_std"] == 0 else drop
     due, left = "", row["days_left"]
@@ -110,8 +110,9 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
     """Return the name of a machine if the folder has another, the next step, and the reasons."""
     named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
-    shown, further = row["reasons"][:MAX_SHOWN_REASONS], row["reasons"][MAX_SHOWN_REASONS:]
-    more = [f"{count_noun(len(further), 'more reason')}: lobewatch trend {row['key']}"] if further else []
+    reasons = row["reasons"] or [row["why"]] * bool(row["why"])
+    shown, further = reasons[:MAX_SHOWN_REASONS], len(reasons) - MAX_SHOWN_REASONS
+    more = [f"{count_noun(further, 'more reason')} (see the report)"] if further > 0 else []
     return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])
 
 

@@ -15,7 +15,7 @@ from lobewatch.show.report.report_data import ReportData, collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMakers, make_programs, make_series
 from lobewatch.show.terminal.output import JsonObject
-from lobewatch.show.terminal.status_labels import status_css_class, status_label
+from lobewatch.show.terminal.status_labels import status_css_class, status_label, status_name
 from lobewatch.verdicts import Stability
 
 
@@ -92,7 +92,7 @@ def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Pa
 def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) -> str:
     """Return the HTML of a fleet with a row for each machine, in the order of the rows."""
     levels = [row["light"] for row in rows]
-    counts = ", ".join(f"{levels.count(level)} {level.value}" for level in StatusLevel if level in levels)
+    counts = ", ".join(f"{levels.count(level)} {status_name(level)}" for level in StatusLevel if level in levels)
     numbers = NumberTable(FLEET_COLUMNS, [[row[column] for column in FLEET_COLUMNS] for row in rows])
     machines = [_machine_content(row) for row in rows]
     return render_page("fleet.html", name=name, now=now, counts=counts, machines=machines, numbers=numbers)

@@ -8,6 +8,10 @@ from lobewatch.show.terminal.output import make_printable
 
 MAX_LINE_LENGTH = 80
 """Largest length of a line of a list (characters)."""
+KEPT_SPACE = "\ue000"
+"""Space at which no line ends."""
+COMMAND = re.compile(r"lobewatch [a-z]+(?: (?:-\S+|'[^']*'|\S*[/.]\S*\w|[a-z]+-[a-z-]+|[A-Z]{3,}\w*))*")
+"""Command with its arguments, which is copied in one piece."""
 
 
 def capitalize(text: str) -> str:
@@ -29,6 +33,7 @@ def wrap_lines(texts: Iterable[str], indent: str = "  ") -> list[str]:
 
 def _wrap(text: str) -> list[str]:
     indent = " " * (2 + len(text) - len(text.lstrip()))
-    kept = re.sub(r"(?<=[0-9]) ", "\u00a0", text)  # a line never ends between a number and its unit
+    kept = COMMAND.sub(lambda match: match[0].replace(" ", KEPT_SPACE), text)
+    kept = re.sub(r"(?<=[0-9]) ", KEPT_SPACE, kept)  # a line never ends between a number and its unit
     style = {"subsequent_indent": indent, "break_long_words": False, "break_on_hyphens": False}
-    return [line.replace("\u00a0", " ") for line in textwrap.wrap(kept, MAX_LINE_LENGTH, **style)]  # type: ignore[arg-type]
+    return [line.replace(KEPT_SPACE, " ") for line in textwrap.wrap(kept, MAX_LINE_LENGTH, **style)]  # type: ignore[arg-type]

@@ -169,7 +169,7 @@ def test_a_column_of_complex_numbers_is_no_notes(shop: Shop, tmp_path: Path) -> 
     (tmp_path / "taps").mkdir()
     for name, text in (("a.txt", "({:.3e}-{:.3e}j)\n"), ("b.txt", "{:.3e} - {:.3e}i\n")):
         (tmp_path / "taps" / name).write_text("".join(text.format(1e-6 * n, 2e-7 * n) for n in range(1, 60)))
-    with pytest.raises(DataError, match=r"a\.txt, .*b\.txt: .*column 1.*--spacing 0\.5"):
+    with pytest.raises(DataError, match=r"a\.txt, .*b\.txt: .*column 1.*--spacing, for example 0\.5"):
         run("replay", shop.path, tmp_path / "taps")
 
 

@@ -23,7 +23,7 @@ def apply_verbosity(ctx: Any, *, quiet: bool, verbose: bool) -> None:
     """Silence the notes, or measure the steps, until the context of a command is closed."""
     if not (quiet or verbose):
         return
-    from lobewatch.show.terminal.output import notes, print_always
+    from lobewatch.show.terminal.output import notes
     from lobewatch.step_times import STEP_TIMES
 
     if quiet and (ctx.invoked_subcommand or ctx.info_name) not in GUIDED_COMMANDS:
@@ -37,6 +37,6 @@ def apply_verbosity(ctx: Any, *, quiet: bool, verbose: bool) -> None:
             STEP_TIMES.seconds = None
             total = time.perf_counter() - start
             steps = seconds | {"other": total - sum(seconds.values()), "total": total}
-            print_always(f"time: {', '.join(f'{step} {value:.2f} s' for step, value in steps.items())}")
+            notes.print("time:", ", ".join(f"{step} {value:.2f} s" for step, value in steps.items()))
 
         ctx.call_on_close(print_times)

@@ -61,7 +61,7 @@ def list_pages(page: Path) -> str:
     index = DOCS / "README.md" if page == ROOT / "README.md" else page
     if index.name != "README.md" or page == DOCS / "README.md":
         return ""
-    contents = {"Documentation": ["docs/README"]} if index != page else {}
+    contents = {"All pages": ["docs/README"]} if index != page else {}
     for section in re.split(r"^#+ ", index.read_text("utf-8"), flags=re.MULTILINE)[1:]:
         links = [os.path.relpath(index.parent / match[2], page.parent) for match in LINK.finditer(section)]
         contents[section.splitlines()[0]] = [

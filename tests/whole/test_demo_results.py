@@ -71,7 +71,7 @@ MEANT = {
     "B": "B: slot at 6 200 rpm",
     "BEAM": "acceleration.lvm",
 }
-ORDINATES = ("natural frequency", "bearing stiffness", "limiting depth", "Re")
+ORDINATES = ("natural frequency", "bearing stiffness", "limiting depth ap", "Re")
 """Names of the pictures of the report."""
 PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt", *(f"report {y}" for y in ORDINATES))
 SMALLER = 3

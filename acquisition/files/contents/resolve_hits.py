@@ -17,7 +17,7 @@ from acquisition.hits.capture_hits import split_record
 
 HIT_COLUMNS_EXAMPLE = ' "time [s],force [N],acceleration [g]"'
 """Example of the columns of hits."""
-NO_FORCE_ADVICE = 'If no force was measured, give hammer = "none", in [tap] of machine.toml or as an option'
+NO_FORCE_ADVICE = 'If no force was measured, set hammer = "none" in [tap], or use fit_file_modes.hammer none'
 """Advice for a file without a force."""
 FEW_DIGITS = "the times in the file have few digits, so missing samples cannot be detected"
 """Note on a time that cannot show missing samples."""

@@ -62,6 +62,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "fit_file_modes": "lobewatch modes",
     "fit_file_modes.accept": "--accept",
     "fit_file_modes.conjugate": "--conjugate",
+    "fit_file_modes.hammer": "--hammer",
     "fit_file_modes.sensor": "--sensor-mass",
     "folder_files.make_machine_folder": "lobewatch init",
     "folder_files.make_machine_folder.template": "lobewatch init --example",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 from lobewatch.commands import GROUPS
@@ -21,14 +21,14 @@ def page() -> str:
     head, _, rest = text.partition("**Commands**:")
     rest = rest[rest.index("## `") :]
     head = head.replace("# All commands\n", f"# All commands\n\n{INTRODUCTION}\n", 1)
-    listed = "\n\n".join(f"**{group}**:\n\n{_links(commands)}" for group, commands in GROUPS.items())
+    listed = "\n\n".join(f"**{group}**: {_links(commands)}" for group, commands in GROUPS.items())
     examples = re.sub(r"^  (?=lobewatch )", "    ", f"{head}{listed}\n\n{rest}", flags=re.MULTILINE)
     repeated = r"^\* `(?:-h, )?--help`.*\n|^\*\*Usage\*\*:\n\n```console\n.*\n```\n\n|  \[required\]$"
     return re.sub(repeated, "", examples, flags=re.MULTILINE).rstrip() + "\n"
 
 
-def _links(commands: Mapping[str, str]) -> str:
-    return "\n".join(f"* [`{name}`](#lobewatch-{name}): {summary}" for name, summary in commands.items())
+def _links(commands: Iterable[str]) -> str:
+    return ", ".join(f"[`{name}`](#lobewatch-{name})" for name in commands)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from typing import Any
 
 from typer.core import TyperOption
 
-QUIET_HELP = "Result and errors only: no notes, no questions."
+QUIET_HELP = "Result and errors only. Instructions of tap, listen and sensors remain."
 GUIDED_COMMANDS = ("tap", "listen", "sensors")
 """Commands that tell a person what to do: --quiet leaves their notes on."""
 VERBOSE_HELP = "Time of each step of the main thread (s), on stderr."

@@ -104,7 +104,7 @@ def split_speed_column(signals: Sequence[Signal], report: ImportReport) -> tuple
         columns = [] if named is None else [named]
     if len(columns) > 1:
         names = ", ".join(signal.name for signal in columns)
-        report.add_missing(f"column of the spindle speed among {names}", "tacho", f' "{columns[0].name}"')
+        report.add_missing(f"choice of the spindle-speed column among {names}", "tacho", f' "{columns[0].name}"')
     rest = [signal for signal in signals if signal.role not in SPEED_ROLES and signal not in columns]
     if pulses is not None and not columns:
         report.reject("pulses", pulses, "no tachometer column", "Name the tachometer column with Description.tacho")
@@ -178,7 +178,7 @@ def _resolve_cut_signals(contents: Contents, report: ImportReport) -> tuple[Floa
     responses = [signal for signal in over_time if infer_kind(signal) == "response"]
     candidates = responses or [signal for signal in over_time if not infer_kind(signal)]
     if not candidates:
-        fact = f"column of the acceleration among {format_signal_names(signals)}"
+        fact = f"acceleration column (columns of the file: {format_signal_names(signals)})"
         raise report.add_missing(fact, "columns", CUT_COLUMNS_EXAMPLE)
     if description.response is not None:
         one = report.attempt(choose_signal, candidates, "responses")

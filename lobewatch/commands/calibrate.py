@@ -74,7 +74,7 @@ def calibrate(
 def _reject_with_tools(given: Mapping[str, object]) -> None:
     named = [option for option, value in given.items() if value is not None and value != []]
     if named:
-        raise ValueError(f"--tool excludes {', '.join(named)}. Leave out --tool or {' and '.join(named)}.")
+        raise ValueError(f"--tool cannot be used with {', '.join(named)}. Leave out --tool or {' and '.join(named)}.")
 
 
 def _calibrate_from_tools(

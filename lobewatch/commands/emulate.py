@@ -143,7 +143,7 @@ def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulatio
 def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
-        raise ValueError("--cut excludes --direction and --askew. Leave out --cut, or both others.")
+        raise ValueError("--cut cannot be used with --direction and --askew. Leave out --cut, or both others.")
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 

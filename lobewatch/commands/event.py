@@ -37,7 +37,7 @@ def event(
 
     folder = MachineFolder(machine)
     if withdraw and (text or date or new_baseline):
-        raise ValueError(f"--withdraw {withdraw} excludes TEXT, --date and --new-baseline. Give only --withdraw.")
+        raise ValueError(f"--withdraw {withdraw} cannot be used with TEXT, --date or --new-baseline. Omit these.")
     with publish_on_change(Logbook(folder)):
         if withdraw:
             gone = withdraw_event(folder, withdraw)

@@ -29,7 +29,7 @@ def history(
     from lobewatch.show.history import history_csv, history_json, history_lines
 
     if as_csv and as_json:
-        raise ValueError("--csv excludes --json. Leave out one of the two options.")
+        raise ValueError("--csv cannot be used with --json. Leave out one of the two options.")
     logbook = Logbook.open(machine)
     if hdf5 is not None:
         from lobes import write_history

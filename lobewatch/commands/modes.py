@@ -81,7 +81,7 @@ def modes(
     from modal import parse_mode_edits
 
     if beside is not None and len(beside) == 1:
-        raise ValueError(f"--beside {beside[0]} is not enough, two files may agree by chance. Give two or more.")
+        raise ValueError(f"--beside {beside[0]} may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
@@ -116,5 +116,5 @@ def modes(
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":
     """Return the edits to store, empty ones to withdraw all, or None to store nothing."""
     if edits and by_fit:
-        raise ValueError("--by-fit excludes --add, --drop and --fix. Leave out --by-fit, or the three others.")
+        raise ValueError("--by-fit cannot be used with --add, --drop or --fix. Leave out --by-fit, or the others.")
     return edits if edits or by_fit else None

@@ -44,7 +44,7 @@ def status(
     from lobewatch.show.terminal.status_labels import status_name
 
     if as_csv and as_json:
-        raise ValueError("--csv excludes --json. Leave out one of the two options.")
+        raise ValueError("--csv cannot be used with --json. Leave out one of the two options.")
     if forget and not to_notify:
         raise ValueError(f"--forget {forget} needs --notify. Add --notify.")
     fleet = Fleet(find_machines(folder), with_option_names)

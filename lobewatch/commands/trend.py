@@ -35,7 +35,7 @@ def trend(
     from lobewatch.show.trend import trend_csv, trend_json, trend_remarks, trend_texts
 
     if as_csv and as_json:
-        raise ValueError("--csv excludes --json. Leave out one of the two options.")
+        raise ValueError("--csv cannot be used with --json. Leave out one of the two options.")
     logbook = Logbook.open(machine)
     machine_outlook = forecast_machine(logbook)
     series = machine_outlook.series(tool, direction)

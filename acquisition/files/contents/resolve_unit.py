@@ -134,7 +134,7 @@ def _resolve_unit(
     field_name, examples, name = texts
     file_unit, given_unit = parse_unit(in_file) if in_file else None, parse_unit(given) if given else None
     if given and (given_unit is None or given_unit.quantity not in wanted):
-        raise report.reject(field_name, given, f"not a unit of {name}", f"Give a unit such as {examples}")
+        raise report.reject(field_name, given, f"not a unit of column {name!r}", f"Give a unit such as {examples}")
     if in_file and (file_unit is None or file_unit.quantity not in wanted):
         cure = f"Give the meaning of the column with Description.columns, and a unit such as {examples}"
         raise report.add_fault(f"unit {in_file!r} of {name} is unknown or of another quantity", cure)

@@ -119,7 +119,7 @@ def _drop_mode(state: Extraction, frequency: float) -> Extraction:
 
 
 def _add_mode(state: Extraction, frequency: float) -> Extraction:
-    request, advice = f"add {frequency:g} Hz", "Check the figure of the FRF, or also fix the damping ratio."
+    request, advice = f"add {frequency:g} Hz", "Check the plot of the FRF, or give the damping ratio too."
     plan = _plan_at_frequency(state, frequency, request)
     for known in plan.poles.T:
         if abs(known[0] - frequency) < SAME_MODE_HALF_WIDTHS * np.prod(known):

@@ -185,7 +185,10 @@ def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
     known = {
-        "report.html": ("a report has no checksum", f"Run {format_command('report', folder)} to write the report again")
+        "report.html": (
+            "lobewatch keeps no checksum of reports",
+            f"Run {format_command('report', folder)} to write the report again",
+        )
     }
     known["history.h5"] = "old cache, or an exported history", DELETION_ADVICE
     for path in sorted(folder.iterdir()):

@@ -177,7 +177,7 @@ MODE_LOST = StatusRule(
 )
 OVERDUE = StatusRule("overdue", WARN, "tap test overdue by {days}", "Take the tap test")
 PROGRAM_UNKNOWN = StatusRule(
-    "program-unknown", WARN, "{stability}", "Run Logbook.verdicts for the reason of this verdict"
+    "program-unknown", WARN, "{stability}", "Run Logbook.verdicts for the reason for this verdict"
 )
 PROGRAM_DOUBTFUL = StatusRule(
     "program-doubtful",

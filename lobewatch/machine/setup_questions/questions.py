@@ -161,7 +161,7 @@ def _current_tool(draft: MachineDraft) -> str:
 
 
 def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
-    length = f"stick-out in mm, {_TOOL_MATERIALS_TEXT} (the last two are optional)"
+    length = f"stick-out in mm (optional) and tool material (optional: {_TOOL_MATERIALS_TEXT})"
     numbers, made_of = _split_tool_answer(answer)
     names = ("flutes", "diameter in mm", "helix in deg", length)
     teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)

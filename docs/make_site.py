@@ -5,6 +5,7 @@ The site needs no network: open index.html of the folder (build/docs), its searc
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ from importlib import import_module
 from pathlib import Path
 
 from sphinx.cmd.build import build_main
+from sphinx.pycode import ModuleAnalyzer
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -53,7 +55,21 @@ def write_sources(folder: Path) -> None:
     for module in MODULES:
         lines = [module, "=" * len(module), "", f".. automodule:: {module}", "   :members:", "   :imported-members:"]
         lines += ["   :no-index:"] * (module == "lobewatch")  # its names are those of its rooms
+        lines += describe_constants(module) if module != "lobewatch" else []
         (folder / "docs" / "api" / f"{module}.rst").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def describe_constants(module: str) -> Iterator[str]:
+    """Yield the entries of the constants and types of a package, documented in the modules below it."""
+    below = [name for name in sorted(sys.modules) if name.startswith(f"{module}.")]
+    for constant in import_module(module).__all__:
+        value = getattr(import_module(module), constant)
+        if inspect.isclass(value) or inspect.isroutine(value):
+            continue
+        homes = (name for name in below if vars(sys.modules[name]).get(constant) is value)
+        texts = (ModuleAnalyzer.for_module(name).find_attr_docs().get(("", constant)) for name in homes)
+        yield from ("", f".. py:data:: {constant}", "")
+        yield from (f"   {line}" for line in next(filter(None, texts), []))
 
 
 def list_pages(page: Path) -> str:

@@ -40,7 +40,7 @@ def model_softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     model it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
-    clause = "constant stiffness (no model)"
+    clause = "constant stiffness (no calibrated spindle model)"
     if ratios.size > 1:
         drop, change = 100 * CALIBRATED_DROPS[ratios.size - 1], 100 * (ratios[-1] - 1)
         clause = f"stiffness from the model ({change:+.1f} % at {drop:.0f} % frequency drop)"

@@ -41,7 +41,7 @@ def test_every_dependency_is_locked_to_a_version_that_it_allows(lock: str) -> No
     versions = locked(lock)
     for requirement in map(Requirement, wanted):
         found = versions.get(canonicalize_name(requirement.name))
-        assert found, f"{requirement.name} is not in {lock}; make it anew with .ci/lock"
+        assert found, f"{requirement.name} is not in {lock}; run .ci/lock"
         assert all(version in requirement.specifier for version in found), (requirement, found)
 
 

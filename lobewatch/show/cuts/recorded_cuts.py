@@ -37,34 +37,22 @@ class Fault(NamedTuple):
 FAULTS: Mapping[str, Fault] = {
     "too-short": Fault("less than 0.3 s of cutting", "Record the spindle in air, then at least 1 s of cutting"),
     "no-cut": Fault("the signal level never rises", "Start the recording in air, then cut"),
-    "no-air": Fault(
-        "no usable 0.15 s of the spindle running in air before or after the cut", "Record the spindle in air, then cut"
-    ),
+    "no-air": Fault("no usable 0.15 s in air before or after the cut", "Record the spindle in air, then cut"),
     "knock": Fault("a knock, such as a hammer blow, during the cut", "Repeat the cut without a knock"),
-    "overload": Fault(
-        "the accelerometer or its input was overloaded", "Choose a larger input range or another place for the sensor"
-    ),
+    "overload": Fault("the accelerometer or its input was overloaded", "Choose a larger range or another position"),
     "lost-scans": Fault("samples were lost", "Lower the sample rate, or use another cable or port"),
-    "speed-not-found": Fault(
-        "no spindle speed within 5 % of the set speed fits the lines of the spectrum", "Correct the set speed"
-    ),
-    "tacho-contradicts": Fault(
-        "the tachometer contradicts the set speed", "Correct --speed, or name another column with --tacho"
-    ),
+    "speed-not-found": Fault("no speed within 5 % of the set speed fits the spectrum", "Correct the set speed"),
+    "tacho-contradicts": Fault("the tachometer contradicts the set speed", "Correct --speed, or choose --tacho"),
     "on-spindle-lines": Fault(
         "run-out lines are louder than tooth passing, which may hide chatter locked to the spindle",
         "Cut at a 3 % higher or lower speed, and give pitch_deg for unevenly spaced flutes",
     ),
-    "faint": Fault(
-        "the lines outside the spindle harmonics are too weak to prove chatter", "Cut longer or a little deeper"
-    ),
+    "faint": Fault("lines outside the spindle harmonics are too weak to prove chatter", "Cut longer or deeper"),
     "unexplained-tone": Fault(
         "is not explained by spindle, flutes or air, and has no side bands of chatter",
         "Cut a little deeper, and check whether the tone is there without cutting",
     ),
-    "slow-sampling": Fault(
-        "the sample rate covers fewer than three harmonics of tooth passing", "Use a higher sample rate"
-    ),
+    "slow-sampling": Fault("the sample rate covers fewer than three harmonics of tooth passing", "Use a higher rate"),
 }
 """Fault for each reason without a verdict."""
 

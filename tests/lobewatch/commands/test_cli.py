@@ -71,8 +71,8 @@ def test_an_interrupted_tap_is_resumed_and_new_restarts(run: Run, trial: Machine
         source.start()
         for hit in islice(capture_hits(source, Trigger(20.0, 6400, 512)), 4):
             running.add(hit, check_hit(hit), "")
-    anew = run("tap", "trial", "--port", device.port, "--new")
-    assert not re.search(r"[34] of 10", anew.err)
+    second = run("tap", "trial", "--port", device.port, "--new")
+    assert not re.search(r"[34] of 10", second.err)
     said = run("tap", "trial", "--port", device.port)
     assert re.search(r"[34] of 10", said.err)
     assert said.code == 0

@@ -106,7 +106,7 @@ def test_a_dry_run_says_the_same_to_every_reader(shop: Shop, folder: Path) -> No
         said = CliRunner().invoke(app, ["replay", str(shop.path), str(folder), *options, "--jobs", str(jobs)])
         found.append(json.loads(said.stdout)["files"])
         (twin,) = [one for one in found[-1] if one["file"].endswith("twin 20240902.csv")]
-        assert "20240901" in twin.pop("known")  # of an identity that is made up anew each time
+        assert "20240901" in twin.pop("known")  # of an identity that is made up each time
     assert found[0] == found[1]
     assert [bool(one["refused"]) for one in found[0]].count(True) == 1
     assert len(taps(shop)) == 0

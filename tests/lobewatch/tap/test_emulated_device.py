@@ -1,4 +1,4 @@
-"""An emulated device says so, and is asked about in a machine with real tap tests."""
+"""Emulated devices identify themselves, and need a confirmation in a machine with real tap tests."""
 
 from __future__ import annotations
 

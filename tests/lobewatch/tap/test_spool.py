@@ -212,8 +212,8 @@ def test_other_interrupted_tests_are_reported_and_kept(
         assert tap.hits == []
         assert len(tap.not_resumed) == 1
         assert str(interrupted) in tap.not_resumed[0]
-    anew = begin_tap(open_folder, Circumstances("m", datetime.now(UTC), "reference"), resume=False)
-    assert (anew.hits, len(anew.not_resumed)) == ([], 1)
+    second = begin_tap(open_folder, Circumstances("m", datetime.now(UTC), "reference"), resume=False)
+    assert (second.hits, len(second.not_resumed)) == ([], 1)
     assert len(list(interrupted.glob("*.h5"))) == 4
 
 

@@ -10,7 +10,7 @@ MAX_LINE_LENGTH = 80
 """Largest length of a line of a list (characters)."""
 KEPT_SPACE = "\ue000"
 """Space at which no line ends."""
-COMMAND = re.compile(r"lobewatch [a-z]+(?: (?:-\S+|'[^']*'|\S*[/.]\S*\w|[a-z]+-[a-z-]+|[A-Z]{3,}\w*))*")
+COMMAND = re.compile(r"lobewatch [a-z]+(?:(?: \w+)? (?:-\S+|'[^']*'|\S*[/.]\S*\w|[a-z]+-[a-z-]+|[A-Z]{3,}\w*))*")
 """Command with its arguments, which is copied in one piece."""
 
 

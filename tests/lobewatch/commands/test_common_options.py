@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from lobewatch.commands.verbosity import apply_verbosity
+from lobewatch.show.terminal.output import notes
 from lobewatch.step_times import STEP_TIMES, time_step
 from tests.lobewatch.commands.conftest import Run
 from tests.lobewatch.commands.pty_talk import Terminal
@@ -55,6 +59,19 @@ def test_quiet_leaves_result_and_errors(run: Run, shop: Shop, option: str) -> No
     failed = run("check", "nowhere", option)
     assert (failed.code, failed.out) == (2, "")
     assert failed.err.startswith("error: nowhere: ")
+
+
+@pytest.mark.parametrize(("name", "is_quiet"), [("check", True), ("tap", False), ("listen", False), ("sensors", False)])
+@pytest.mark.parametrize("is_before", [True, False])
+def test_quiet_keeps_the_instructions_of_guided_commands(name: str, is_quiet: bool, is_before: bool) -> None:
+    closes = list[Callable[[], None]]()
+    named = {"invoked_subcommand": name, "info_name": "lobewatch"} if is_before else {"info_name": name}
+    ctx = SimpleNamespace(**{"invoked_subcommand": None} | named, call_on_close=closes.append)
+    apply_verbosity(ctx, quiet=True, verbose=False)
+    assert notes.quiet is is_quiet
+    for close in closes:
+        close()
+    assert notes.quiet is False
 
 
 @pytest.mark.parametrize("option", VERBOSE)

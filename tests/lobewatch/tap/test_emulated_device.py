@@ -19,6 +19,7 @@ from acquisition.emulation import EmulationSetup
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.measurement.recording_questions import find_device_questions
 from lobewatch.tap.device_connection import describe_device, label_device
 from lobewatch.tap.emulated_spindle import build_structure, get_spindle_table
 from lobewatch.tap.session import TapSession, plan_session
@@ -85,6 +86,17 @@ def test_among_real_tap_tests_it_is_asked_before_the_first_hit(shop: Shop) -> No
     assert (entry.asked, entry.accepted) == ((CODE,), (CODE,))
     assert folder.read(entry).circumstances.is_emulated
     assert Logbook(folder).questions.get(entry.id) is None
+
+
+def test_a_damaged_old_tap_file_does_not_stop_the_question(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    shop.tap(1, 1713.0)
+    old, new = (shop.path / entry.file for entry in shop.folder.taps())
+    about = DeviceIdentity("DI-4108", "EMULATED", "")
+    old.write_bytes(old.read_bytes()[:-40] + bytes(40))
+    assert find_device_questions(shop.folder, about) == (CODE,)
+    new.unlink()
+    assert find_device_questions(MachineFolder(shop.path), DeviceIdentity("DI-4108", "5E0ABC12", "")) == ()
 
 
 def test_an_emulated_tap_test_that_is_committed_without_an_answer_is_no_reference(shop: Shop) -> None:

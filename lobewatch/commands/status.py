@@ -12,8 +12,8 @@ from lobewatch.show.terminal.output import Json, emit, results
 if TYPE_CHECKING:
     from lobewatch.fleet.fleet import Fleet
 
-DASHBOARD_ONLY_KEYS = ("points", "limits", "limit", "word", "why")
-"""Keys that only the dashboard shows."""
+DASHBOARD_ONLY_KEYS = ("drop_reasons", "points", "limits", "limit", "word", "why")
+"""Keys that only the text and the dashboard show."""
 
 
 def status(

@@ -45,6 +45,7 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "last_tap": summary.last_tap,
         "days_left": dated.days_left,
         "reasons": reasons,
+        "drop_reasons": [remark.finding for remark in remarks if remark.code in SEPARATE_REASON_CODES[:2]],
         "note": join_sentences(*reasons),
         "why": join_sentences(*(remark.finding for remark in remarks if remark.code != "overdue")),
         "next_step": dated.next_step,
@@ -110,7 +111,7 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
     """Return the name of a machine if the folder has another, the next step, and the reasons."""
     named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
-    reasons = row["reasons"] or [row["why"]] * bool(row["why"])
+    reasons = row["drop_reasons"] + row["reasons"]
     shown, further = reasons[:MAX_SHOWN_REASONS], len(reasons) - MAX_SHOWN_REASONS
     more = [f"{count_noun(further, 'more reason')} (see the report)"] if further > 0 else []
     return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
 """Error numbers of a place without write permission or without any."""
 REMEDY_BY_ERRNO = {
+    **dict.fromkeys((errno.ENOENT, errno.ENOTDIR), "Check this path"),
+    **dict.fromkeys((errno.EEXIST, errno.EISDIR), "Choose another name"),
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "Free space on this disk"),
     **dict.fromkeys((errno.EMFILE, errno.ENFILE), "Close other programs: too many files are open"),
     errno.ESTALE: "The network drive was lost: mount the drive again, then repeat the command",

@@ -118,7 +118,7 @@ def resolve_speed(signal: Signal, sample_rate: float, report: ImportReport) -> F
     if unit is None or unit.quantity != "frequency":
         if signal.role == "speed":
             example = f' "speed [rpm]={signal.name}"'
-            raise report.add_missing(f"unit of the spindle speed in {signal.name}", "columns", example)
+            raise report.add_missing(f"unit of the spindle speed in column {signal.name!r}", "columns", example)
         try:
             return compute_speed_from_pulses(values, sample_rate, 1 if pulses is None else pulses)
         except ValueError as error:

@@ -32,7 +32,7 @@ GROUPS = {
     "Archive": {
         "replay": "Store recorded files as tap tests, each file once.",
         "history": "List tap tests, test cuts and events of a machine, oldest first.",
-        "verify": "Verify all files of a machine folder.",
+        "verify": "Find damaged, missing or changed files of a machine folder.",
         "rebuild": "Rebuild the history and a damaged journal. No file is deleted.",
     },
     "Fleet": {

@@ -89,7 +89,7 @@ def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: boo
     draft = MachineDraft(text, {})
     chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
     if edit and not asks and edit not in answers:
-        raise ValueError(f"--edit {edit} needs a terminal. Give the answer with --{edit}.")
+        raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
     if not asks:
         return answer_questions(draft, answers)
     try:

@@ -19,8 +19,8 @@ def tap(
     direction: Annotated[
         str,
         Option(
-            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y). Default: x, at a terminal "
-            "then y."
+            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y). Default: x. At a terminal, "
+            "y follows x."
         ),
     ] = "",
     operator: Annotated[str, Option(help="Name of the operator.")] = "",

@@ -1,6 +1,7 @@
 """Forecast when programs become doubtful or not stable and when limits are reached."""
 
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -34,11 +35,10 @@ class MachineForecast:
         for series in self.status.series:
             if tool in (None, series.tool) and direction in (None, series.direction):
                 return series
-        known = [(series.tool, series.direction) for series in self.status.series]
+        known = [(shlex.quote(series.tool), series.direction) for series in self.status.series]
         names = ", ".join(f"SeriesStatus.tool {name} SeriesStatus.direction {axis}" for name, axis in known)
-        raise DataError(
-            f"no tap-test series of tool {tool or 'any'}, direction {direction or 'any'}. Choose one of: {names}."
-        )
+        wanted = f"{repr(tool) if tool else 'any'}, direction {direction or 'any'}"
+        raise DataError(f"no tap-test series of tool {wanted}. Choose one of: {names}.")
 
 
 def forecast_machine(logbook: Logbook, now: datetime | None = None) -> MachineForecast:

@@ -202,7 +202,7 @@ def _to_operator_error(error: Exception) -> Exception:
     if isinstance(error, OSError):
         cure = "Get write permission for this folder" if error.errno in PERMISSION_ERRNOS else kept
         if isinstance(error, FileNotFoundError):
-            cure = "Check this path, then repeat the command"
+            cure = "Then repeat the command"
         return DataError(join_sentences(format_os_error(error), cure))
     return RuntimeError(join_sentences(f"lobewatch has failed ({type(error).__name__}: {error})", kept))
 

@@ -160,7 +160,7 @@ def _error_remarks(mode: Mode) -> Iterator[Remark]:
     scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
     if scatter > MAX_HIT_SCATTER_RATIO:
         text = f"scatter from hit to hit is {scatter:.1f} times the standard error of the fit"
-        yield mode_remark(mode, "scatter", text, "Hit the same point in the same direction, equally hard")
+        yield mode_remark(mode, "scatter", text, "Hit the same point in the same direction with the same force")
 
 
 def add_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:

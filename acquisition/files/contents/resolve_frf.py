@@ -81,7 +81,7 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
             report.add_fault(f"column {first.name} has real numbers, but the values of an FRF are complex")
         return first.values.astype(np.complex128)
     if second is None or second.values.shape != first.values.shape:
-        fact = f"{'imaginary part' if first.role == 'real' else 'phase'} of {first.name}"
+        fact = f"{'imaginary part' if first.role == 'real' else 'phase'} of column {first.name!r}"
         raise report.add_missing(fact, "columns", ' "frequency,real,imag" or "frequency,magnitude,phase"')
     if first.role == "real":
         if second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
@@ -92,7 +92,7 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     if not angle:
         raise report.add_missing("unit of the phase", "columns", ' "frequency,magnitude,phase [deg]"')
     if not is_decibel(first.unit) and np.any(first.values < 0):
-        fact = f"unit of {first.name}, probably dB because it has negative values"
+        fact = f"unit of column {first.name!r}, probably dB because it has negative values"
         raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
@@ -117,7 +117,7 @@ def _resolve_frequency(
         raise report.add_fault(f"Omit Description.spacing and Description.start: {reason}")
     if not axis.unit and _is_angular(axis):
         example = f' "frequency [rad/s]={axis.name},..."'
-        raise report.add_missing(f"unit of {axis.name}, Hz or rad/s", "columns", example)
+        raise report.add_missing(f"unit of column {axis.name!r}, Hz or rad/s", "columns", example)
     unit = parse_unit(axis.unit or "Hz")
     if unit is None or unit.quantity != "frequency":
         raise report.add_fault(f"unit {axis.unit!r} of frequency {axis.name} is not one of Hz, kHz, rad/s")

@@ -91,9 +91,11 @@ def choose_cut(
     machine: Machine, program: str, cut: str, speed: float | None, depth: float | None, power_kw: float | None = None
 ) -> CutSetting:
     """Return the setting of a program, or of a cut with speed (rpm) and depth (mm); ValueError unless one is named."""
-    if bool(program) == bool(cut):
-        both, neither = "both choose_cut.program and", "neither choose_cut.program nor"
-        raise ValueError(f"{both if cut else neither} choose_cut.cut given. {_choose_one_of(machine.cut_tables)}.")
+    if program and cut:
+        raise ValueError("choose_cut.program cannot be used with choose_cut.cut. Leave out one of the two.")
+    if not program and not cut:
+        known = _choose_one_of(machine.cut_tables)
+        raise ValueError(f"neither choose_cut.program nor choose_cut.cut given. {known}.")
     if cut and (speed is None or depth is None):
         key = "speed_rpm" if speed is None else "depth_mm"
         raise ValueError(f"choose_cut.cut {cut} needs ProgramTable.{key}. Give both, or use choose_cut.program.")

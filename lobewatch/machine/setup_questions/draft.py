@@ -178,7 +178,7 @@ def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -
     words = ANSWER_NUMBER_PATTERN.sub(" ", answer)
     strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
     if strange:
-        raise ValueError(f"{answer!r}: {strange[0]!r} is not a number or unit. Enter {', '.join(names)}.")
+        raise ValueError(f"{answer!r}: {strange[0]!r} is neither a number nor a unit. Enter {', '.join(names)}.")
     numbers = [float(number.replace(",", ".")) for number in ANSWER_NUMBER_PATTERN.findall(answer)]
     if not (len(names) if least is None else least) <= len(numbers) <= len(names):
         count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"

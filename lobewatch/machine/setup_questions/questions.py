@@ -104,7 +104,7 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
     words = [word.strip(",;") for word in answer.casefold().split()]
     mountings = [word for word in words if word in MOUNTINGS]
     rest = " ".join(word for word in words if word not in MOUNTINGS)
-    names = (f"mass in g, then {', '.join(MOUNTINGS)}",)
+    names = (f"the mass in g and one of {', '.join(MOUNTINGS)}",)
     mass = setup.parse_numbers(rest, names, 0 if mountings else 1)
     return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
 

@@ -220,7 +220,7 @@ def test_a_channel_of_a_sound_file_is_the_tachometer_and_needs_no_full_scale(tmp
             "n",
             SPEED,
             Description(columns=("time [s]", "acceleration [m/s^2]", "speed")),
-            'n (give Description.columns, for example "speed [rpm]=n")',
+            "'n' (give Description.columns, for example \"speed [rpm]=n\")",
         ),
     ],
 )

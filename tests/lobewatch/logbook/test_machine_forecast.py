@@ -201,7 +201,7 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
 @pytest.mark.parametrize(
     ("options", "facts"),
     [
-        (["--tool", "other"], " other.*SeriesStatus.tool reference SeriesStatus.direction x"),
+        (["--tool", "other"], "'other'.*SeriesStatus.tool reference SeriesStatus.direction x"),
         (["--direction", "z"], " z.*SeriesStatus.tool reference SeriesStatus.direction x"),
         (["--csv", "--json"], "--csv.*--json"),
     ],

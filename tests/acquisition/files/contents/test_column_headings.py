@@ -132,7 +132,7 @@ def test_a_frequency_in_rad_per_s_is_asked_about_and_never_taken_as_hz(tmp_path:
     h = 1 / (4e8 * (1 - (frequency / 150) ** 2 + 2j * 0.01 * frequency / 150))
     for name in ("w", "omega", "x", "frequency"):
         path = put(tmp_path / "a.csv", f"{name},re,im\n" + rows(2 * np.pi * frequency, h.real, h.imag, separator=","))
-        assert f"unit of {name}, Hz or rad/s" in complaint(
+        assert f"unit of column {name!r}, Hz or rad/s" in complaint(
             path, columns=(f"frequency={name}", "real=re", "imag=im"), unit="m/N"
         )
         said = Description(columns=(f"frequency [rad/s]={name}", "real [m/N]=re", "imag=im"))

@@ -59,7 +59,8 @@ def test_json_is_exact_and_harmless(text: str) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("lobewatch.show.terminal.output.results", SafeConsole(file=to, width=120))
         emit({text: [text, 1.5, float("nan")]}, True)
-    assert json.loads(to.getvalue()) == {text: [text, 1.5, None]}
+    told = with_option_names(text)
+    assert json.loads(to.getvalue()) == {told: [told, 1.5, None]}
     assert make_printable(to.getvalue()) == to.getvalue()
 
 

@@ -126,14 +126,24 @@ class FrameFormat(NamedTuple):
     """True if a checksum follows the values."""
 
 
+MIN_FRAMES_IN_STEP = 16
+"""Consecutive frames that show where frames without checksum begin."""
+
+
 class SimpleFrameDecoder(_RowDecoder):
-    """Decoder of a stream of frames into rows of numbers."""
+    """Decoder of a stream of frames into rows of numbers.
+
+    A value may have the bytes of a start. Without checksum, a frame therefore counts if another start follows it, from
+    the only place on where starts follow each other at the length of a frame.
+    """
 
     def __init__(self, form: FrameFormat, values: int = 2) -> None:
         """Expect this number of values per frame. Bytes before the first whole frame are not counted."""
         super().__init__()
         self._form, self._payload = form, 2 * (values + form.counter)
         self._size = len(form.start) + self._payload + form.checksum
+        self._least = self._size + (0 if form.checksum else len(form.start))
+        self._in_step = False
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the complete rows. Bytes between frames, and a wrong checksum, are a broken frame."""
@@ -141,7 +151,7 @@ class SimpleFrameDecoder(_RowDecoder):
 
     def _parse_frames(self, received: bytes) -> Iterator[list[int]]:
         form, place = self._form, 0
-        while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= self._size:
+        while len(received) - (begin := self._find_start(received, place)) >= self._least:
             payload = received[begin + len(form.start) :][: self._payload]
             good = not form.checksum or received[begin + self._size - 1] == sum(payload) & 0xFF
             if self._begun and (begin > place or not good):
@@ -151,6 +161,33 @@ class SimpleFrameDecoder(_RowDecoder):
                 yield [words[0] & 0xFFFF, *words[1:]] if form.counter else words
             self._begun, place = self._begun or good, begin + (self._size if good else 1)
         self._rest = received[place:]
+
+    def _find_start(self, received: bytes, place: int) -> int:
+        """Return where the next frame begins, the end of these bytes if that is unknown."""
+        if self._form.checksum:
+            begin = received.find(self._form.start, place)
+            return len(received) if begin < 0 else begin
+        goes_on = all(received.startswith(self._form.start, at) for at in (place, place + self._size))
+        if not (self._in_step and goes_on) and len(received) - place >= self._least:
+            place = self._find_step(received, place)
+            self._in_step = place < len(received)
+        return place
+
+    def _find_step(self, received: bytes, place: int) -> int:
+        """Return the only place from which starts follow each other to the end, the end if there is none or several."""
+        while len(received) - place >= self._size * (MIN_FRAMES_IN_STEP + 1):
+            ends = {first: self._end_of_run(received, first) for first in range(place, place + self._size)}
+            whole = [first for first, end in ends.items() if len(received) - end < len(self._form.start)]
+            if whole:
+                return whole[0] if len(whole) == 1 else len(received)
+            place = max(max(ends.values()), place + self._size)
+        return len(received)
+
+    def _end_of_run(self, received: bytes, place: int) -> int:
+        """Return the place after the frames from here on that begin with a start."""
+        while received.startswith(self._form.start, place):
+            place += self._size
+        return place
 
 
 class OutputFormat(NamedTuple):

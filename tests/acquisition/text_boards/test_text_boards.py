@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -167,6 +168,26 @@ def test_rows_do_not_depend_on_how_the_bytes_are_cut(scans: list[tuple[int, int,
         pieces = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
         rows = [row for piece in pieces for printed in decoder.feed(piece) for row in printed.rows.tolist()]
         assert [tuple(map(int, row)) for row in rows] == scans
+
+
+@pytest.mark.parametrize("idle", [0, 2, 514])
+@pytest.mark.parametrize("begin", [0, 1, 2, 3, 4, 7])
+def test_a_value_that_looks_like_a_start_puts_no_frame_out_of_step(idle: int, begin: int) -> None:
+    levels = np.where(np.arange(400) < 200, idle, 300 * np.sin(np.arange(400))).astype(np.int16)
+    stream = b"".join(b"\x02" + struct.pack("<hh", level, 7) for level in levels.tolist())
+    lost = stream[:1502] + stream[1503:]  # one byte of frame 300
+    decoder = SimpleFrameDecoder(FrameFormat(b"\x02", checksum=False))
+    printed = [rows for i in range(begin, len(lost), 33) for rows in decoder.feed(lost[i : i + 33])]
+    rows = np.concatenate([part.rows for part in printed])
+    assert set(rows[:, 1]) == {7.0}
+    skipped = -(-begin // 5)
+    assert rows[:, 0].tolist() == [*levels[skipped:300].tolist(), *levels[301:-1].tolist()]
+    assert [part.broken_before for part in printed if part.broken_before] == [1]
+
+
+def test_frames_that_cannot_be_told_from_their_values_are_not_read() -> None:
+    decoder = SimpleFrameDecoder(FrameFormat(b"\x02", checksum=False))
+    assert list(decoder.feed(500 * (b"\x02" + struct.pack("<hh", 700, 7)))) == []
 
 
 def _frame(counter: int, *values: int) -> bytes:

@@ -137,10 +137,15 @@ class TextBoardSource(ClosedOnExit):
                 yield Block(scan, self._codes(values), lost_before=lost)
                 scan, last_arrival = scan + values.shape[1], time.monotonic()
             if time.monotonic() - last_arrival > SILENCE_TIMEOUT:
-                wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
                 text = f"the board on {self._link.port} has printed no samples for {SILENCE_TIMEOUT:g} s"
-                remedy = f"Check baud_rate and the program of the board, which must print counter,{wanted} or {wanted}"
-                raise DeviceError(text, remedy)
+                raise DeviceError(text, self._silence_remedy())
+
+    def _silence_remedy(self) -> str:
+        """Return the remedy for a board whose samples are not found."""
+        if self._printing.frame:
+            return "Check baud_rate, frame_start, counter and checksum. Add a checksum if values contain frame_start"
+        wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
+        return f"Check baud_rate and the program of the board, which must print counter,{wanted} or {wanted}"
 
     def _codes(self, values: Floats) -> Codes:
         """Return the codes of the converter, one row per channel."""

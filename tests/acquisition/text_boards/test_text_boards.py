@@ -247,6 +247,16 @@ def test_a_board_that_prints_something_else_is_a_device_error(monkeypatch: pytes
             list(islice(source.blocks(), 1))
 
 
+def test_frames_that_look_like_their_values_are_a_device_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("acquisition.text_boards.source.SILENCE_TIMEOUT", 0.3)
+    printing = OutputFormat(frame=FrameFormat(b"\x02", checksum=False))
+    with silent_port() as (master, port), TextBoardSource(port, INPUTS, RATE, printing) as source:
+        source.start()
+        os.write(master, b"\x02\xbc\x02\x07\x00" * 100)
+        with pytest.raises(DeviceError, match="frame_start"):
+            list(islice(source.blocks(), 1))
+
+
 def test_an_unplugged_board_is_a_device_error() -> None:
     sensitivities = FORCE.sensitivity, ACCELERATION.sensitivity
     board = TextBoardEmulator(ramp, sensitivities, 5.0, RATE, realtime=False)

@@ -81,7 +81,7 @@ def modes(
     from modal import parse_mode_edits
 
     if beside is not None and len(beside) == 1:
-        raise ValueError(f"--beside {beside[0]} may agree by chance. Give --beside twice or more.")
+        raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:

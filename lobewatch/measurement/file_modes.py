@@ -15,6 +15,7 @@ from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
+from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.step_times import time_step
@@ -255,7 +256,8 @@ def fit_file_modes(
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
-    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
+    found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
+    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
 
@@ -269,7 +271,7 @@ def _fit_decay_modes(
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
-    remarks = (*decays.remarks, *fit_remarks)
+    remarks = (*decays.remarks, *fit_remarks, *find_hit_remarks(decays.hits, band))
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
 
 

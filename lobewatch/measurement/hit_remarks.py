@@ -41,13 +41,15 @@ def find_hit_remarks(hits: Sequence[Hit], band: tuple[float, float] | None = Non
     low, high = band or (0.0, np.inf)
     changes = [change for change in modal.find_hit_changes(hits) if low <= change.frequency <= high]
     for kind in dict.fromkeys(change.kind for change in changes):
-        yield _make_remark([change for change in changes if change.kind is kind])
+        of_kind = [change for change in changes if change.kind is kind]
+        is_small = max(change.relative_spread for change in of_kind) < MIN_UNCOVERED_SPREAD
+        if not (is_small and kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
+            yield _make_remark(of_kind, is_small)
 
 
-def _make_remark(changes: Sequence[HitChange]) -> Remark:
+def _make_remark(changes: Sequence[HitChange], is_small: bool) -> Remark:
     """Return the remark on the changes of one kind, the most flexible mode first."""
     change = changes[0]
-    is_small = max(other.relative_spread for other in changes) < MIN_UNCOVERED_SPREAD
     code = SMALL_CHANGE_CODE if is_small else HIT_CHANGE_CODES[change.kind]
     others = f", also at {', '.join(f'{other.frequency:.0f}' for other in changes[1:])} Hz" if changes[1:] else ""
     return Remark(code, f"{change.frequency:.0f} Hz", _describe(change) + others, REMEDIES[change.kind])

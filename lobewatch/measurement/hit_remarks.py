@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 import modal
-from acquisition import Hit, Remark
+from acquisition import Hit, HitFlags, Remark
 from modal import HitChange, HitChangeKind
 
 MIN_UNCOVERED_SPREAD = 0.25
@@ -33,18 +33,40 @@ REMEDIES = {
 """Remedy of a change from hit to hit, by its kind."""
 
 
-def find_hit_remarks(hits: Sequence[Hit], band: tuple[float, float] | None = None) -> Iterator[Remark]:
-    """Yield a remark on each kind of change over the accepted hits of a tap test, at its most flexible mode.
+MIN_INCONSISTENT_HITS = 2
+"""Fewest hits that differ from the mean and are compared as well; chosen: one may be a slip of the hammer."""
 
-    band: frequencies of interest (Hz); None for all.
+
+def find_hit_remarks(
+    hits: Sequence[Hit], band: tuple[float, float] | None = None, flags: Sequence[HitFlags] = ()
+) -> Iterator[Remark]:
+    """Yield a remark on each kind of change over the hits of a tap test, at its most flexible mode.
+
+    band: frequencies of interest (Hz), None for all. flags: faults of each hit, empty if all are accepted.
     """
     low, high = band or (0.0, np.inf)
-    changes = [change for change in modal.find_hit_changes(hits) if low <= change.frequency <= high]
+    changes = [change for change in _find_changes(hits, flags) if low <= change.frequency <= high]
     for kind in dict.fromkeys(change.kind for change in changes):
         of_kind = [change for change in changes if change.kind is kind]
         is_small = max(change.relative_spread for change in of_kind) < MIN_UNCOVERED_SPREAD
         if not (is_small and kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
             yield _make_remark(of_kind, is_small)
+
+
+def _find_changes(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> list[HitChange]:
+    """Return the changes over the accepted hits, or over these and the hits that differ from their mean.
+
+    The mean is that of the first hits: of two states, all hits in the other one are rejected. Of these hits only what
+    repeats counts, and no mode that they miss.
+    """
+    accepted = [hit for hit, flag in zip(hits, flags, strict=True) if not flag] if flags else hits
+    if flags.count(HitFlags.INCONSISTENT) < MIN_INCONSISTENT_HITS:
+        return modal.find_hit_changes(accepted)
+    kept = [(hit, flag) for hit, flag in zip(hits, flags, strict=True) if flag in (HitFlags.OK, HitFlags.INCONSISTENT)]
+    good = {i for i, (_, flag) in enumerate(kept) if not flag}
+    changes = modal.find_hit_changes([hit for hit, _ in kept])
+    repeated = [change for change in changes if change.kind is not HitChangeKind.SCATTER and not good <= {*change.hits}]
+    return repeated or modal.find_hit_changes(accepted)
 
 
 def _make_remark(changes: Sequence[HitChange], is_small: bool) -> Remark:

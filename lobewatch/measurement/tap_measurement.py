@@ -113,7 +113,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
-            changes = tuple(find_hit_remarks(tap.accepted, machine.mode.band_hz))
+            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.flags))
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
                 said = (*edited, *decay_remarks(machine.tap.sensor), *changes)

@@ -64,7 +64,7 @@ def find_series_change(number: Integers, frequency: Floats, error: Floats, force
     total = _fit(np.ones((frequency.size, 1)), frequency, weight)[0]
     fits = [fit for fit in _fit_changes(number, frequency, weight, force) if _is_significant(fit, total)]
     if fits:
-        return min(fits, key=lambda fit: fit.rest / fit.freedom)
+        return min(fits, key=_preference)
     if total < MIN_CHI_SQUARE + scipy.special.chdtri(frequency.size - 1, SCATTER_PROBABILITY):
         return None
     std = float(np.sqrt(2) * np.median(error))
@@ -96,6 +96,12 @@ def _fit(columns: Floats, f: Floats, weight: Floats) -> tuple[float, Floats, Flo
     values = covariance @ (columns.T @ (weight * (f - np.mean(f))))
     rest = f - np.mean(f) - columns @ values
     return float(np.sum(weight * rest**2)), values, covariance
+
+
+def _preference(fit: SeriesChange) -> tuple[float, bool, float]:
+    """Return the key of the fit that leaves least; a line before two states if both leave no more than the errors."""
+    rest = fit.rest / fit.freedom
+    return max(rest, MAX_REST_OF_ERRORS), fit.kind is HitChangeKind.TWO_STATES, rest
 
 
 def _is_significant(fit: SeriesChange, total: float) -> bool:

@@ -25,7 +25,7 @@ MIN_SEARCHED_SHARE = 0.02
 """Least mobility of a searched peak over the highest mobility of the hit: 0.1 of its receptance at a fifth of f."""
 LINK_HALF_WIDTHS = 3.0
 """Largest distance between peaks of one mode in two hits (half-power half-widths); chosen."""
-MAX_STATE_DISTANCE = 0.05
+MAX_STATE_DISTANCE = 0.1
 """Largest relative distance between two states of one mode whose peaks do not overlap; chosen."""
 WINDOW_HALF_WIDTHS = 3.0
 """Reach of the fitted lines beyond the outermost peaks (half-power half-widths); chosen."""

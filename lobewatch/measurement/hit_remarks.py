@@ -65,8 +65,13 @@ def _find_changes(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> list[HitCha
     kept = [(hit, flag) for hit, flag in zip(hits, flags, strict=True) if flag in (HitFlags.OK, HitFlags.INCONSISTENT)]
     good = {i for i, (_, flag) in enumerate(kept) if not flag}
     changes = modal.find_hit_changes([hit for hit, _ in kept])
-    repeated = [change for change in changes if change.kind is not HitChangeKind.SCATTER and not good <= {*change.hits}]
-    return repeated or modal.find_hit_changes(accepted)
+    return [change for change in changes if _repeats(change, good)] or modal.find_hit_changes(accepted)
+
+
+def _repeats(change: HitChange, good: set[int]) -> bool:
+    """Return whether a change is more than rejected hits of their own, or without a mode that all good hits have."""
+    is_only_missing = change.kind is HitChangeKind.PARTIAL and good <= {*change.hits}
+    return change.kind is not HitChangeKind.SCATTER and not is_only_missing
 
 
 def _make_remark(changes: Sequence[HitChange], is_small: bool) -> Remark:

@@ -4,6 +4,7 @@ The averaged FRF hides such changes. A resonance that moves is smeared there, an
 """
 
 import itertools
+import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -35,6 +36,8 @@ GAUSS_NEWTON_STEPS = 8
 """Steps of a fit; it converges from two half-widths away in five."""
 MAX_STEP_HALF_WIDTHS = 0.5
 """Largest step of a pole (half-power half-widths)."""
+MAX_LAST_STEP = 1e-4
+"""Largest step of a converged pole (half-power half-widths)."""
 MIN_POLE_ERROR = 1e-6
 """Least standard error of a pole (half-power half-widths), of hits without noise; chosen."""
 MAX_COMMON_START_EXCESS = 1.5
@@ -169,7 +172,7 @@ class _HitMode:
 
     @property
     def centre(self) -> float:
-        return float(np.median(self.frequencies))
+        return statistics.median(self.frequencies)
 
     @property
     def receptance(self) -> float:
@@ -182,7 +185,7 @@ class _HitMode:
 
     @property
     def half_width(self) -> float:
-        return float(np.median([peak.half_width for peak in self.peaks.values()]))
+        return statistics.median(peak.half_width for peak in self.peaks.values())
 
     def is_near(self, peak: Resonance) -> bool:
         reach = LINK_HALF_WIDTHS * max(peak.half_width, self.half_width)
@@ -256,6 +259,8 @@ def _fit_poles(window: _Window, pole: Complexes) -> _PoleFit:
         slope = values[:, :1] * columns[:, :, 0] ** 2
         values, residual, variance = _solve(np.concatenate([columns, slope[:, :, np.newaxis]], 2), window.accelerance)
         step = values[:, 3]
+        if np.max(np.abs(step)) < MAX_LAST_STEP:
+            break
         step = step * np.minimum(1.0, MAX_STEP_HALF_WIDTHS / np.maximum(np.abs(step), 1e-30))
         pole = pole + step
         pole = np.clip(pole.real, -reach, reach) + 1j * np.clip(pole.imag, 0.1, reach)

@@ -75,10 +75,13 @@ def _fit_changes(number: Integers, f: Floats, weight: Floats, force: Floats | No
     nobody = np.zeros(f.size, dtype=bool)
     for kind, x in ((HitChangeKind.DRIFT, number), (HitChangeKind.FORCE, force)):
         if x is not None and np.ptp(x) > 0:
-            yield _fit_change(kind, (x - np.min(x)) / np.ptp(x), f, weight, nobody, f.size - 2)
+            share = np.asarray((x - np.min(x)) / np.ptp(x), np.float64)
+            yield _fit_change(kind, share, f, weight, nobody, f.size - 2)
     order = np.argsort(f)
     uppers = [np.isin(np.arange(f.size), order[size:]) for size in range(2, f.size - 1)]
-    halves = [_fit_change(HitChangeKind.TWO_STATES, upper, f, weight, upper, f.size - 3) for upper in uppers]
+    halves = [
+        _fit_change(HitChangeKind.TWO_STATES, upper.astype(float), f, weight, upper, f.size - 3) for upper in uppers
+    ]
     yield min(halves, key=lambda fit: fit.rest)
 
 
@@ -92,7 +95,7 @@ def _fit_change(kind: HitChangeKind, x: Floats, f: Floats, weight: Floats, upper
 
 def _fit(columns: Floats, f: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
     """Return chi-square, values and covariance of a linear fit."""
-    covariance = np.linalg.inv(columns.T @ (columns * weight[:, np.newaxis]))
+    covariance = np.asarray(np.linalg.inv(columns.T @ (columns * weight[:, np.newaxis])), np.float64)
     values = covariance @ (columns.T @ (weight * (f - np.mean(f))))
     rest = f - np.mean(f) - columns @ values
     return float(np.sum(weight * rest**2)), values, covariance

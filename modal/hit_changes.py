@@ -20,6 +20,8 @@ from modal.frequency_series import HitChangeKind, find_series_change
 
 MIN_HITS_FOR_CHANGES = 4
 """Fewest hits in which changes are searched: two states of two hits each, or a line with two more hits than values."""
+MIN_HITS_WITH_MODE, MIN_HITS_WITHOUT_MODE = 2, 2
+"""Fewest hits that have a mode, and that lack it, for a mode missing in some hits; chosen: one may be a slip."""
 MIN_PEAK_SHARE = 0.1
 """Least receptance or mobility of a searched peak over that of the highest peak; chosen: a lower one limits no cut."""
 MIN_SEARCHED_SHARE = 0.02
@@ -95,8 +97,8 @@ class _HitSpectrum:
     """FRF of the hit, or the spectrum of its free decay, on the lines of the whole record."""
     resonances: tuple[Resonance, ...]
     """Resonances in the usable band; empty if they cannot be found."""
-    force: float | None
-    """Largest force (N); None if not measured."""
+    force: float
+    """Largest force (N); NaN if not measured."""
 
 
 def find_hit_changes(hits: Sequence[Hit]) -> list[HitChange]:
@@ -152,7 +154,7 @@ def _compute_spectrum(hit: Hit) -> _HitSpectrum:
         frf, force = estimate_frf([hit]), float(np.max(hit.force) - np.median(hit.force))
     else:
         decay = extract_free_decay(hit)
-        (frf,), force = decay_spectra(np.pad(decay, (0, hit.acceleration.size - decay.size)), hit.sample_rate), None
+        (frf,), force = decay_spectra(np.pad(decay, (0, hit.acceleration.size - decay.size)), hit.sample_rate), np.nan
     try:
         resonances = find_resonances(usable_lines(frf, None), MIN_SEARCHED_SHARE)
     except ValueError:
@@ -291,8 +293,8 @@ def _cut_window(spectra: Sequence[_HitSpectrum], mode: _HitMode, neighbours: Seq
     first, end = np.searchsorted(f, [min(low, least - width), max(high, most + width)])
     spare = max(0, MIN_WINDOW_LINES - int(end - first) + 1) // 2
     part = slice(max(int(first) - spare, 0), int(end) + spare)
-    receptance = np.array([spectrum.frf.receptance[part] for spectrum in spectra])
-    return _Window((f[part] - mode.centre) / width, receptance * f[part] ** 2)
+    receptance: Complexes = np.array([spectrum.frf.receptance[part] for spectrum in spectra])
+    return _Window((f[part] - mode.centre) / width, np.asarray(receptance * f[part] ** 2, np.complex128))
 
 
 def _fit_mode(window: _Window, mode: _HitMode) -> _PoleFit:
@@ -304,16 +306,19 @@ def _fit_mode(window: _Window, mode: _HitMode) -> _PoleFit:
     for hit, peak in mode.peaks.items():
         own[hit] += (peak.frequency - mode.centre) / mode.half_width
     from_peaks, has_peak = _fit_poles(window, own), mode.is_in(own.size)
-    near = from_peaks.pole[has_peak]
-    shared = _fit_poles(window, np.full(own.size, np.median(near.real) + 1j * np.median(near.imag)))
+    shared = _fit_poles(window, np.full(own.size, _median_pole(from_peaks.pole[has_peak])))
     better = has_peak & (shared.residual > MAX_COMMON_START_EXCESS * from_peaks.residual)
     both = zip(vars(from_peaks).values(), vars(shared).values(), strict=True)
     return _PoleFit(*(np.where(better, first, second) for first, second in both))
 
 
+def _median_pole(pole: Complexes) -> complex:
+    return complex(np.median(pole.real), np.median(pole.imag))
+
+
 def _evaluate_mode(spectra: Sequence[_HitSpectrum], mode: _HitMode, others: Sequence[_HitMode]) -> Iterator[HitChange]:
     """Yield the changes of one mode."""
-    if len(mode.peaks) < 2:
+    if len(mode.peaks) < MIN_HITS_WITH_MODE:
         return
     window = _cut_window(spectra, mode, [other.centre for other in others])
     if window.x.size < MIN_WINDOW_LINES:
@@ -321,19 +326,21 @@ def _evaluate_mode(spectra: Sequence[_HitSpectrum], mode: _HitMode, others: Sequ
     fit = _fit_mode(window, mode)
     has_mode = mode.is_in(len(spectra))
     present, absent = has_mode, np.zeros_like(has_mode)
-    if spectra[0].force is not None:  # without a force the sizes of two hits cannot be compared
+    forces = np.array([spectrum.force for spectrum in spectra])
+    knows_force = bool(np.all(np.isfinite(forces)))
+    if knows_force:  # without it the sizes of two hits cannot be compared
         absent = _find_absent(window, fit, has_mode)
         present = has_mode & ~absent
     f = mode.centre + mode.half_width * fit.pole[present].real
     half_width = mode.half_width * float(np.median(fit.pole[present].imag))
     of_mode = float(np.mean(f)), half_width / mode.centre, mode.receptance
     of_test = len(spectra), all(mode.receptance >= other.receptance for other in others)
-    if np.count_nonzero(absent) > 1:
+    if np.count_nonzero(absent) >= MIN_HITS_WITHOUT_MODE:
         yield HitChange(HitChangeKind.PARTIAL, *of_mode, *of_test, tuple(np.flatnonzero(present).tolist()))
     if f.size < MIN_HITS_FOR_CHANGES:
         return
     number = np.flatnonzero(present)
-    force = None if spectra[0].force is None else np.array([spectra[k].force for k in number])
+    force = forces[present] if knows_force else None
     change = find_series_change(number, f, mode.half_width * fit.error[present], force)
     if change is not None and abs(change.spread) >= MIN_SPREAD * half_width:
         state = tuple(number[change.smaller_state].tolist())
@@ -342,8 +349,7 @@ def _evaluate_mode(spectra: Sequence[_HitSpectrum], mode: _HitMode, others: Sequ
 
 def _find_absent(window: _Window, fit: _PoleFit, has_mode: Flags) -> Flags:
     """Return which hits lack a mode beyond their noise, shape (hits,)."""
-    near = fit.pole[has_mode]
-    pole = np.where(has_mode, fit.pole, np.median(near.real) + 1j * np.median(near.imag))
+    pole = np.where(has_mode, fit.pole, _median_pole(fit.pole[has_mode]))
     values, residual, variance = _solve(window.columns(pole)[:, :, ::-1], window.accelerance)
     size, noise = np.abs(values[:, 2]), np.sqrt(residual / (window.x.size - 3) * variance)
     second_largest = float(np.sort(size[has_mode])[-2])

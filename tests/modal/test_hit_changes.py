@@ -90,7 +90,8 @@ def test_the_unit_of_the_force_does_not_matter() -> None:
     hits = tap(lambda number, _: 1 - 0.5 * ZETA * number / 9)
     in_pounds = [replace(hit, force=hit.force / 4.448) for hit in hits]
     one, other = first(hits), first(in_pounds)
-    assert (other.kind, other.spread) == (one.kind, pytest.approx(one.spread, rel=1e-6))
+    assert other.kind is one.kind
+    assert other.spread == pytest.approx(one.spread, rel=1e-6)
     assert other.peak == pytest.approx(4.448 * one.peak)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
 from acquisition.arrays import Floats
@@ -92,8 +94,11 @@ def test_screens_show_the_change_unless_a_hit_is_rejected(run: Run) -> None:
     assert state.hit_change is not None
     shown = json.loads(encode_tap_state(state))["hit_change"]
     assert shown == {"code": "hits-drift", "text": str(state.hit_change)}
-    lines = [getattr(line, "plain", "") for line in render_state(replace(state, reason=""), muted=False).renderables]  # type: ignore[attr-defined]
-    assert str(state.hit_change) in lines
+    console = Console(width=400, record=True, file=io.StringIO())
+    console.print(render_state(replace(state, reason=""), muted=False))
+    assert str(state.hit_change) in console.export_text()
+    console.print(render_state(replace(state, reason="rejected"), muted=False))
+    assert str(state.hit_change) not in console.export_text()
 
 
 def test_a_failed_comparison_ends_no_test(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,7 +37,7 @@ class HitChangeKind(enum.StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class SeriesChange:
+class FrequencyChange:
     """Change of a frequency, fitted by weighted least squares."""
 
     kind: HitChangeKind
@@ -54,7 +54,9 @@ class SeriesChange:
     """Degrees of freedom of that rest."""
 
 
-def find_series_change(number: Integers, frequency: Floats, error: Floats, force: Floats | None) -> SeriesChange | None:
+def find_frequency_change(
+    number: Integers, frequency: Floats, error: Floats, force: Floats | None
+) -> FrequencyChange | None:
     """Return how a frequency changes over the hits; None if it is constant within its errors.
 
     number: hit number; error: standard error of each frequency; force: peak force of each hit (N), None if unknown; all
@@ -68,10 +70,10 @@ def find_series_change(number: Integers, frequency: Floats, error: Floats, force
     if total < MIN_CHI_SQUARE + scipy.special.chdtri(frequency.size - 1, SCATTER_PROBABILITY):
         return None
     std = float(np.sqrt(2) * np.median(error))
-    return SeriesChange(HitChangeKind.SCATTER, float(np.ptp(frequency)), std, np.zeros(frequency.size, dtype=bool))
+    return FrequencyChange(HitChangeKind.SCATTER, float(np.ptp(frequency)), std, np.zeros(frequency.size, dtype=bool))
 
 
-def _fit_changes(number: Integers, f: Floats, weight: Floats, force: Floats | None) -> Iterator[SeriesChange]:
+def _fit_changes(number: Integers, f: Floats, weight: Floats, force: Floats | None) -> Iterator[FrequencyChange]:
     nobody = np.zeros(f.size, dtype=bool)
     for kind, x in ((HitChangeKind.DRIFT, number), (HitChangeKind.FORCE, force)):
         if x is not None and np.ptp(x) > 0:
@@ -85,12 +87,14 @@ def _fit_changes(number: Integers, f: Floats, weight: Floats, force: Floats | No
     yield min(halves, key=lambda fit: fit.rest)
 
 
-def _fit_change(kind: HitChangeKind, x: Floats, f: Floats, weight: Floats, upper: Flags, freedom: int) -> SeriesChange:
+def _fit_change(
+    kind: HitChangeKind, x: Floats, f: Floats, weight: Floats, upper: Flags, freedom: int
+) -> FrequencyChange:
     """Fit a change in proportion to x, which goes from 0 to 1."""
     rest, values, covariance = _fit(np.column_stack([np.ones(f.size), x]), f, weight)
     std = np.sqrt(covariance[1, 1] * max(1.0, rest / freedom))
     smaller = upper if np.count_nonzero(upper) <= f.size / 2 else ~upper
-    return SeriesChange(kind, float(values[1]), float(std), smaller, rest, freedom)
+    return FrequencyChange(kind, float(values[1]), float(std), smaller, rest, freedom)
 
 
 def _fit(columns: Floats, f: Floats, weight: Floats) -> tuple[float, Floats, Floats]:
@@ -101,13 +105,13 @@ def _fit(columns: Floats, f: Floats, weight: Floats) -> tuple[float, Floats, Flo
     return float(np.sum(weight * rest**2)), values, covariance
 
 
-def _preference(fit: SeriesChange) -> tuple[float, bool, float]:
+def _preference(fit: FrequencyChange) -> tuple[float, bool, float]:
     """Return the key of the fit that leaves least; a line before two states if both leave no more than the errors."""
     rest = fit.rest / fit.freedom
     return max(rest, MAX_REST_OF_ERRORS), fit.kind is HitChangeKind.TWO_STATES, rest
 
 
-def _is_significant(fit: SeriesChange, total: float) -> bool:
+def _is_significant(fit: FrequencyChange, total: float) -> bool:
     """Return whether a change exceeds the errors, and explains its share or leaves no more than the errors.
 
     The best two states of any series explain up to two thirds of the scatter by the errors.

@@ -16,7 +16,7 @@ from modal.arrays import Complexes, Flags, Floats
 from modal.bands.find_resonances import Resonance, find_resonances
 from modal.bands.frf_lines import usable_lines
 from modal.fit_modes import decay_spectra
-from modal.frequency_series import HitChangeKind, find_series_change
+from modal.frequency_series import HitChangeKind, find_frequency_change
 
 MIN_HITS_FOR_CHANGES = 4
 """Fewest hits in which changes are searched: two states of two hits each, or a line with two more hits than values."""
@@ -341,7 +341,7 @@ def _evaluate_mode(spectra: Sequence[_HitSpectrum], mode: _HitMode, others: Sequ
         return
     number = np.flatnonzero(present)
     force = forces[present] if knows_force else None
-    change = find_series_change(number, f, mode.half_width * fit.error[present], force)
+    change = find_frequency_change(number, f, mode.half_width * fit.error[present], force)
     if change is not None and abs(change.spread) >= MIN_SPREAD * half_width:
         state = tuple(number[change.smaller_state].tolist())
         yield HitChange(change.kind, *of_mode, *of_test, state, change.spread, change.spread_std)

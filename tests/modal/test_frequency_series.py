@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modal import HitChangeKind
-from modal.frequency_series import SeriesChange, find_series_change
+from modal.frequency_series import FrequencyChange, find_frequency_change
 
 NUMBER = np.arange(10)
 ERROR = np.full(10, 0.01)
@@ -19,8 +19,8 @@ def noise(seed: int, count: int = 10) -> np.ndarray:
     return 0.01 * np.random.default_rng(seed).normal(size=count)
 
 
-def change_of(frequency: np.ndarray) -> SeriesChange:
-    change = find_series_change(NUMBER, frequency, ERROR, FORCE)
+def change_of(frequency: np.ndarray) -> FrequencyChange:
+    change = find_frequency_change(NUMBER, frequency, ERROR, FORCE)
     assert change is not None
     return change
 
@@ -57,7 +57,7 @@ def test_values_in_no_order_are_scatter() -> None:
 def test_errors_are_no_change(count: int) -> None:
     force = 150 + 200 * np.random.default_rng(count).uniform(size=count)
     series = [500 + noise(seed, count) for seed in range(300)]
-    found = [find_series_change(np.arange(count), f, np.full(count, 0.01), force) for f in series]
+    found = [find_frequency_change(np.arange(count), f, np.full(count, 0.01), force) for f in series]
     assert found == [None] * 300
 
 
@@ -66,8 +66,8 @@ def test_errors_are_no_change(count: int) -> None:
 def test_kind_and_spread_follow_scale_offset_and_order(seed: int, scale: float, offset: float) -> None:
     frequency = 500 - 0.05 * NUMBER + noise(seed)
     change = change_of(frequency)
-    scaled = find_series_change(NUMBER, scale * frequency + offset, scale * ERROR, FORCE)
-    backwards = find_series_change(NUMBER, frequency[::-1], ERROR, FORCE[::-1])
+    scaled = find_frequency_change(NUMBER, scale * frequency + offset, scale * ERROR, FORCE)
+    backwards = find_frequency_change(NUMBER, frequency[::-1], ERROR, FORCE[::-1])
     assert scaled is not None
     assert backwards is not None
     assert change.kind is scaled.kind is backwards.kind is HitChangeKind.DRIFT

@@ -204,8 +204,10 @@ def _receptance(peak: Resonance) -> float:
 
 
 def _join_peaks(spectra: Sequence[_HitSpectrum]) -> list[_HitMode]:
-    """Join the peaks of single hits to modes, from the highest receptance down."""
-    peaks = [(k, peak) for k, spectrum in enumerate(spectra) for peak in spectrum.resonances]
+    """Join the peaks of single hits in their median usable band to modes, from the highest receptance down."""
+    end = statistics.median(spectrum.frf.usable_band[1] if spectrum.frf.usable_band else np.inf for spectrum in spectra)
+    numbered = [(k, peak) for k, spectrum in enumerate(spectra) for peak in spectrum.resonances]
+    peaks = [(k, peak) for k, peak in numbered if peak.frequency + peak.half_width < end]
     peaks.sort(key=lambda numbered: -_receptance(numbered[1]))
     sizes = np.array([(_receptance(peak), peak.height) for _, peak in peaks]).reshape(-1, 2)
     is_high = np.any(sizes >= MIN_PEAK_SHARE * np.max(sizes, axis=0, initial=0.0), axis=1)
@@ -337,7 +339,7 @@ def _evaluate_mode(spectra: Sequence[_HitSpectrum], mode: _HitMode, others: Sequ
     of_test = len(spectra), all(mode.receptance >= other.receptance for other in others)
     if np.count_nonzero(absent) >= MIN_HITS_WITHOUT_MODE:
         yield HitChange(HitChangeKind.PARTIAL, *of_mode, *of_test, tuple(np.flatnonzero(present).tolist()))
-    if f.size < MIN_HITS_FOR_CHANGES:
+    if f.size < max(MIN_HITS_FOR_CHANGES, len(spectra) / 2):
         return
     number = np.flatnonzero(present)
     force = forces[present] if knows_force else None

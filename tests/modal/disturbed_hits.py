@@ -11,17 +11,24 @@ from acquisition import Hit, Structure
 RATE = 25600.0
 RECORD, PRE_TRIGGER = 12800, 128
 FORCE_NOISE, RESPONSE_NOISE = 0.05, 1.0
+HARD_TIP, SOFT_TIP = (2.6e-4, 3.4e-4), (5.5e-4, 7.5e-4)
+"""Range of the foot width of the pulse (s). A soft tip ends the usable band at about 3.5 kHz, where the noise grows."""
 Share = Callable[[int, float], float]
 """Factor on the frequencies of a hit, by its number and its peak force (N)."""
 
 
 def tap_structure(
-    structures: Sequence[Structure], seed: int, *, share: Share = lambda *_: 1.0, noise: float = 1.0
+    structures: Sequence[Structure],
+    seed: int,
+    *,
+    share: Share = lambda *_: 1.0,
+    noise: float = 1.0,
+    tip: tuple[float, float] = HARD_TIP,
 ) -> list[Hit]:
     """Return one hit on each structure with the noise of sensors, times `noise`."""
     random, hits = np.random.default_rng(seed), []
     for number, structure in enumerate(structures):
-        peak, width = random.uniform(150, 350), random.uniform(2.6e-4, 3.4e-4)
+        peak, width = random.uniform(150, 350), random.uniform(*tip)
         time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / RATE
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         factor = share(number, peak)

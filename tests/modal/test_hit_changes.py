@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Hit, Structure
 from modal import HitChange, HitChangeKind, find_hit_changes
-from tests.modal.disturbed_hits import Share, draw_structure, tap_structure
+from tests.modal.disturbed_hits import HARD_TIP, SOFT_TIP, Share, draw_structure, tap_structure
 
 ZETA = 0.012
 SPINDLE = Structure(np.array([700.0, 1300.0, 2300.0]), np.full(3, ZETA), np.array([2e8, 2.5e7, 6e8]))
@@ -103,21 +103,23 @@ def close_pair(seed: int) -> Structure:
     return Structure(frequency, np.full(2, zeta), 3e7 * np.array([1, random.uniform(0.5, 2)]))
 
 
-def count_said(structures: list[Structure], noise: float = 2.0) -> int:
+def count_said(structures: list[Structure], tip: tuple[float, float] = HARD_TIP) -> int:
     """Return how many undisturbed tap tests of 4 to 20 hits are said to change."""
-    tests = [tap_structure([s] * (4 + seed % 17), seed, noise=noise) for seed, s in enumerate(structures)]
+    tests = [tap_structure([s] * (4 + seed % 17), seed, noise=2.0, tip=tip) for seed, s in enumerate(structures)]
     return sum(bool(find_hit_changes(hits)) for hits in tests)
 
 
 def test_undisturbed_hits_tell_nothing() -> None:
     assert count_said([draw_structure(seed) for seed in range(12)]) == 0
     assert count_said([close_pair(seed) for seed in range(12)]) == 0
+    assert count_said([draw_structure(seed) for seed in range(12)], SOFT_TIP) == 0
 
 
 @pytest.mark.long
 def test_at_most_one_of_200_undisturbed_tests_is_said_to_change() -> None:
     assert count_said([draw_structure(seed) for seed in range(100, 250)]) <= 1
     assert count_said([close_pair(seed) for seed in range(100, 150)]) <= 1
+    assert count_said([draw_structure(seed) for seed in range(100, 200)], SOFT_TIP) <= 1
 
 
 DISTURBANCES: dict[str, Share] = {

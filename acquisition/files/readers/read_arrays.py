@@ -126,8 +126,8 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}
     direction, tool = (str(first.get(key, "")) for key in ("direction", "tool"))
-    created, machines = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
-    return Contents(tuple(signals), created=created, direction=direction, tool=tool, machines=machines)
+    created, names = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
+    return Contents(tuple(signals), created=created, direction=direction, tool=tool, groups=names)
 
 
 def _parse_timestamp(text: object) -> datetime | None:

@@ -107,12 +107,11 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
 
 
 def _try_inspect(path: Path, description: Description) -> Recording:
-    """Inspect one of several files; a file that cannot be read is a recording with this problem."""
+    """Inspect one of several files; a damaged one is a recording with this problem."""
     try:
         return inspect_file(path, description)
-    except (DataError, OSError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        return Recording(path, "unreadable file", problems=reason.removeprefix(f"{path}: "))
+    except DataError as error:
+        return Recording(path, "damaged file", problems=str(error).removeprefix(f"{path}: "))
 
 
 def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:

@@ -156,6 +156,7 @@ def file_modes_json(file_modes: FileModes) -> JsonObject:
     return {
         "file": str(file_modes.path),
         "n_averages": frf and frf.n_averages,
+        "n_hits_found": file_modes.n_found,
         "usable_band_hz": frf and frf.usable_band,
         "facts": file_modes.facts,
         "by_hand": file_modes.by_hand,
@@ -190,8 +191,9 @@ def _frf_text(file_modes: FileModes) -> str:
     frf = file_modes.frf or state.frf
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
-    averaged = f"{count_noun(frf.n_averages, 'hit')} averaged"
-    what = averaged if file_modes.frf else f"{count_noun(len(state.frfs), 'free decay')} fitted together"
+    n, n_found = frf.n_averages if file_modes.frf else len(state.frfs), file_modes.n_found
+    noun, done = ("hit", "averaged") if file_modes.frf else ("free decay", "fitted together")
+    what = f"{n} of {count_noun(n_found, noun)} {done}" if n_found > n else f"{count_noun(n, noun)} {done}"
     return f"{what}, {lines}{usable}"
 
 

@@ -21,8 +21,8 @@ from acquisition.hit import Hit
 from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions
 
 Result = TypeVar("Result")
-_TEST_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force", "one_test")
-_NON_SIGNAL_FIELDS = (*_TEST_FIELDS, "hit_files")
+_LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
+_HIT_FIELDS = ("one_test", "hit_files")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Description:
 
     def list_signal_options(self) -> list[str]:
         """List the given fields that state something about the signals of the file."""
-        names = [option.name for option in fields(self) if option.name not in _NON_SIGNAL_FIELDS]
+        names = [option.name for option in fields(self) if option.name not in (*_LABEL_FIELDS, *_HIT_FIELDS)]
         return [f"Description.{name}" for name in names if getattr(self, name) not in ("", (), None)]
 
 

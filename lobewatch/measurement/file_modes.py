@@ -67,8 +67,8 @@ def read_file_frf(
         finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
         raise ValueError(f"{finding}. Leave out the number of averages.")
     frf = _average_hits(path, recording.hits, accepted, description)
-    remarks, n_found = (*recording.remarks, *frf.remarks), len(recording.hits) + len(recording.remarks)
-    return replace(frf, facts=recording.facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
+    facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
+    return replace(frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
 
 
 def _check_phase(path: Path, description: Description) -> str:

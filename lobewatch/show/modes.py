@@ -22,6 +22,8 @@ MATCHES_NOTE = "matches: number of other measurements with the mode within 0.5 %
 """Line below a table with the column "matches"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "assumed"}
 """Words for the origin of a fact on a file."""
+FILE_REMARK_CODES = "hit-left-out", "units-differ"
+"""Codes of remarks on single hits and files, each of which is shown in full."""
 NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
@@ -171,14 +173,17 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
     shown = sort_modes(file_modes.fitted, rejected=everything)
     trusted = [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]
     remarks = mode_remark_lines if everything else grouped_remark_lines
+    of_files = [remark for remark in file_modes.remarks if remark.code in FILE_REMARK_CODES]
+    others = [remark for remark in file_modes.remarks if remark not in of_files]
     texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
+        *map(str, merge_remarks(of_files)),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),
         *trust_reasons(shown),
         *mode_notes(shown if everything else trusted),
-        *remarks(shown, file_modes.remarks),
+        *remarks(shown, others),
     ]
     if file_modes.frf is not None:
         heading = "for comparison, peak picking by eqs. (28) and (29) of Gaber & Hashemi:"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.files.contents.column_headings import assign_columns
+from acquisition.files.contents.column_headings import assign_columns, infer_role
 from acquisition.files.contents.contents import Description, ImportReport, Signal
 from acquisition.files.contents.resolve_hits import infer_kind
 
@@ -35,6 +35,14 @@ def suggest_axes(shape: Sequence[int]) -> tuple[str, ...]:
     others = [axis for axis in range(len(shape)) if axis != samples]
     channels = min(reversed(others), key=lambda axis: shape[axis])
     return tuple("samples" if axis == samples else "channels" if axis == channels else "hits" for axis in range(3))
+
+
+def suggest_columns(signals: Sequence[Signal]) -> str:
+    """Return an example of `Description.columns` for the signals of a hit: by their names, else a force first."""
+    words = {"time": "time [s]", "force": "force [N]", "response": "acceleration [g]"}
+    roles = [infer_role(re.split(r"[/.]", signal.name)[-1], signal.unit) for signal in signals]
+    free = iter([role for role in ("force", "response") if role not in roles])
+    return ",".join(words[role] if role in words else words.get(next(free, ""), "-") for role in roles)
 
 
 def find_stack(signals: Sequence[Signal]) -> Signal | None:
@@ -146,8 +154,8 @@ class NamedHits(NamedTuple):
     """Signals of all hits."""
     channels: Mapping[str, str]
     """Name of the channel of each other signal."""
-    is_sure: bool
-    """True if a word for a hit is in the names."""
+    is_named: bool
+    """True if a word for a hit or a group is in the names."""
 
     def count_complete(self, *, needs_force: bool) -> int:
         """Count the hits with a response, and with one force where one is needed; unknown kinds may be it."""
@@ -185,7 +193,12 @@ def _group_by_name(signals: Sequence[Signal], split: _Split) -> NamedHits:
             channels[signal.name] = channel
         else:
             shared.append(signal)
-    return NamedHits([*hits.values()], shared, channels, split is _SPLITS[0])
+    groups = {channel.rpartition("/")[0] for channel in channels.values()}
+    common = f"{groups.pop()}/" if len(groups) == 1 else ""  # which says nothing without its number
+    short = {channel: channel.removeprefix(common) for channel in channels.values()}
+    named = [[replace(signal, name=short[signal.name]) for signal in hit] for hit in hits.values()]
+    channels = {name: short[channel] for name, channel in channels.items()}
+    return NamedHits(named, shared, channels, split in _SPLITS[:2])
 
 
 def _split_record(record: Signals, description: Description) -> list[HitSignals]:

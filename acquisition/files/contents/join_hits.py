@@ -1,5 +1,6 @@
 """Join hits from several records or files into one tap test."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,14 +10,16 @@ from acquisition.errors import Remark
 from acquisition.hit import Hit
 from acquisition.hits.capture_hits import MIN_LAST_HIT_SHARE
 
+HIT_LEFT_OUT_CODE = "hit-left-out"
+"""Code of the remark on a hit that a tap test is averaged without."""
+_CURE = "Record and export all hits of a tap test with the same settings"
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
 
 
-def make_left_out_remark(place: str, text: str) -> Remark:
+def make_left_out_remark(place: str, fault: str, cure: str = "") -> Remark:
     """Make the remark on a hit or a file that a tap test is averaged without."""
-    cure = "The tap test does without. Correct the file to use it"
-    return Remark("hit-left-out", place, text.rstrip("."), cure)
+    return Remark(HIT_LEFT_OUT_CODE, place, f"not used: {fault.rstrip('.')}", cure)
 
 
 def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
@@ -27,13 +30,14 @@ def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
     """
     rate, has_force = _choose_most_frequent_rate(hits), 2 * sum(hit.has_force for hit in hits.values()) >= len(hits)
     faults = {place: _find_difference(hit, rate, has_force) for place, hit in hits.items()}
+    faults |= _find_repeated(hits)
     sizes = [hit.acceleration.size for place, hit in hits.items() if not faults[place]]
     least = MIN_LAST_HIT_SHARE * float(np.median(sizes))
     for place, hit in hits.items():
         if hit.acceleration.size < least and not faults[place]:
-            faults[place] = f"{hit.acceleration.size} samples are less than half of the other hits"
+            faults[place] = f"{hit.acceleration.size} samples are less than half of the median ({np.median(sizes):g})"
     used = [hit for place, hit in hits.items() if not faults[place]]
-    remarks = [make_left_out_remark(place, fault) for place, fault in faults.items() if fault]
+    remarks = [make_left_out_remark(place, fault, _CURE) for place, fault in faults.items() if fault]
     n, channels = min(hit.acceleration.size for hit in used), {hit.channels for hit in used}
     before = {hit.pre_trigger for hit in used}
     return [_cut(hit, n, before.pop() if len(before) == 1 else 0, len(channels) == 1) for hit in used], remarks
@@ -54,6 +58,14 @@ def _find_difference(hit: Hit, rate: float, has_force: bool) -> str:
     if hit.has_force != has_force:
         return "no force, unlike the other hits" if has_force else "a force, unlike the other hits"
     return ""
+
+
+def _find_repeated(hits: Mapping[str, Hit]) -> dict[str, str]:
+    """Return the hits that are copies of an earlier one, with this finding."""
+    by_digest: dict[bytes, str] = {}
+    digests = {place: hashlib.sha256(hit.signals.tobytes()).digest() for place, hit in hits.items()}
+    originals = {place: by_digest.setdefault(digest, place) for place, digest in digests.items()}
+    return {place: f"same samples as {first}" for place, first in originals.items() if place != first}
 
 
 def _cut(hit: Hit, n: int, before: int, keeps_codes: bool) -> Hit:

@@ -1,6 +1,6 @@
 """Join the recordings of several files into one tap test."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from acquisition.errors import Remark, join_sentences
@@ -8,6 +8,9 @@ from acquisition.files.contents.contents import Fact
 from acquisition.files.contents.join_hits import join_hits, make_left_out_remark
 from acquisition.files.contents.recording import Recording
 from acquisition.hit import Hit
+
+_UNIT_FACTS = ("force", "unit")
+"""Names of the facts with the units of force and response."""
 
 
 def join_recordings(recordings: Sequence[Recording]) -> Recording:
@@ -23,7 +26,7 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
     for recording in recordings:
         name = recording.path.name
         if recording.hits:
-            remarks += [replace(remark, about=f"{name}, {remark.about}") for remark in recording.remarks]
+            remarks += recording.remarks
             hits |= _name_hits(recording, name, hits)
         else:
             remarks.append(make_left_out_remark(name, _reject_frf(recording).problems))
@@ -34,7 +37,18 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
     created = min((recording.created for recording in usable if recording.created), default=None)
     problems = join_sentences(*_list_contradictions(usable))
     together = replace(usable[0], created=created, facts=(*facts, n_files, n_hits), problems=problems)
-    return replace(together, hits=() if problems else tuple(joined), remarks=(*remarks, *differing))
+    remarks += [*differing, *_compare_units(usable)]
+    return replace(together, hits=() if problems else tuple(joined), remarks=tuple(remarks))
+
+
+def _compare_units(usable: Sequence[Recording]) -> Iterator[Remark]:
+    """Yield a remark on each file with another unit than most of them."""
+    units = [tuple(fact.value for fact in recording.facts if fact.name in _UNIT_FACTS) for recording in usable]
+    usual = max(units, key=units.count)
+    for recording, unit in zip(usable, units, strict=True):
+        if unit != usual:
+            text = f"converted from {', '.join(unit)} instead of {', '.join(usual)} as in the other files"
+            yield Remark("units-differ", recording.path.name, text, "Check the units in this file")
 
 
 def _name_hits(recording: Recording, name: str, earlier: dict[str, Hit]) -> dict[str, Hit]:

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from acquisition.errors import DataError, Remark, join_sentences
+from acquisition.errors import DataError, Remark
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
 from acquisition.files.contents.contents import Contents, Description, Fact, ImportReport, Signal, parse_time_constant
 from acquisition.files.contents.hit_layouts import (
@@ -17,7 +17,9 @@ from acquisition.files.contents.hit_layouts import (
     find_stack,
     split_hits,
     suggest_axes,
+    suggest_columns,
 )
+from acquisition.files.contents.join_hits import HIT_LEFT_OUT_CODE
 from acquisition.files.contents.resolve_frf import FRF_COLUMNS_EXAMPLE, find_frf_candidates, resolve_frf
 from acquisition.files.contents.resolve_hits import HIT_COLUMNS_EXAMPLE, infer_kind, resolve_hits, resolve_test
 from acquisition.frf import Frf
@@ -64,6 +66,11 @@ class Recording:
     window: float | None = None
     """Time constant of the exponential window over the response (s); NaN if unknown, None without a window."""
 
+    @property
+    def n_found(self) -> int:
+        """Number of hits found, with those that are left out; 0 for an FRF."""
+        return len(self.hits) + sum(remark.code == HIT_LEFT_OUT_CODE for remark in self.remarks)
+
     def require_valid(self) -> Recording:
         """Return this recording; raise DataError with all missing facts and faults."""
         if self.problems:
@@ -76,8 +83,8 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
     report = ImportReport(description)
     found = _resolve_contents(contents, report)
     layout = None if description.axes or description.one_test else _infer_layout(contents, found, report)
-    if layout is not None and layout.axes:
-        report = _ask_for_axes(contents, layout, report)
+    if layout is not None:
+        report = _ask_for_layout(contents, layout, report)
     groups = () if description.one_test else contents.groups
     for noun, names in (("machines", contents.machines), ("groups", groups)):
         if len(names) > 1:
@@ -90,12 +97,12 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
         report.add_fact("window", window)
     for note in contents.notes:
         report.add_fact("note", note)
-    advice = _advise_one_test(contents, layout) if layout is not None and layout.one_test else ""
-    facts, problems = tuple(report.facts), join_sentences(report.format_problems(), advice)
+    facts, problems = tuple(report.facts), report.format_problems()
     hits = () if problems else tuple(found.hits)
     labels = contents.created, contents.tool, contents.direction
-    remarks, time_constant = tuple(report.remarks), parse_time_constant(window)
-    return Recording(path, title, hits, found.frf, facts, problems, *labels, remarks=remarks, window=time_constant)
+    remarks = tuple(replace(remark, about=f"{path.name}, {remark.about}") for remark in report.remarks)
+    recording = Recording(path, title, hits, found.frf, facts, problems, *labels, remarks=remarks)
+    return replace(recording, window=parse_time_constant(window))
 
 
 class _Resolved(NamedTuple):
@@ -141,14 +148,19 @@ def _resolve_test(found: Sequence[HitSignals], report: ImportReport) -> list[Hit
     """Return the hits of one tap test."""
     _reject_frf_fields(report)
     first = found[0]
-    if first.report.is_clean and not any(map(infer_kind, first.signals)):
-        names = format_signal_names(first.signals)
-        ignored = ["-"] * (len(first.signals) - 2)
-        example = ",".join(["force [N]", "acceleration [g]", *ignored])
-        report.add_missing(f"meaning of the columns {names} of each hit", "columns", f' "{example}"')
-        if not any(signal.rate for signal in first.signals):
+    if first.report.is_clean and not _has_known_kinds(first.signals, report.description):
+        names, example = format_signal_names(first.signals), f' "{suggest_columns(first.signals)}"'
+        report.add_missing(f"meaning of the columns {names} of each hit", "columns", example)
+        if not any(signal.rate or signal.role == "time" for signal in first.signals):
             report.add_missing("sample rate if no column is the time", "rate", " 51200")
     return [] if report.missing else resolve_test(found, report)
+
+
+def _has_known_kinds(signals: Sequence[Signal], description: Description) -> bool:
+    """Return whether the kinds of the needed channels are known, or no channel of unknown kind can be one of them."""
+    kinds = [infer_kind(signal) for signal in signals if signal.role != "time"]
+    needed = {"response"} if description.without_force else {"force", "response"}
+    return needed <= set(kinds) or "" not in kinds
 
 
 def _infer_layout(contents: Contents, found: _Resolved, report: ImportReport) -> Description | None:
@@ -158,35 +170,25 @@ def _infer_layout(contents: Contents, found: _Resolved, report: ImportReport) ->
         return None
     if stack is not None and stack.array is not None and (not found.hits or infer_kind(stack)):
         return replace(report.description, axes=suggest_axes(stack.array.shape))
-    if not report.is_clean and _find_sure_hits(contents.signals, report.description):
-        return replace(report.description, one_test=True)
-    return None
+    named = find_named_hits(contents.signals, needs_force=not report.description.without_force)
+    is_hint = named is not None and (named.is_named or any(map(infer_kind, named.hits[0])))
+    return replace(report.description, one_test=True) if is_hint and not report.is_clean else None
 
 
-def _ask_for_axes(contents: Contents, layout: Description, report: ImportReport) -> ImportReport:
-    """Return a report with the missing order of axes, and what else is missing if it is the likely one."""
-    arrays = {one.name.rpartition(":")[0]: one.array for one in contents.signals if one.array is not None}
-    shapes = (f"{name} ({' x '.join(map(str, array.shape))})" for name, array in arrays.items() if array.ndim > 2)
+def _ask_for_layout(contents: Contents, layout: Description, report: ImportReport) -> ImportReport:
+    """Return a report with the layout of the hits as the missing fact, and what else is missing with it."""
     asked, trial = ImportReport(report.description), ImportReport(layout)
-    asked.add_missing(f"order of the axes of {', '.join(shapes)}", "axes", f" {','.join(layout.axes)}")
     _resolve_contents(contents, trial)
+    if layout.axes:
+        arrays = {one.name.rpartition(":")[0]: one.array for one in contents.signals if one.array is not None}
+        shapes = (f"{name} ({' x '.join(map(str, array.shape))})" for name, array in arrays.items() if array.ndim > 2)
+        asked.add_missing(f"order of the axes of {', '.join(shapes)}", "axes", f" {','.join(layout.axes)}")
+    else:
+        asked.add_missing("use of all hits of the file as one tap test", "one_test")
+        asked.missing[0] += "".join(f", or {choice}," for choice in report.missing[:1])
+        asked.faults += [] if report.missing else report.faults
     asked.merge(trial)
     return asked
-
-
-def _advise_one_test(contents: Contents, layout: Description) -> str:
-    """Return the advice to use the hits of a file as one tap test, with what else is missing for that."""
-    trial, n_hits = ImportReport(layout), len(_find_sure_hits(contents.signals, layout))
-    _resolve_contents(contents, trial)
-    advice = f"For one tap test of the {n_hits} hits in groups or numbered channels, give Description.one_test"
-    return join_sentences(f"{advice} ({problems})" if (problems := trial.format_problems()) else advice)
-
-
-def _find_sure_hits(signals: Sequence[Signal], description: Description) -> Sequence[Sequence[Signal]]:
-    """Return hits by their names; empty if nothing shows that they are hits."""
-    named = find_named_hits(signals, needs_force=not description.without_force)
-    is_sure = named is not None and (named.is_sure or any(infer_kind(signal) for signal in named.hits[0]))
-    return named.hits if named is not None and is_sure else ()
 
 
 def _holds_frf(signals: Sequence[Signal]) -> bool:

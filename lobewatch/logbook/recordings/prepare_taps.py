@@ -107,7 +107,7 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
         and all(isinstance(fact, str) for fact in answer.assumed_facts)
-        and answer.count == HitCount(len(tap.hits) + len(answer.remarks), len(tap.accepted))
+        and answer.count.used == len(tap.accepted) <= len(tap.hits) <= answer.count.found
         and all(isinstance(remark, Remark) for remark in answer.remarks)
     )
 
@@ -173,7 +173,7 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     tap, recording, fit = interpret_content(context, file, description, content, at)
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
-    count = HitCount(len(tap.hits) + len(recording.remarks), len(tap.accepted))
+    count = HitCount(recording.n_found, len(tap.accepted))
     entry, created = TapEntry.of(tap, packed), tap.circumstances.created
     return TapDraft(digest, packed, entry, created, fit, defaults, count, recording.remarks)
 

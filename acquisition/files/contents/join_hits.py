@@ -12,7 +12,7 @@ from acquisition.hits.capture_hits import MIN_LAST_HIT_SHARE
 
 HIT_LEFT_OUT_CODE = "hit-left-out"
 """Code of the remark on a hit that a tap test is averaged without."""
-_CURE = "Record and export all hits of a tap test with the same settings"
+_CURE = "Record and export each hit of a tap test once, with the same settings"
 MAX_RATE_DIFFERENCE = 1e-4
 """Largest relative difference of equal sample rates: that of a rate with five digits."""
 

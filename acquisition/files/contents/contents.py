@@ -331,7 +331,7 @@ def format_window(time_constant: float | None) -> str:
     return "of unknown form" if math.isnan(time_constant) else f"exponential {time_constant!r} s"
 
 
-MAX_ARRAY_COLUMNS = 64
+MAX_ARRAY_COLUMNS = 1024
 """Largest number of columns of an array that become signals."""
 MIN_FRF_LINES = 8
 """Smallest number of complex values of an FRF; fewer are poles."""

@@ -29,11 +29,17 @@ _BORDER = re.compile(r"^[\s_.:/#-]+|[\s_.:#-]+(?=[/.]|$)|/$")
 """Signs that are left where a number is taken out of a name."""
 
 
-def suggest_axes(shape: Sequence[int]) -> tuple[str, ...]:
-    """Return the likely axes of an array: most samples, and fewer channels than hits."""
-    samples = int(np.argmax(shape))
-    others = [axis for axis in range(len(shape)) if axis != samples]
-    channels = min(reversed(others), key=lambda axis: shape[axis])
+def suggest_axes(array: NDArray[Any]) -> tuple[str, ...]:
+    """Return the likely axes of an array: most samples, and channels along the axis where the crest factor differs.
+
+    A force is a short pulse in every hit, a response is not.
+    """
+    samples = int(np.argmax(array.shape))
+    others = [axis for axis in range(3) if axis != samples]
+    peaks, levels = np.max(np.abs(array), axis=samples), np.std(array, axis=samples)
+    crest = np.nan_to_num(np.log((peaks + np.finfo(float).tiny) / (levels + np.finfo(float).tiny)))
+    spreads = np.std(crest.mean(axis=1)), np.std(crest.mean(axis=0))
+    channels = others[int(np.argmax(spreads))]
     return tuple("samples" if axis == samples else "channels" if axis == channels else "hits" for axis in range(3))
 
 
@@ -47,8 +53,11 @@ def suggest_columns(signals: Sequence[Signal]) -> str:
 
 def find_stack(signals: Sequence[Signal]) -> Signal | None:
     """Return the first column of a real array of three axes, none of length 1; None without one."""
-    stacked = (signal for signal in signals if signal.array is not None and np.squeeze(signal.array).ndim > 2)
-    return next((signal for signal in stacked if not np.iscomplexobj(signal.array)), None)
+    for signal in signals:
+        array = signal.array
+        if array is not None and not np.iscomplexobj(array) and np.squeeze(array).ndim > 2:
+            return signal
+    return None
 
 
 class HitSignals(NamedTuple):

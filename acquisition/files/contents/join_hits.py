@@ -69,8 +69,7 @@ def _find_repeated(hits: Mapping[str, Hit]) -> dict[str, str]:
 
 
 def _cut(hit: Hit, n: int, before: int, keeps_codes: bool) -> Hit:
-    codes = hit.codes[:, :n] if keeps_codes and hit.codes is not None else None
-    force, acceleration = hit.force[:n], hit.acceleration[:n]
-    channels = hit.channels if keeps_codes else None
-    changed = {"force": force, "acceleration": acceleration, "codes": codes, "channels": channels}
-    return replace(hit, **changed, pre_trigger=before, cross_hit=None)
+    part = replace(hit, force=hit.force[:n], acceleration=hit.acceleration[:n], pre_trigger=before, cross_hit=None)
+    if keeps_codes and hit.codes is not None:
+        return replace(part, codes=hit.codes[:, :n])
+    return replace(part, codes=None, channels=hit.channels if keeps_codes else None)

@@ -12,6 +12,7 @@ from acquisition.errors import DataError, Remark
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
 from acquisition.files.contents.contents import Contents, Description, Fact, ImportReport, Signal, parse_time_constant
 from acquisition.files.contents.hit_layouts import (
+    AXES,
     HitSignals,
     find_named_hits,
     find_stack,
@@ -169,7 +170,11 @@ def _infer_layout(contents: Contents, found: _Resolved, report: ImportReport) ->
     if found.frf is not None or _holds_frf(found.signals):
         return None
     if stack is not None and stack.array is not None and (not found.hits or infer_kind(stack)):
-        return replace(report.description, axes=suggest_axes(stack.array.shape))
+        if stack.array.ndim > len(AXES):
+            fault = f"{_format_array(stack)} has {stack.array.ndim} axes"
+            report.add_fault(fault, "Save an array with only the axes hits, channels and samples")
+            return None
+        return replace(report.description, axes=suggest_axes(stack.array))
     named = find_named_hits(contents.signals, needs_force=not report.description.without_force)
     is_hint = named is not None and (named.is_named or any(map(infer_kind, named.hits[0])))
     return replace(report.description, one_test=True) if is_hint and not report.is_clean else None
@@ -180,15 +185,22 @@ def _ask_for_layout(contents: Contents, layout: Description, report: ImportRepor
     asked, trial = ImportReport(report.description), ImportReport(layout)
     _resolve_contents(contents, trial)
     if layout.axes:
-        arrays = {one.name.rpartition(":")[0]: one.array for one in contents.signals if one.array is not None}
-        shapes = (f"{name} ({' x '.join(map(str, array.shape))})" for name, array in arrays.items() if array.ndim > 2)
-        asked.add_missing(f"order of the axes of {', '.join(shapes)}", "axes", f" {','.join(layout.axes)}")
+        stacks = [one for one in contents.signals if one.array is not None and one.array.ndim == len(AXES)]
+        names = ", ".join(dict.fromkeys(map(_format_array, stacks)))
+        asked.add_missing(f"order of the axes of {names}", "axes", f" {','.join(layout.axes)}")
     else:
         asked.add_missing("use of all hits of the file as one tap test", "one_test")
         asked.missing[0] += "".join(f", or {choice}," for choice in report.missing[:1])
         asked.faults += [] if report.missing else report.faults
     asked.merge(trial)
     return asked
+
+
+def _format_array(column: Signal) -> str:
+    """Return the name and the shape of the array of a column."""
+    return (
+        f"{column.name.rpartition(':')[0]} ({' x '.join(map(str, () if column.array is None else column.array.shape))})"
+    )
 
 
 def _holds_frf(signals: Sequence[Signal]) -> bool:

@@ -67,7 +67,7 @@ class TapDraft(NamedTuple):
     """Fitted modes."""
     assumed_facts: tuple[str, ...]
     """Defaults assumed for facts that the file does not state."""
-    count: HitCount
+    hit_count: HitCount
     """Number of hits found and used."""
     remarks: tuple[Remark, ...]
     """Remarks on hits and files that are left out."""
@@ -107,7 +107,7 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
         and all(isinstance(fact, str) for fact in answer.assumed_facts)
-        and answer.count.used == len(tap.accepted) <= len(tap.hits) <= answer.count.found
+        and answer.hit_count.used == len(tap.accepted) <= len(tap.hits) <= answer.hit_count.found
         and all(isinstance(remark, Remark) for remark in answer.remarks)
     )
 

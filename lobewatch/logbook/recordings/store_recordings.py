@@ -156,7 +156,7 @@ def store_recordings(
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
     tap_ids = [used[file] for file in files if file in used]
-    counts = {tap.entry.id: tap.count for tap in ready}
+    counts = {tap.entry.id: tap.hit_count for tap in ready}
     remarks = [*chain.from_iterable(tap.remarks for tap in ready), *find_one_hit_tests(ready)]
     return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, counts, remarks)
 
@@ -170,7 +170,7 @@ def find_one_hit_tests(stored: Sequence[TapDraft]) -> list[Remark]:
     series = {(tap.entry.tool, tap.entry.direction) for tap in stored}
     times = sorted(tap.created for tap in stored)
     is_close = all(later - earlier <= MAX_HIT_PAUSE for earlier, later in pairwise(times))
-    if len(stored) < 2 or len(series) > 1 or not is_close or any(tap.count.found != 1 for tap in stored):
+    if len(stored) < 2 or len(series) > 1 or not is_close or any(tap.hit_count.found != 1 for tap in stored):
         return []
     text = f"{len(stored)} files with one hit each became {len(stored)} tap tests"
     cure = "If they are hits of one tap test, exclude these tests and replay the files with Description.one_test"

@@ -212,7 +212,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     """
     path = Path(path)
     file_format = detect_format(path)
-    if file_format.read_frf is not None:
+    if file_format.read_frf is not None and not description.hit_files:
         return file_format.read_frf(path)
     recording = read_recording(path, description)
     if isinstance(recording, Frf):

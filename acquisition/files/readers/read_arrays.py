@@ -5,6 +5,7 @@ import re
 import struct
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -76,7 +77,9 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
 
 def read_hdf5(path: Path) -> Contents:
     """Read the data sets of an HDF5 file by their paths; raise DataError for damage or unpacking out of proportion."""
-    return _make_array_contents(read_mat_variables(path))
+    contents = _make_array_contents(read_mat_variables(path))
+    signals = (one if one.array is None else replace(one, array=one.array.T) for one in contents.signals)
+    return replace(contents, signals=tuple(signals))  # arrays were transposed as those of MATLAB
 
 
 def _make_array_contents(variables: Mapping[str, Any]) -> Contents:

@@ -78,8 +78,9 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
 def read_hdf5(path: Path) -> Contents:
     """Read the data sets of an HDF5 file by their paths; raise DataError for damage or unpacking out of proportion."""
     contents = _make_array_contents(read_mat_variables(path))
-    signals = (one if one.array is None else replace(one, array=one.array.T) for one in contents.signals)
-    return replace(contents, signals=tuple(signals))  # arrays were transposed as those of MATLAB
+    in_file = {id(one.array): one.array.T for one in contents.signals if one.array is not None}  # not as in MATLAB
+    signals = (replace(one, array=in_file.get(id(one.array))) for one in contents.signals)
+    return replace(contents, signals=tuple(signals))
 
 
 def _make_array_contents(variables: Mapping[str, Any]) -> Contents:

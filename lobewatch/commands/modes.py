@@ -13,6 +13,7 @@ from lobewatch.show.terminal.output import Json, emit
 from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
+    from lobewatch.measurement import FileModes
     from modal import ModeEdits
 
 
@@ -82,7 +83,6 @@ def modes(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import read_tap_modes
-    from lobewatch.logbook.recordings.recorded_files import find_recordings
     from lobewatch.machine.settings.setup_tables import SensorLoading
     from lobewatch.measurement import Window, fit_file_modes, list_comparison_files, match_modes_across_files
     from lobewatch.notify.publish_status import publish_on_change
@@ -92,11 +92,7 @@ def modes(
     if beside is not None and len(beside) == 1:
         raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
-    if file_options.one_test:
-        file, *hit_files = find_recordings([file, *(names or ())])[0]
-        tap = ""
-    else:
-        tap, hit_files = _get_tap_name(names or ()), []
+    file, tap, hit_files = _resolve_names(file, names or (), one_test=file_options.one_test)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
@@ -109,7 +105,7 @@ def modes(
         text = "--by-fit needs a stored tap test" if by_fit else f"{file} is a folder"
         raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
     else:
-        said = file_options.description(averages=averages, without_force=hammer == "none", hit_files=tuple(hit_files))
+        said = file_options.description(averages=averages, without_force=hammer == "none", hit_files=hit_files)
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
@@ -120,19 +116,28 @@ def modes(
     if beside:
         file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:
-        from lobewatch.show.figures.drawing import save_figure
-        from lobewatch.show.figures.spindle_figures import plot_modes
-
-        save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
+        _save_figure(file_modes, file.name, figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
 
 
-def _get_tap_name(names: Sequence[str]) -> str:
-    """Return the tap test among the names behind FILE, empty without one."""
+def _resolve_names(file: Path, names: Sequence[str], *, one_test: bool) -> tuple[Path, str, tuple[Path, ...]]:
+    """Return the file or folder, the tap test of the folder, and the further files of one tap test."""
+    from lobewatch.logbook.recordings.recorded_files import find_recordings
+
+    if one_test:
+        first, *others = find_recordings([file, *names])[0]
+        return first, "", tuple(others)
     if len(names) > 1:
         text = f"{len(names) + 1} files. Give --one-test if they are hits of one tap test, or name a single file"
         raise ValueError(f"{text}, or a machine folder and one tap test.")
-    return names[0] if names else ""
+    return file, names[0] if names else "", ()
+
+
+def _save_figure(file_modes: "FileModes", name: str, figure: Path) -> None:
+    from lobewatch.show.figures.drawing import save_figure
+    from lobewatch.show.figures.spindle_figures import plot_modes
+
+    save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, name), figure)
 
 
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":

@@ -54,7 +54,7 @@ def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
     axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == parts[0].record]
     used, axes = cut_to_shortest([*parts, *([coherence] if coherence else [])], axes, report)
     parts = used[: len(parts)]
-    _ask_for_level_and_angle(parts, axes, coherence, report)
+    _ask_for_level_and_angle(contents.signals, parts, report)
     values = report.attempt(_compute_complex_values, parts)
     unit = report.attempt(resolve_frf_unit, parts[0])
     frequency = report.attempt(_resolve_frequency, contents, parts, axes)
@@ -104,9 +104,7 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
     return np.asarray(size * np.exp(1j * phase))
 
 
-def _ask_for_level_and_angle(
-    parts: Sequence[Signal], axes: Sequence[Signal], coherence: Signal | None, report: ImportReport
-) -> None:
+def _ask_for_level_and_angle(signals: Sequence[Signal], parts: Sequence[Signal], report: ImportReport) -> None:
     """Ask for the unit of a phase, and of a magnitude that is probably a level, in one message."""
     if parts[0].role != "magnitude" or len(parts) < 2:
         return
@@ -114,17 +112,15 @@ def _ask_for_level_and_angle(
     may_be_level = not is_decibel(size.unit) and bool(np.any(size.values < 0))
     asked = [f"unit of column {size.name!r}, probably dB because it has negative values"] if may_be_level else []
     asked += [] if phase.unit.lower() in ANGLE_UNITS else ["unit of the phase"]
-    if asked:
-        word = "db" if may_be_level or is_decibel(size.unit) else "magnitude"
-        likely = "deg" if np.ptp(phase.values) > 2 * math.pi else "rad"
-        angle = phase.unit if phase.unit.lower() in ANGLE_UNITS else likely
-        words = [
-            *(f"frequency={axis.name}" for axis in axes[:1]),
-            f"{word}={size.name}",
-            f"phase [{angle}]={phase.name}",
-        ]
-        words += [f"coherence={coherence.name}"] if coherence else []
-        report.add_missing(" and ".join(asked), "columns", f' "{",".join(words)}"')
+    if not asked:
+        return
+    likely = "deg" if np.ptp(phase.values) > 2 * math.pi else "rad"
+    angle = phase.unit if phase.unit.lower() in ANGLE_UNITS else likely
+    words = {"magnitude": "db" if may_be_level or is_decibel(size.unit) else "magnitude", "phase": f"phase [{angle}]"}
+    used = [one for one in signals if one.role in ("frequency", "coherence") or one.name in (size.name, phase.name)]
+    in_order = len(used) == len(signals) and not any(word == "-" or "=" in word for word in report.description.columns)
+    columns = (words.get(one.role, one.role) + ("" if in_order else f"={one.name}") for one in used)
+    report.add_missing(" and ".join(asked), "columns", f' "{",".join(columns)}"')
 
 
 def _is_same_unit(one: str, other: str) -> bool:

@@ -84,6 +84,9 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     ('', 100)
     """
     if description.hit_files:
+        if description.force is not None:
+            cure = "Several files of one tap test need force and response in each of them."
+            raise DataError(f"Omit Description.force {description.force}. {cure}")
         alone = replace(description, hit_files=(), one_test=True)
         return join_recordings([_try_inspect(file, alone) for file in (Path(path), *description.hit_files)])
     path = Path(path)

@@ -354,7 +354,9 @@ def list_comparison_files(
         Path and missing data of each measurement.
     """
     return [
-        (file, replace(description, response=int(text))) if text.isdecimal() else (Path(text), description)
+        (file, replace(description, response=int(text)))
+        if text.isdecimal()
+        else (Path(text), replace(description, hit_files=()))
         for text in beside
     ]
 

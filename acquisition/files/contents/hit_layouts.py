@@ -166,6 +166,11 @@ class NamedHits(NamedTuple):
     is_named: bool
     """True if a word for a hit or a group is in the names."""
 
+    @property
+    def is_likely(self) -> bool:
+        """True if the names or the kinds of the channels show that these are hits."""
+        return self.is_named or any(map(infer_kind, self.hits[0]))
+
     def count_complete(self, *, needs_force: bool) -> int:
         """Count the hits with a response, and with one force where one is needed; unknown kinds may be it."""
         kinds = ([infer_kind(signal) for signal in hit if signal.role != "time"] for hit in self.hits)

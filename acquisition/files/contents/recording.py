@@ -175,9 +175,11 @@ def _infer_layout(contents: Contents, found: _Resolved, report: ImportReport) ->
             report.add_fault(fault, "Save an array with only the axes hits, channels and samples")
             return None
         return replace(report.description, axes=suggest_axes(stack.array))
+    if report.is_clean:
+        return None
     named = find_named_hits(contents.signals, needs_force=not report.description.without_force)
-    is_hint = named is not None and (named.is_named or any(map(infer_kind, named.hits[0])))
-    return replace(report.description, one_test=True) if is_hint and not report.is_clean else None
+    may_be_hits = named is not None and (named.is_likely or not report.description.columns)
+    return replace(report.description, one_test=True) if may_be_hits else None
 
 
 def _ask_for_layout(contents: Contents, layout: Description, report: ImportReport) -> ImportReport:

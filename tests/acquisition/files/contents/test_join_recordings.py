@@ -93,6 +93,11 @@ def test_a_copy_of_a_hit_does_not_count_twice(files: list[Path], tmp_path: Path)
     assert left_out(joined) == ["copy.csv, hit 1"]
 
 
+def test_a_file_of_the_force_cannot_belong_to_several_files(files: list[Path]) -> None:
+    with pytest.raises(DataError, match=r"Description\.force"):
+        join(files[:2], force=files[2])
+
+
 def test_frfs_and_missing_files_are_no_hits(files: list[Path], tmp_path: Path) -> None:
     frf = tmp_path / "frf.csv"
     convert(files[0], frf, Description())
@@ -138,10 +143,11 @@ def test_tap_files_of_lobewatch_are_joined_too(tmp_path: Path) -> None:
 
 
 def test_the_rate_of_most_hits_counts() -> None:
-    hits = {str(k): Hit(*HITS[k], RATE * (2 if k in (0, 3) else 1)) for k in range(5)}
+    hits = {str(k): Hit(HITS[k, 0], HITS[k, 1], RATE * (2 if k in (0, 3) else 1)) for k in range(5)}
     joined, remarks = join_hits(hits)
     assert [hit.sample_rate for hit in joined] == [RATE] * 3
     assert [remark.about for remark in remarks] == ["0", "3"]
-    odd = {"a": Hit(np.empty(0), HITS[0, 1], RATE), "b": Hit(*HITS[1], RATE), "c": Hit(*HITS[2], RATE * 1.00001)}
+    odd = {name: Hit(HITS[k, 0], HITS[k, 1], RATE * (1 + 1e-5 * k)) for k, name in enumerate("abc")}
+    odd["a"] = Hit(np.empty(0), HITS[0, 1], RATE)
     joined, remarks = join_hits(odd)
     assert (len(joined), [remark.about for remark in remarks]) == (2, ["a"])

@@ -67,9 +67,9 @@ class TapDraft(NamedTuple):
     """Fitted modes."""
     assumed_facts: tuple[str, ...]
     """Defaults assumed for facts that the file does not state."""
-    hit_count: HitCount
+    hit_count: HitCount = HitCount(0, 0)
     """Number of hits found and used."""
-    remarks: tuple[Remark, ...]
+    remarks: tuple[Remark, ...] = ()
     """Remarks on hits and files that are left out."""
 
 
@@ -175,7 +175,7 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
     count = HitCount(recording.n_found, len(tap.accepted))
     entry, created = TapEntry.of(tap, packed), tap.circumstances.created
-    return TapDraft(digest, packed, entry, created, fit, defaults, count, recording.remarks)
+    return TapDraft(digest, packed, entry, created, fit, defaults, hit_count=count, remarks=recording.remarks)
 
 
 def interpret_content(

@@ -158,7 +158,9 @@ def store_recordings(
     tap_ids = [used[file] for file in files if file in used]
     counts = {tap.entry.id: tap.hit_count for tap in ready}
     remarks = [*chain.from_iterable(tap.remarks for tap in ready), *find_one_hit_tests(ready)]
-    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, counts, remarks)
+    return ReplayOutcome(
+        tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, hit_counts=counts, remarks=remarks
+    )
 
 
 MAX_HIT_PAUSE = timedelta(hours=1)

@@ -64,10 +64,10 @@ def test_every_file_that_cannot_be_used_is_named_and_the_rest_is_used(files: lis
 
 
 def test_files_in_different_units_are_converted_and_named(files: list[Path]) -> None:
-    put_hit(files[3], HITS[3] / np.array([[1.0], [9.80665]]), "time [s],force [N],acceleration [g]")
+    put_hit(files[5], HITS[5] / np.array([[1.0], [9.80665]]), "time [s],force [N],acceleration [g]")
     joined = join(files).require_valid()
     assert np.array([hit.signals for hit in joined.hits]) == pytest.approx(HITS, abs=1e-7)
-    assert [(remark.code, remark.about) for remark in joined.remarks] == [("units-differ", "hit 4.csv")]
+    assert [(remark.code, remark.about) for remark in joined.remarks] == [("units-differ", "hit 6.csv")]
     unknown = put_hit(files[1], HITS[1], "time [s],force [N],acceleration")
     assert left_out(join(files)) == [unknown.name]
 

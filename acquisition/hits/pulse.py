@@ -47,7 +47,8 @@ def find_pulse(hit: Hit) -> Pulse | None:
         return None
     top = int(np.argmax(hit.force))
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    offset, rms = float(np.mean(quiet)), float(np.std(quiet))
+    offset = float(np.mean(quiet))
+    rms = float(np.sqrt(np.mean((quiet - offset) ** 2)))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None

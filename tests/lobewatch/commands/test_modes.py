@@ -189,13 +189,13 @@ def test_figure_draws_phase_coherence_and_the_peaks_that_the_modes_miss() -> Non
     top, *_, phase, coherence = plot_modes(state, modes, "x").axes
     assert [line for line in top.lines if line.get_marker() == "v"] == []
     assert coherence.lines[0].get_ydata() == pytest.approx(0.95)
-    measured, fitted = (line.get_xydata() for line in phase.lines[:2])
+    measured, fitted = (np.asarray(line.get_xydata()) for line in phase.lines[:2])
     assert np.interp(900.0, *measured.T) == pytest.approx(90.0, abs=5.0)
     assert np.interp(900.0, *fitted.T) == pytest.approx(np.interp(900.0, *measured.T), abs=0.5)
     (marks,) = (line for line in plot_modes(state, modes[:1], "x").axes[0].lines if line.get_marker() == "v")
-    ((frequency, size),) = marks.get_xydata()
+    ((frequency, size),) = np.asarray(marks.get_xydata()).tolist()
     assert frequency == pytest.approx(1722.0, rel=0.02)
-    assert size == pytest.approx(abs(np.interp(frequency, LINES, exact.accelerance)))
+    assert size == pytest.approx(np.interp(frequency, LINES, np.abs(exact.accelerance)))
     assert f"{frequency:.0f}" in str(marks.get_label())
 
 

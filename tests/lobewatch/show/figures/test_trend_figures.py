@@ -121,12 +121,12 @@ def test_the_fit_and_the_peaks_that_it_misses_are_drawn_and_named() -> None:
     amplitude, phase, coherence = plot_frf(None, frf, (100.0, 1500.0), modes[:1], missed).axes
     _, fit, mark = amplitude.lines
     assert fit.get_ydata() == pytest.approx(1e9 * np.abs(modes[0].receptance(f)))
-    assert mark.get_xydata()[0] == pytest.approx(
+    assert np.asarray(mark.get_xydata())[0] == pytest.approx(
         [peak.frequency, 1e9 * abs(np.interp(peak.frequency, f, frf.receptance))]
     )
     assert f"{peak.frequency:.0f}" in str(mark.get_label())
     assert mark.get_marker() != "None"
-    assert np.interp(500.0, f, phase.lines[1].get_ydata()) == pytest.approx(-90.0, abs=0.5)
+    assert np.interp(500.0, f, np.asarray(phase.lines[1].get_ydata())) == pytest.approx(-90.0, abs=0.5)
     assert coherence.lines[0].get_ydata() == pytest.approx(0.97)
     assert plot_frf(None, frf, (100.0, 1500.0), modes).axes[0].lines[-1].get_marker() == "None"
 

@@ -1,17 +1,14 @@
 """Detect double hits in the force pulse and in the free decay."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from acquisition.arrays import Floats, find_median
 from acquisition.hits.pulse import Pulse
 
-Indices = NDArray[np.intp]
 DOUBLE_HIT_SHARE = 0.025
 """Height over the first pulse from which a second pulse makes a double hit; 3 % is found for any shape."""
 HEIGHT_NOISE_MARGIN = 3.0
@@ -54,22 +51,21 @@ def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
     span = width / step
     near = (np.array([pulse.start - width, pulse.end + width]) / step).astype(int)
     limit = NormalDist().inv_cdf(1 - PULSE_FALSE_ALARM_RATE / (force.size * len(PULSE_WIDTH_RATIOS)))
-    search = _BumpSearch(force, 1.4 * PULSE_WIDTH_RATIOS[-1] * span)
-    others = np.r_[: max(near[0], 0), near[1] : force.size]
     best = SecondPulse(0.0, 0.0)
-    for relative in PULSE_WIDTH_RATIOS if others.size >= BINS_PER_PULSE else ():
-        height, find_prominence = search.fit(1.4 * relative * span)
-        outside = height[others]
-        lowest = max(best.share, DOUBLE_HIT_SHARE / (1 + HEIGHT_NOISE_MARGIN / limit))  # of any noise
-        high = np.flatnonzero(outside > lowest * pulse.peak)
-        high = high[find_prominence(others[high]) > MIN_PULSE_PROMINENCE * outside[high]]
-        if not high.size:
+    for relative in PULSE_WIDTH_RATIOS:
+        heights = _fit_bump_heights(force, 1.4 * relative * span)
+        outside, rise = np.concatenate((heights[:, : max(near[0], 0)], heights[:, near[1] :]), axis=1)
+        if outside.size < BINS_PER_PULSE:
             continue
-        at = high[np.argmax(outside[high])]
-        share = float(outside[at]) / pulse.peak
-        noise = 1.4826 * find_median(np.abs(outside - find_median(outside)))
-        if outside[at] > limit * noise and share > DOUBLE_HIT_SHARE - HEIGHT_NOISE_MARGIN * noise / pulse.peak:
-            best = SecondPulse((int(others[at]) + 0.5) * step - pulse.peak_index, share)
+        standing = np.where(rise > MIN_PULSE_PROMINENCE * outside, outside, 0.0)
+        at = int(np.argmax(standing))
+        share = float(standing[at]) / pulse.peak
+        if share <= max(best.share, DOUBLE_HIT_SHARE / (1 + HEIGHT_NOISE_MARGIN / limit)):
+            continue  # whatever the noise is
+        noise = 1.4826 * float(np.median(np.abs(outside - np.median(outside))))
+        if standing[at] > limit * noise and share > DOUBLE_HIT_SHARE - HEIGHT_NOISE_MARGIN * noise / pulse.peak:
+            bin_ = at if at < near[0] else at - max(near[0], 0) + near[1]
+            best = SecondPulse((bin_ + 0.5) * step - pulse.peak_index, share)
     return best if best.share else None
 
 
@@ -84,33 +80,23 @@ def _remove_main_pulse(pulse: Pulse, width: int) -> Floats:
     return force
 
 
-class _BumpSearch:
-    """Search of a force for raised cosines up to a longest one (samples)."""
+def _fit_bump_heights(force: Floats, foot: float) -> Floats:
+    """Fit a raised cosine around every sample, shape (2, n).
 
-    def __init__(self, force: Floats, longest: float) -> None:
-        self._size, self._margin = force.size, int(np.ceil(1.5 * longest))
-        self._padded = np.pad(force, self._margin, mode="reflect")
-        self._sums = np.concatenate(([0.0], np.cumsum(self._padded)))
-
-    def fit(self, foot: float) -> tuple[Floats, Callable[[Indices], Floats]]:
-        """Fit a raised cosine of a width (samples) around every sample.
-
-        Return its least-squares heights, shape (n,), and the function of their prominence over the higher side.
-        """
-        half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
-        bump = 0.5 * (1 + np.cos(2 * np.pi * np.arange(-wing, wing + 1) / foot))
-        length, side, first = 2 * half + 1, half - wing, self._margin - half
-        mean = bump.sum() / length
-        centre = slice(self._margin - wing, self._margin + self._size + wing)
-        weighed = np.convolve(self._padded[centre], bump, "valid")
-        whole = self._sums[first + length :][: self._size] - self._sums[first:][: self._size]
-
-        def find_prominence(at: Indices) -> Floats:
-            before, after = (self._sums[at + begin + side] - self._sums[at + begin] for begin in (first, last))
-            return np.asarray(weighed[at] / bump.sum() - np.maximum(before, after) / side)
-
-        last = first + length - side
-        return (weighed - mean * whole) / (np.sum(bump**2) - length * mean**2), find_prominence
+    Rows: its least-squares height, and its prominence over the higher side. foot: width of the bump (samples).
+    """
+    half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
+    place = np.arange(-wing, wing + 1)
+    bump = 0.5 * (1 + np.cos(2 * np.pi * place / foot))
+    length, side = 2 * half + 1, half - wing
+    mean = bump.sum() / length
+    padded = np.pad(force, half, mode="reflect")
+    sums = np.concatenate(([0.0], np.cumsum(padded)))
+    weighed = np.convolve(padded[side : padded.size - side], bump, "valid")
+    parts = ((0, side), (length - side, length), (0, length))
+    left, right, whole = (sums[stop:][: force.size] - sums[start:][: force.size] for start, stop in parts)
+    height = (weighed - mean * whole) / (np.sum(bump**2) - length * mean**2)
+    return np.stack([height, weighed / bump.sum() - np.maximum(left, right) / side])
 
 
 PREDICTION_ORDER = 32

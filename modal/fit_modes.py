@@ -48,8 +48,8 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     Raises
     ------
     ValueError
-        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase, and hits
-        with other lines than the FRF or without a pulse.
+        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase or without any coherence,
+        and hits with other lines than the FRF or without a pulse.
 
     References
     ----------

@@ -9,7 +9,15 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
-from acquisition.files.contents.contents import Contents, Description, Fact, ImportReport, Signal, parse_time_constant
+from acquisition.files.contents.contents import (
+    MIN_FRF_LINES,
+    Contents,
+    Description,
+    Fact,
+    ImportReport,
+    Signal,
+    parse_time_constant,
+)
 from acquisition.files.contents.resolve_frf import FRF_COLUMNS_EXAMPLE, find_frf_candidates, resolve_frf
 from acquisition.files.contents.resolve_hits import HIT_COLUMNS_EXAMPLE, resolve_hits
 from acquisition.frf import Frf
@@ -58,6 +66,14 @@ class Recording:
         """Return this recording; raise DataError with all missing facts and faults."""
         if self.problems:
             raise DataError(f"{self.path}: {self.problems}")
+        return self
+
+    def require_measurable(self) -> Recording:
+        """Return this recording; raise DataError as `require_valid`, and for an FRF of too few lines for a mode."""
+        frf = self.require_valid().frf
+        if frf is not None and frf.frequency.size < MIN_FRF_LINES:
+            found = f"the FRF has {frf.frequency.size} lines, but a mode needs at least {MIN_FRF_LINES}"
+            raise DataError(f"{self.path}: {found}. Export more frequency lines.")
         return self
 
 

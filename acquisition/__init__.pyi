@@ -20,6 +20,7 @@ from .estimation.frf_corrections import (
     measure_time_after_hit,
     remove_sensor_mass,
 )
+from .estimation.response_delay import advance_response, remove_response_delay
 from .file_io import atomic_write
 from .files.contents.contents import Contents, Description, Fact, Format, Signal
 from .files.contents.recording import Recording
@@ -111,6 +112,7 @@ __all__ = [
     "TapsFaults",
     "TapsSource",
     "Trigger",
+    "advance_response",
     "apply_exponential_window",
     "atomic_write",
     "average_good_hits",
@@ -159,6 +161,7 @@ __all__ = [
     "read_recording",
     "read_tap",
     "read_tap_hits",
+    "remove_response_delay",
     "remove_sensor_mass",
     "sanitize_id_part",
     "scan_ports",

@@ -18,6 +18,7 @@ from .modes.measurement_effects import (
     with_mass_uncertainty,
 )
 from .modes.mode import Mode, synthesize_frf
+from .modes.response_delay import find_response_delay
 from .modes.mode_edits import ModeEdits, parse_mode_edits
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
@@ -45,6 +46,7 @@ __all__ = [
     "edit_modes",
     "extract_modes",
     "find_peaks_above_band",
+    "find_response_delay",
     "find_truncated_peaks",
     "find_unexplained_peaks",
     "fit_common_modes",

@@ -15,6 +15,7 @@ from modal.fitting.band_fit import BandFit
 from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
+from modal.quality.quantity_remarks import add_quantity_remarks
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
@@ -99,7 +100,7 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
-    return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
+    return add_quantity_remarks(state.frf, add_smoothing_remarks(state.frf, add_phase_remarks(rising)))
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:

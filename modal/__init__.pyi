@@ -18,8 +18,8 @@ from .modes.measurement_effects import (
     with_mass_uncertainty,
 )
 from .modes.mode import Mode, synthesize_frf
-from .modes.response_delay import find_response_delay
 from .modes.mode_edits import ModeEdits, parse_mode_edits
+from .modes.response_delay import find_response_delay
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
 from .quality.unexplained_peaks import UnexplainedPeak, find_unexplained_peaks

@@ -47,7 +47,6 @@ class ExportLabels:
         return " ".join(self.tool.replace(";", ",").split())
 
 
-
 def convert_to_measured_form(frf: Frf) -> tuple[Complexes, str]:
     """Return the values of an FRF in the form that was measured, which keeps them exact, and their unit."""
     return getattr(frf, frf.measured_as), FRF_UNITS[frf.measured_as]

@@ -165,7 +165,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
 
 def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
     """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
-    if fit.frf is None:
+    if fit.frf is None or (questions.check_quantity(fit.modes) is not None and not trusted.modes):
         return
     low, high = machine.mode.band_hz or (0.0, np.inf)
     for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):

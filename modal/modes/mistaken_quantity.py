@@ -13,7 +13,8 @@ _ORDER: dict[FrfQuantity, int] = {"receptance": 0, "mobility": 1, "accelerance":
 MODAL_MASS_LIMITS = 3e-4, 1e5
 """Limits of the modal mass K/w^2 of a tapped structure (kg), from a thin end mill to a large machine; chosen.
 
-Each time derivative too many or too few changes it by w, hundreds to ten thousands. Measured structures: 0.007 to 3e4 kg.
+Each time derivative too many or too few changes it by w, hundreds to ten thousands. Measured structures have
+0.007 to 3e4 kg.
 """
 MIN_QUARTER_TURN_DEG = 65.0
 """Phase that three of four modal constants exceed if they are imaginary instead of real (degrees); chosen."""

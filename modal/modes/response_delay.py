@@ -46,8 +46,9 @@ def find_response_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
     """Find the delay of the response that makes all modes real.
 
     A response late by T turns the phase by -2 pi f T: from mode to mode, and over each peak, which tells the number of
-    full turns. A quarter turn of all modes is another quantity, not a delay. For each delay, the modes with real constants, a mass and a spring are fitted to the lines near the
-    peaks. Of delays that fit about equally, one with positive K at all modes is taken, then the shortest.
+    full turns. A quarter turn of all modes is another quantity, not a delay. For each delay, the modes with real
+    constants, a mass and a spring are fitted to the lines near the peaks. Of delays that fit about equally, one with
+    positive K at all modes is taken, then the shortest.
 
     Parameters
     ----------
@@ -66,7 +67,8 @@ def find_response_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
     >>> line = np.arange(100.0, 2000.0)
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], line)
     >>> late = Frf(line, frf.receptance * np.exp(-2j * np.pi * line * 1e-3))
-    >>> round(1e3 * find_response_delay(late, [Mode(500.0, 0.02, -2e7), Mode(900.0, 0.03, 5e7, phase_deg=36.0)]), 2)  # ms
+    >>> fitted = [Mode(500.0, 0.02, -2e7), Mode(900.0, 0.03, 5e7, phase_deg=36.0)]
+    >>> round(1e3 * find_response_delay(late, fitted), 2)  # ms
     1.0
     """
     if len(modes) < 2 or not all(mode.has_stiffness for mode in modes):

@@ -28,7 +28,9 @@ def add_quantity_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
     if true is None and is_plausible_mass(mass):
         return [*modes]
     phase = float(np.median([abs(mode.phase_deg) for mode in known]))
-    return [_with_quantity_remark(mode, frf, true, f"median modal mass {mass:.1g} kg, phase {phase:.0f}°") for mode in modes]
+    return [
+        _with_quantity_remark(mode, frf, true, f"median modal mass {mass:.1g} kg, phase {phase:.0f}°") for mode in modes
+    ]
 
 
 def _with_quantity_remark(mode: Mode, frf: Frf, true: FrfQuantity | None, figures: str) -> Mode:

@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from acquisition import Remark, stiffness_remark
 from modal.modes.mode import Mode
@@ -215,13 +215,11 @@ def _rejection_remark(mode: Mode) -> Remark | None:
     """Return the reason why a mode is not credible; None if it is."""
     at = f"{mode.frequency:.4g} Hz"
     stiffness = stiffness_remark(mode.stiffness) if mode.has_stiffness else None
+    cause = next((remark for remark in mode.remarks if remark.code in STIFFNESS_CAUSE_CODES), stiffness)
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
         reasons.append("peak cut off at the edge of the fitted band")
     if reasons:
         text = f"mode not used, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, REJECTED_MODE_REMEDY)
-    if stiffness is None:
-        return None
-    cause = next((remark for remark in mode.remarks if remark.code in STIFFNESS_CAUSE_CODES), stiffness)
-    return replace(cause, about=at)
+    return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, (cause or stiffness).cure)

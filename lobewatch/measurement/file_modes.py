@@ -59,7 +59,8 @@ def read_file_frf(
         phase = "" if conjugate else _check_phase(path, description)
         missing = missing_window_text(recording.window, window)
         raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
-    if recording.require_measurable().frf is not None:
+    recording.require_measurable()
+    if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:

@@ -60,8 +60,8 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
 
 
 def fit_on_time(
-    frf: Frf, hits: Sequence[Hit], sensor: SensorLoading, fit: Callable[[Frf, Sequence[Hit]], FrfFit]
-) -> tuple[Frf, Sequence[Hit], FrfFit]:
+    frf: Frf, hits: tuple[Hit, ...], sensor: SensorLoading, fit: Callable[[Frf, Sequence[Hit]], FrfFit]
+) -> tuple[Frf, tuple[Hit, ...], FrfFit]:
     """Fit an FRF without the sensor mass and without a delay of the response.
 
     Returns FRF and hits without the delay, and the fit.

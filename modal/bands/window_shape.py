@@ -88,10 +88,11 @@ def _is_apart(peak: Resonance, resonances: Sequence[Resonance]) -> bool:
 def window_ratio(peaks: Sequence[NarrowPeak], spacing: float) -> float:
     """Return the sum of squares under a window with side terms at a spacing (Hz) over that without.
 
-    It is the geometric mean over the peaks, at the best common place of the hit.
+    It is the geometric mean over the peaks, at the best common place of the hit; infinite if a peak fits worse.
     """
-    ratios = [_squares(peak, PHASES, spacing) / _squares(peak, np.zeros(1), 0.0) for peak in peaks]
-    return float(np.min(np.exp(np.mean(np.log(ratios), axis=0))))
+    ratios = np.array([_squares(peak, PHASES, spacing) / _squares(peak, np.zeros(1), 0.0) for peak in peaks])
+    means = np.exp(np.mean(np.log(ratios), axis=0))
+    return float(np.min(np.where(np.max(ratios, axis=0) < 1, means, np.inf)))
 
 
 def _squares(peak: NarrowPeak, phases: Floats, spacing: float) -> Floats:

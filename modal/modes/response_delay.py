@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition import Frf
-from modal.arrays import Complexes, Floats
+from modal.arrays import Complexes, Flags, Floats, Indices
 from modal.modes.mode import Mode
 
 MAX_DELAY = 0.01
@@ -75,13 +75,13 @@ def find_response_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
         return None
     peaks, highest = _weigh_peaks(frf, modes), max(mode.frequency for mode in modes)
     step = 1 / (STEPS_PER_PERIOD * highest)
-    delays = step * np.arange(-round(MAX_DELAY / step), round(MAX_DELAY / step) + 1)
+    delays = step * np.arange(-round(MAX_DELAY / step), round(MAX_DELAY / step) + 1, dtype=np.float64)
     left, is_positive = _fit_real_modes(peaks, delays)
     if left[delays.size // 2] < MIN_LEFT_SHARE:
         return None
     likely = np.flatnonzero((left <= MAX_COST_RATIO * np.min(left)) & (left <= _lower_neighbour(left)))
     best = delays[min(likely, key=lambda i: (not is_positive[i], abs(delays[i])))]
-    fine = best + step * np.linspace(-1, 1, 2 * STEPS_PER_PERIOD + 1)
+    fine = np.asarray(best + step * np.linspace(-1, 1, 2 * STEPS_PER_PERIOD + 1), dtype=np.float64)
     costs, _ = _fit_real_modes(peaks, fine)
     delay, cost = float(fine[np.argmin(costs)]), float(np.min(costs))
     (turned,), _ = _fit_real_modes(peaks._replace(values=1j * peaks.values), np.zeros(1))
@@ -95,7 +95,7 @@ def _lower_neighbour(values: Floats) -> Floats:
 
 
 def _weigh_peaks(frf: Frf, modes: Sequence[Mode]) -> _Peaks:
-    lines, weights = list[Floats](), list[Floats]()
+    lines, weights = list[Indices](), list[Floats]()
     for mode in modes:
         distance = np.abs(frf.frequency - mode.frequency)
         least = np.sort(distance)[min(MIN_PEAK_LINES, distance.size) - 1]
@@ -110,7 +110,7 @@ def _weigh_peaks(frf: Frf, modes: Sequence[Mode]) -> _Peaks:
     return _Peaks(f, frf.receptance[place] * weight, columns / np.linalg.norm(columns, axis=0))
 
 
-def _fit_real_modes(peaks: _Peaks, delays: Floats) -> tuple[Floats, Floats]:
+def _fit_real_modes(peaks: _Peaks, delays: Floats) -> tuple[Floats, Flags]:
     """Return for each delay (s) the share of the squares that real modes leave, and whether all K are positive."""
     q, triangle = np.linalg.qr(np.concatenate([peaks.columns.real, peaks.columns.imag]))
     real, imaginary = np.vsplit(q, 2)

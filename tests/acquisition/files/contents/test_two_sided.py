@@ -30,7 +30,7 @@ def test_printed_digits_are_no_obstacle(digits: int) -> None:
 
 
 def test_lines_at_negative_frequencies_are_left_out_in_either_order() -> None:
-    frequency, spectrum = np.fft.fftfreq(301, 1e-3), np.fft.fft(DECAY)
+    frequency, spectrum = np.asarray(np.fft.fftfreq(301, 1e-3), dtype=np.float64), np.fft.fft(DECAY)
     for order in (np.arange(301), np.argsort(frequency)):
         kept = find_lower_half(frequency[order], spectrum[order])
         assert frequency[order][kept].tolist() == pytest.approx(np.arange(151) / 0.301)

@@ -8,7 +8,7 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 
 
-def remove_response_delay(frf: Frf, delay: float) -> Frf:
+def remove_frf_delay(frf: Frf, delay: float) -> Frf:
     """Remove the delay of the response from an FRF.
 
     Parameters
@@ -26,16 +26,16 @@ def remove_response_delay(frf: Frf, delay: float) -> Frf:
     Examples
     --------
     >>> late = Frf(np.array([100.0, 200.0]), np.exp(-2j * np.pi * np.array([100.0, 200.0]) * 1e-3))
-    >>> remove_response_delay(late, 1e-3).receptance.round(9).real.tolist()
+    >>> remove_frf_delay(late, 1e-3).receptance.round(9).real.tolist()
     [1.0, 1.0]
     """
     return replace(frf, receptance=frf.receptance * np.exp(2j * np.pi * frf.frequency * delay))
 
 
-def advance_response(hit: Hit, delay: float) -> Hit:
-    """Advance the response of a hit, as `remove_response_delay` does with its FRF.
+def remove_hit_delay(hit: Hit, delay: float) -> Hit:
+    """Remove the delay of the response from a hit, as `remove_frf_delay` does with its FRF.
 
-    The samples that leave the record at its start come back at its end.
+    Samples that leave the record at its start come back at its end.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def advance_response(hit: Hit, delay: float) -> Hit:
     Examples
     --------
     >>> late = Hit(np.zeros(64), np.sin(2 * np.pi * (np.arange(64) - 8) / 64), 64.0)  # a period of 1 s, 1/8 s late
-    >>> on_time = advance_response(late, 1 / 8).acceleration
+    >>> on_time = remove_hit_delay(late, 1 / 8).acceleration
     >>> float(abs(on_time - np.sin(2 * np.pi * np.arange(64) / 64)).max()) < 1e-12
     True
     """

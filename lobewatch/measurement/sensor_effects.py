@@ -8,9 +8,9 @@ from acquisition import (
     Frf,
     Hit,
     Remark,
-    advance_response,
     extract_free_decay,
-    remove_response_delay,
+    remove_frf_delay,
+    remove_hit_delay,
     remove_sensor_mass,
 )
 from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -68,10 +68,10 @@ def fit_on_time(
     """
     found = fit_without_sensor_mass(frf, sensor, lambda bare: fit(bare, hits))
     credible = [mode for mode in found.modes if modal.assess_trust(mode) is not Trust.REJECTED]
-    delay = modal.find_response_delay(found.extraction.frf, credible)
+    delay = modal.find_delay(found.extraction.frf, credible)
     if delay is None:
         return frf, hits, found
-    frf, hits = remove_response_delay(frf, delay), tuple(advance_response(hit, delay) for hit in hits)
+    frf, hits = remove_frf_delay(frf, delay), tuple(remove_hit_delay(hit, delay) for hit in hits)
     found = fit_without_sensor_mass(frf, sensor, lambda bare: fit(bare, hits))
     text = f"response is {1e3 * abs(delay):.3g} ms {'late' if delay > 0 else 'early'}: delay removed from the FRF"
     cure = "Record force and response with the same trigger and the same filters"

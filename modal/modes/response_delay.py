@@ -42,7 +42,7 @@ class _Peaks(NamedTuple):
     """Weighted modes with positive K, mass and spring, shape (n, m + 2)."""
 
 
-def find_response_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
+def find_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
     """Find the delay of the response that makes all modes real.
 
     A response late by T turns the phase by -2 pi f T: from mode to mode, and over each peak, which tells the number of
@@ -68,7 +68,7 @@ def find_response_delay(frf: Frf, modes: Sequence[Mode]) -> float | None:
     >>> frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], line)
     >>> late = Frf(line, frf.receptance * np.exp(-2j * np.pi * line * 1e-3))
     >>> fitted = [Mode(500.0, 0.02, -2e7), Mode(900.0, 0.03, 5e7, phase_deg=36.0)]
-    >>> round(1e3 * find_response_delay(late, fitted), 2)  # ms
+    >>> round(1e3 * find_delay(late, fitted), 2)  # ms
     1.0
     """
     if len(modes) < 2 or not all(mode.has_stiffness for mode in modes):

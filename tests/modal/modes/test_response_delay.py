@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import Frf, remove_response_delay
-from modal import Mode, Trust, assess_trust, find_response_delay, fit_modes, synthesize_frf
+from acquisition import Frf, remove_frf_delay
+from modal import Mode, Trust, assess_trust, find_delay, fit_modes, synthesize_frf
 
 SPINDLE = (Mode(700.0, 0.03, 4e7), Mode(1240.0, 0.02, 3e7), Mode(2300.0, 0.015, 9e7))
 LINES = np.arange(50.0, 3500.0, 2.0)
@@ -21,7 +21,7 @@ def measured(modes: tuple[Mode, ...], delay: float = 0.0, turn: complex = 1.0) -
 
 
 def found(frf: Frf) -> float | None:
-    return find_response_delay(frf, [mode for mode in fit_modes(frf) if assess_trust(mode) is not Trust.REJECTED])
+    return find_delay(frf, [mode for mode in fit_modes(frf) if assess_trust(mode) is not Trust.REJECTED])
 
 
 @pytest.mark.parametrize("delay", [1e-3, -5e-4, 3e-4, 1.2e-4])
@@ -31,7 +31,7 @@ def test_a_delay_is_found_at_driving_and_transfer_points(delay: float, opposed: 
     frf = measured(modes, delay)
     value = found(frf)
     assert value == pytest.approx(delay, abs=1e-5)
-    restored = fit_modes(remove_response_delay(frf, value or 0.0))
+    restored = fit_modes(remove_frf_delay(frf, value or 0.0))
     assert [mode.is_driving_point for mode in restored] == [mode.is_driving_point for mode in modes]
 
 
@@ -56,4 +56,4 @@ def test_a_small_delay_that_leaves_all_signs_is_not_removed() -> None:
 
 
 def test_one_mode_tells_no_delay() -> None:
-    assert find_response_delay(measured(SPINDLE[:1], 1e-3), [SPINDLE[0]]) is None
+    assert find_delay(measured(SPINDLE[:1], 1e-3), [SPINDLE[0]]) is None

@@ -180,32 +180,34 @@ def _add_phase_remark(mode: Mode, expected: float) -> Mode:
 
 
 def add_smoothing_remarks(state: Extraction, modes: Sequence[Mode]) -> list[Mode]:
-    """Add a remark and an error of zeta to the narrow modes of an FRF if its lines were smoothed or windowed."""
+    """Add a remark to narrow modes if the lines were smoothed, and an error of zeta under a Hann window."""
     frf, step = state.frf, float(np.mean(np.diff(state.frf.frequency)))
     lines = [mode.damping_ratio * mode.frequency / step for mode in modes]
     if min(lines, default=np.inf) >= MIN_SMOOTHED_HALF_WIDTH_LINES:
         return [*modes]
-    resonances = [resonance for band in state.bands for resonance in band.resonances]
-    cause = "a smoothed FRF" if is_smoothed(frf) else "a record under a Hann window"
-    if not is_smoothed(frf) and not has_hann_shape(frf, resonances):
+    has_window = has_hann_shape(frf, [resonance for band in state.bands for resonance in band.resonances])
+    if not has_window and not is_smoothed(frf):
         return [*modes]
+    cause = "a record under a Hann window" if has_window else "a smoothed FRF"
     effect = "zeta is a few percent too large, stiffness K too small"
     text = f"half-width of the peak is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines of {cause}: {effect}"
     return [
-        _smoothed_mode(mode, half_width, text) if half_width < MIN_SMOOTHED_HALF_WIDTH_LINES else mode
+        _smoothed_mode(mode, half_width if has_window else np.inf, text)
+        if half_width < MIN_SMOOTHED_HALF_WIDTH_LINES
+        else mode
         for mode, half_width in zip(modes, lines, strict=True)
     ]
 
 
 SMOOTHING_ERROR = 2 / 3
-"""Standard error of zeta by three smoothed lines, over zeta, times the square of the half-width (lines).
+"""Standard error of zeta by a Hann window, over zeta, times the square of the half-width (lines).
 
 The lines H/2 + (H(f - d) + H(f + d))/4 are H + d^2 H''/4 to second order: a fit finds zeta too large by 0.65 of it.
 """
 
 
 def _smoothed_mode(mode: Mode, half_width: float, text: str) -> Mode:
-    """Return a narrow mode with the remark and the error of zeta by the smoothing; half_width in lines."""
+    """Return a narrow mode with the remark and the error of zeta by a window; half_width in lines, infinite without."""
     off = np.diag([0.0, SMOOTHING_ERROR * mode.damping_ratio / half_width**2, 0.0])
     wider = change_covariances(mode, lambda own: own + off**2)
     return add_remark(wider, "smoothed-lines", text, "Export the FRF again without smoothing or window")

@@ -10,7 +10,6 @@ from pathlib import Path
 from acquisition.errors import DataError
 from acquisition.files.contents.column_headings import assign_columns, format_signal_names
 from acquisition.files.contents.contents import (
-    MIN_FRF_LINES,
     Contents,
     Description,
     Fact,
@@ -29,6 +28,9 @@ ANY_COLUMNS_EXAMPLE = (
     f"or Description.columns{FRF_COLUMNS_EXAMPLE} for an FRF, with Description.spacing if there is no frequency"
 )
 """Example of the columns of either hits or an FRF."""
+
+MIN_MODE_LINES = 4
+"""Fewest lines of an FRF with a mode: with complex constant, mass and spring it has eight real unknowns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +71,10 @@ class Recording:
         return self
 
     def require_measurable(self) -> Recording:
-        """Return this recording; raise DataError as `require_valid`, and for an FRF of too few lines for a mode."""
+        """Return this recording; raise DataError as `require_valid`, and for an FRF of too few lines for any mode."""
         frf = self.require_valid().frf
-        if frf is not None and frf.frequency.size < MIN_FRF_LINES:
-            found = f"the FRF has {frf.frequency.size} lines, but a mode needs at least {MIN_FRF_LINES}"
+        if frf is not None and frf.frequency.size < MIN_MODE_LINES:
+            found = f"the FRF has {frf.frequency.size} lines, but one mode needs at least {MIN_MODE_LINES}"
             raise DataError(f"{self.path}: {found}. Export more frequency lines.")
         return self
 

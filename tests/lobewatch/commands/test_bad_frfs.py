@@ -103,3 +103,11 @@ def test_a_late_response_is_said_and_k_keeps_its_sign(machine: Path, tmp_path: P
     measured = Logbook.open(machine).measurement(Logbook.open(machine).newest_tap().id)
     assert "response-delay-removed" in [remark.code for remark in measured.remarks]
     assert all(mode.is_driving_point for mode in measured.modes)
+
+
+def test_new_columns_replace_the_quantity_of_a_universal_file(tmp_path: Path) -> None:
+    file, universal = table(tmp_path / "frf.csv", *WRONG["accelerance"]), tmp_path / "frf.uff"
+    run("convert", file, universal)
+    columns = "frequency [Hz]=frequency,frf [m/s^2/N]=1 over 1"
+    modes = json.loads(run("modes", universal, "--columns", columns, "--json").stdout)["modes"]
+    assert [mode["stiffness_n_per_m"] for mode in modes] == pytest.approx([m.stiffness for m in SPINDLE], rel=0.02)

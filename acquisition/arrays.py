@@ -13,6 +13,8 @@ Complexes = NDArray[np.complex128]
 """Complex values (complex128), of any shape."""
 Codes = NDArray[np.int32]
 """ADC codes (int32), of any shape."""
+Indices = NDArray[np.intp]
+"""Places in an array, of any shape."""
 Flags = NDArray[np.bool_]
 """Truth values, of any shape."""
 

@@ -75,7 +75,8 @@ def find_resonances(frf: Frf, least_share: float = 0.0) -> list[Resonance]:
     them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
     mobility are ignored, which saves time.
 
-    Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
+    Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
+    ConjugateError.
     """
     n = frf.frequency.size
     if n < MIN_FRF_LINES:
@@ -84,6 +85,9 @@ def find_resonances(frf: Frf, least_share: float = 0.0) -> list[Resonance]:
         )
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
+    if frf.coherence is not None and not np.any(frf.coherence):
+        found = "the coherence is 0 on every line, so the response does not come from the hammer"
+        raise ValueError(f"{found}. Check the cables of hammer and sensor.")
     frf = remove_drift(frf)
     peaks = _find_peaks_at_all_scales(frf, least_share * float(np.max(np.abs(frf.mobility))))
     if peaks and not np.any(frf.receptance.imag):

@@ -36,6 +36,11 @@ class Pulse:
     """Rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
     @property
+    def width(self) -> int:
+        """Length between these (samples), at least 8."""
+        return max(self.end - self.start, 8)
+
+    @property
     def force(self) -> Floats:
         """Force without its offset (N), shape (n,)."""
         return self.recorded - self.offset
@@ -102,46 +107,3 @@ def extract_baseline(signal: Floats, before: int) -> Floats:
     """Return the first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
     quiet = signal[: int(0.8 * before)]
     return quiet if quiet.size >= 8 else signal[-max(signal.size // 10, 8) :]
-
-
-@dataclass(frozen=True, eq=False)
-class WindowedForce:
-    """Tapered samples around the pulse of a hit; all others count as zero."""
-
-    samples: slice
-    """Place in the hit."""
-    force: Floats
-    """Force without its offset times the window (N), shape (m,)."""
-    window: Floats
-    """Weight of each sample, 0 to 1, shape (m,)."""
-    noise: float
-    """Rms of the baseline (N)."""
-    mean_noise: float
-    """Standard error of the baseline's mean (N)."""
-
-
-def window_force(hit: Hit) -> WindowedForce:
-    """Return the pulse with one pulse width on either side, tapered to zero over one more (raised cosine).
-
-    A tight window matters: noise inside it is alike at neighbouring lines, and shifts the mode. The result is cached
-    per hit. Raises ValueError for a hit without a pulse.
-    """
-    if hit not in _windowed_forces:
-        _windowed_forces[hit] = _compute_windowed_force(hit)
-    return _windowed_forces[hit]
-
-
-_windowed_forces: WeakKeyDictionary[Hit, WindowedForce] = WeakKeyDictionary()
-
-
-def _compute_windowed_force(hit: Hit) -> WindowedForce:
-    pulse = require_pulse(hit)
-    width = max(pulse.end - pulse.start, 8)
-    corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
-    samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))
-    beyond = np.interp(np.arange(samples.start, samples.stop), corners, [1.0, 0.0, 0.0, 1.0])
-    window = 0.5 + 0.5 * np.cos(np.pi * beyond)
-    quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    noise = pulse.baseline_rms
-    force = (hit.force[samples] - pulse.offset) * window
-    return WindowedForce(samples, force, window, noise, noise / np.sqrt(quiet.size))

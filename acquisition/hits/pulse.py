@@ -12,6 +12,13 @@ PULSE_END_SHARE = 0.05
 """Share of the peak below which a pulse ends, unless the noise is larger."""
 BASELINE_NOISE_RATIO = 3.0
 """Level of the noise over the rms of the baseline, below which a pulse ends."""
+MIN_TOUCH_SHARE = 0.003
+"""Smallest height of a touch over that of the main pulse: one that is left out changes the FRF by its share (chosen).
+"""
+TOUCH_DEVIATION = 4.0
+"""Largest force of a baseline over its rms above which a touch is searched in it (chosen)."""
+TOUCH_SPREAD = 6.0
+"""Robust standard deviations from the median above which samples of a baseline are those of a touch (chosen)."""
 SEARCH_BLOCK_SIZE = 1024
 """Number of samples searched at once."""
 
@@ -51,7 +58,7 @@ def find_pulse(hit: Hit) -> Pulse | None:
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))
-    quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
+    quiet = _drop_touches(extract_baseline(hit.force, count_pre_hit_samples(hit)), float(hit.force[top]))
     offset, rms = float(np.mean(quiet)), float(np.std(quiet))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
@@ -60,6 +67,15 @@ def find_pulse(hit: Hit) -> Pulse | None:
     start = top - _count_above(foot, hit.force[top::-1]) + 1
     end = top + _count_above(foot, hit.force[top:])
     return Pulse(hit.force, offset, top, peak, start, end, rms)
+
+
+def _drop_touches(quiet: Floats, top: float) -> Floats:
+    """Return the samples of a baseline without those of a touch before the main pulse."""
+    if float(np.max(quiet)) <= float(np.mean(quiet)) + TOUCH_DEVIATION * float(np.std(quiet)):
+        return quiet
+    middle = float(np.median(quiet))
+    spread = 1.4826 * float(np.median(np.abs(quiet - middle)))
+    return quiet[np.abs(quiet - middle) <= max(TOUCH_SPREAD * spread, MIN_TOUCH_SHARE * (top - middle))]
 
 
 def require_pulse(hit: Hit) -> Pulse:

@@ -1,25 +1,22 @@
 """Find the further touches of the hammer in the force of a hit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 
 from acquisition.arrays import Floats
-from acquisition.hits.pulse import Pulse
+from acquisition.hits.pulse import MIN_TOUCH_SHARE, Pulse
 
-MIN_TOUCH_SHARE = 0.003
-"""Smallest height of a touch, over that of the main pulse: left out, it biases the FRF by that share (chosen)."""
-FALSE_TOUCH_RATE = 0.05
-"""Number of times per hit that noise passes for a touch, each of which adds most of a window of noise (chosen)."""
+FALSE_TOUCH_RATE = 0.005
+"""Number of touches per hit that are noise. Each has some 6 times the noise power of the main pulse's window (chosen).
+"""
 BINS_PER_WIDTH = 8
 """Number of averaged samples per pulse width; fewer where it was recorded with fewer."""
 LEVEL_WIDTHS = 8
-"""Pulse widths over which the level under the touches is a median: they may fill half of them (chosen)."""
-SQUARED_SINE_CORE = 0.818
-"""Mean of a squared sine over the middle half of its foot, over its peak."""
+"""Pulse widths over which the level under a touch is a median: touches may fill half of them (chosen)."""
+CORE_SHARE = 0.818
+"""Mean of a squared sine over the middle half of its foot, over its peak: (1/2 + 1/pi)."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +24,7 @@ class Touch:
     """Further touch of the hammer."""
 
     start: int
-    """First sample."""
+    """First sample in which it is above the noise."""
     end: int
     """First sample after it."""
     height: float
@@ -37,27 +34,40 @@ class Touch:
 
 
 def find_touches(pulse: Pulse) -> list[Touch]:
-    """Find the touches besides the main pulse, in the order of time."""
+    """Find the touches other than the main pulse, in the order of time.
+
+    The force is averaged over half a pulse width and over a whole one. A touch is where an average is above the median
+    of its surroundings by more than noise and by 0.3 % of the main pulse. The median follows offset, drift, hum, and a
+    force that sinks below zero behind a high pass and recovers. Noise is the median absolute deviation in the record,
+    or that of differences before the pulse: some recorders leave zeros after it.
+    """
     step = max(1, pulse.width // BINS_PER_WIDTH)
     force = _remove_main_pulse(pulse)
     force = force[: force.size // step * step].reshape(-1, step).mean(axis=1)
     floor = MIN_TOUCH_SHARE * pulse.peak
     if np.ptp(force) < floor:
         return []
-    force = force - _measure_slow_level(force, LEVEL_WIDTHS * pulse.width // step)
+    white = _estimate_noise(np.diff(force[: max(pulse.start, 0) // step])) / np.sqrt(2)
+    force = np.nan_to_num(force - _measure_level(force, LEVEL_WIDTHS * pulse.width // step))
     limit = NormalDist().inv_cdf(1 - FALSE_TOUCH_RATE / (2 * force.size))
     above = np.zeros(force.size, dtype=bool)
-    for core in (pulse.width // (2 * step), pulse.width // step):
-        smooth = _average(force, core)
-        noise = 1.4826 * float(np.median(np.abs(smooth[::core])))
-        above |= smooth > max(limit * noise, SQUARED_SINE_CORE * floor)
+    for count in (pulse.width // (2 * step), pulse.width // step):
+        smooth = _average(force, count)
+        noise = max(_estimate_noise(smooth[::count]), white / np.sqrt(count))
+        above |= smooth > max(limit * noise, CORE_SHARE * floor)
     edges = np.flatnonzero(np.diff(above, prepend=False, append=False)).reshape(-1, 2)
-    touches = []
-    for first, last in edges:
-        top = first + int(np.argmax(force[first:last]))
-        touches.append(Touch(first * step, last * step, float(force[top]), (top + 0.5) * step))
+    touches = [_measure_touch(force, first, last, step) for first, last in edges]
     low, high = pulse.start - pulse.width, pulse.end + pulse.width
     return [touch for touch in touches if touch.start < low or touch.end > high]
+
+
+def _estimate_noise(values: Floats) -> float:
+    return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
+
+
+def _measure_touch(force: Floats, first: int, last: int, step: int) -> Touch:
+    top = first + int(np.argmax(force[first:last]))
+    return Touch(first * step, last * step, float(force[top]), (top + 0.5) * step)
 
 
 def _remove_main_pulse(pulse: Pulse) -> Floats:
@@ -72,15 +82,17 @@ def _remove_main_pulse(pulse: Pulse) -> Floats:
     return force
 
 
-def _measure_slow_level(force: Floats, length: int) -> Floats:
-    """Return the medians of pieces, joined by straight lines."""
-    count = max(force.size // length, 1)
-    pieces = force[: count * length].reshape(count, -1)
-    return np.interp(np.arange(force.size), (np.arange(count) + 0.5) * pieces.shape[1], np.median(pieces, axis=1))
+def _measure_level(force: Floats, length: int) -> Floats:
+    """Return the medians of pieces of this length, joined by straight lines; 0 at the begin, NaN after the last one."""
+    count = force.size // length
+    medians = np.median(force[force.size - count * length :].reshape(count, length), axis=1)
+    middles = force.size + (np.arange(-count, 0) + 0.5) * length
+    levels = np.concatenate([[0.0], medians])
+    return np.interp(np.arange(force.size), np.concatenate([[0.0], middles]), levels, right=np.nan)
 
 
 def _average(force: Floats, count: int) -> Floats:
-    """Return the mean over so many samples around each."""
-    padded = np.pad(force, (count // 2, count - 1 - count // 2), mode="edge")
+    """Return the mean over so many values around each."""
+    padded = np.pad(force, (count // 2, count - 1 - count // 2))
     sums = np.cumsum(np.concatenate(([0.0], padded)))
-    return (sums[count:] - sums[:-count]) / count
+    return np.asarray((sums[count:] - sums[:-count]) / count)

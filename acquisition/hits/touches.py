@@ -8,7 +8,7 @@ import numpy as np
 from acquisition.arrays import Floats
 from acquisition.hits.pulse import MIN_TOUCH_SHARE, Pulse
 
-FALSE_TOUCH_RATE = 0.005
+FALSE_TOUCH_RATE = 0.001
 """Number of touches per hit that are noise. Each has some 6 times the noise power of the main pulse's window (chosen).
 """
 BINS_PER_WIDTH = 8

@@ -21,6 +21,7 @@ from .modes.mode import Mode, synthesize_frf
 from .modes.mode_edits import ModeEdits, parse_mode_edits
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
+from .quality.unexplained_peaks import UnexplainedPeak, find_unexplained_peaks
 
 __all__ = [
     "CommonDelay",
@@ -35,6 +36,7 @@ __all__ = [
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",
+    "UnexplainedPeak",
     "assess_trust",
     "candidate_frequencies",
     "common_decay_rate",
@@ -44,6 +46,7 @@ __all__ = [
     "extract_modes",
     "find_peaks_above_band",
     "find_truncated_peaks",
+    "find_unexplained_peaks",
     "fit_common_modes",
     "fit_decays",
     "fit_lscf_poles",

@@ -1,7 +1,7 @@
 """Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache
@@ -14,6 +14,7 @@ from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
+from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.step_times import time_step
@@ -47,6 +48,13 @@ class TapFit:
     """Remarks on missing and doubtful results."""
     failed: bool = False
     """True if the fit was impossible."""
+    frf: Frf | None = None
+    """FRF that was fitted, in its usable band and without the mass of the sensor; None without force."""
+
+    @property
+    def uncovered(self) -> tuple[Remark, ...]:
+        """Remarks that say the modes do not cover the measurement (`coverage.UNCOVERED_CODES`)."""
+        return find_uncovered(self.remarks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +118,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
             windows = hidden_window_remarks(tap.accepted, fitted.modes)
-            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
+            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows), frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
@@ -148,8 +156,22 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
+        remarks += _coverage_remarks(fit, trusted, machine)
     results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
     return Measurement(**vars(fit) | results)
+
+
+def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
+    """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
+    if fit.frf is None:
+        return
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):
+        if low <= peak.frequency <= high:
+            explained = f"the modes explain {1e6 * peak.explained:.2g} um/N"
+            text = f"peak not explained, real part of the FRF {1e6 * peak.measured:.2g} um/N, {explained}"
+            cure = "Warm up the spindle, check the clamping, and tap again"
+            yield Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, cure)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
@@ -261,14 +283,15 @@ def is_fit_of(answer: object, entry: TapEntry) -> bool:
         and (answer.tap_id, answer.time.isoformat()) == (entry.id, entry.time)
         and (answer.tool, answer.direction) == (entry.tool, entry.direction)
         and isinstance(answer.failed, bool)
+        and (answer.frf is None or (isinstance(answer.frf, Frf) and _is_valid(answer.frf)))
         and all(isinstance(remark, Remark) for remark in answer.remarks)
-        and all(isinstance(mode, Mode) and _is_valid_mode(mode) for mode in answer.modes)
+        and all(isinstance(mode, Mode) and _is_valid(mode) for mode in answer.modes)
     )
 
 
-def _is_valid_mode(mode: Mode) -> bool:
+def _is_valid(part: Mode | Frf) -> bool:
     try:
-        replace(mode)  # what has come from elsewhere was never checked
+        replace(part)  # what has come from elsewhere was never checked
     except (TypeError, ValueError):
         return False
     return True

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition.arrays import Complexes, Flags, Floats
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.hits.pulse import window_force
+from acquisition.hits.force_window import window_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -130,7 +130,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
         part = window_force(hit)
-        backwards = -np.arange(part.samples.start, part.samples.stop)
+        backwards = -part.samples
         records[0, backwards] = part.force  # in time: its spectrum is conj(F)
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
@@ -330,10 +330,12 @@ def propagate_force_noise_through(
 ) -> Iterator[Complexes]:
     """Yield linear maps (k, n) of each array of `propagate_force_noise`, shape (k, samples + 1), without that array."""
     parts = [window_force(hit) for hit in hits]
-    time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
-    waves = np.exp(-2j * np.pi * np.outer(frequency, time))
-    spectra = [waves[:, : part.force.size] @ part.force for part in parts]
+    delays = [part.samples - part.samples[0] for part in parts]
+    used = np.unique(np.concatenate(delays))
+    waves = np.exp(-2j * np.pi * np.outer(frequency, used / hits[0].sample_rate))
+    columns = [np.searchsorted(used, delay) for delay in delays]
+    spectra = [waves[:, column] @ part.force for column, part in zip(columns, parts, strict=True)]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
-    for part, spectrum in zip(parts, spectra, strict=True):
-        response = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
+    for part, spectrum, column in zip(parts, spectra, columns, strict=True):
+        response = (rows * (np.conj(spectrum) / power)) @ waves[:, column]
         yield np.column_stack((response * (-part.noise * part.window), response @ (part.mean_noise * part.window)))

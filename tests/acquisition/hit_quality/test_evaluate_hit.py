@@ -83,7 +83,7 @@ def test_a_hole_counts_up_to_the_end_of_the_required_band() -> None:
     told = re.search(r"at (\d+) Hz", evaluate_hit(double).text)
     assert told is not None
     assert int(told[1]) == pytest.approx(250, rel=0.01)
-    assert evaluate_hit(double, band=(20.0, 240.0)).flags == HitFlags.OK
+    assert evaluate_hit(double, band=(20.0, 220.0)).flags == HitFlags.OK
     assert evaluate_hit(double, band=(20.0, 260.0)).flags == HitFlags.DOUBLE_HIT
 
 
@@ -107,10 +107,10 @@ def test_a_touch_whose_response_is_cut_off_is_a_double_hit() -> None:
     decay, end = 60.0, TIME[-1]
     for start, share, flags in ((0.12, 0.3, HitFlags.OK), (0.2, 0.3, HitFlags.DOUBLE_HIT), (0.2, 0.02, HitFlags.OK)):
         one = hit((200, 0, 0.6e-3), (200 * share, start, 0.6e-3))
-        response = sum(
-            size * np.exp(-decay * np.maximum(TIME - at, 0)) * np.sin(2 * np.pi * 400 * (TIME - at)) * (at < TIME)
-            for at, size in ((0.0, 1000.0), (start, 1000.0 * share))
-        )
+        response = np.zeros(TIME.size)
+        for at, size in ((0.0, 1000.0), (start, 1000.0 * share)):
+            t = np.maximum(TIME - at, 0)
+            response += size * np.exp(-decay * t) * np.sin(2 * np.pi * 400 * t)
         expected = share * np.exp(-decay * (end - start)) > 0.02
         assert bool(flags) == expected
         assert evaluate_hit(replace(one, acceleration=response)).flags & HitFlags.DOUBLE_HIT == flags

@@ -37,8 +37,11 @@ def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> floa
     power = spectrum.real**2 + spectrum.imag**2
     largest = float(np.max(power))
     high = np.flatnonzero(power > MIN_LOBE_POWER * largest)
-    deep = np.flatnonzero(power[high[0] : high[-1]] < HOLE_POWER * largest)
-    hole = float(high[0] + deep[0]) * sample_rate / size if deep.size else np.inf
+    deep = high[0] + np.flatnonzero(power[high[0] : high[-1]] < HOLE_POWER * largest)
+    if not deep.size:
+        return None
+    first = np.split(deep, np.flatnonzero(np.diff(deep) > 1) + 1)[0]
+    hole = float(first[np.argmin(power[first])]) * sample_rate / size
     return hole if hole < end else None
 
 

@@ -281,9 +281,11 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
 
 
 def describe_second_touch(hit: Hit) -> tuple[str, ...]:
-    """Return the finding of the highest further touch of a hit with a pulse; none below 2.5 % of the main pulse."""
+    """Return the note on the highest further touch of a hit with a pulse; none below 2.5 % of the main pulse."""
     second = find_second_touch(window_force(hit))
-    return (SECOND_TOUCH_TEXT.format(**_measure_touch(hit, second)),) if second else ()
+    if second is None:
+        return ()
+    return (join_sentences(SECOND_TOUCH_TEXT.format(**_measure_touch(hit, second)), "The FRF includes it"),)
 
 
 def _measure_touch(hit: Hit, touch: Touch) -> dict[str, object]:

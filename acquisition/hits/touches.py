@@ -88,7 +88,8 @@ def _measure_level(force: Floats, length: int) -> Floats:
     medians = np.median(force[force.size - count * length :].reshape(count, length), axis=1)
     middles = force.size + (np.arange(-count, 0) + 0.5) * length
     levels = np.concatenate([[0.0], medians])
-    return np.interp(np.arange(force.size), np.concatenate([[0.0], middles]), levels, right=np.nan)
+    found = np.interp(np.arange(force.size), np.concatenate([[0.0], middles]), levels, right=np.nan)
+    return np.asarray(found)
 
 
 def _average(force: Floats, count: int) -> Floats:

@@ -17,6 +17,7 @@ from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
+from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
 
@@ -255,7 +256,7 @@ def fit_file_modes(
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
-    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
+    remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
     picked = tuple(modal.pick_peaks(frf, band))
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
 

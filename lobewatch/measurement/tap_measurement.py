@@ -17,6 +17,7 @@ from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits
 
@@ -117,7 +118,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
                 said = (*edited, *decay_remarks(machine.tap.sensor))
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
-            windows = hidden_window_remarks(tap.accepted, fitted.modes)
+            windows = (*hidden_window_remarks(tap.accepted, fitted.modes), *touch_remarks(tap.accepted))
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows), frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")

@@ -127,7 +127,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
     parts = spectra.view(np.float64)
-    s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
+    s_fx, product, powers = np.zeros_like(spectra[0]), np.empty_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
         part = window_force(hit)
         backwards = -part.samples
@@ -135,7 +135,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
         records[0, backwards] = 0.0
-        s_fx += spectra[0] * spectra[1]
+        s_fx += np.multiply(*spectra, out=product)
         powers += np.square(parts, out=parts)
     channels = hits[0].channels
     skew = channels[1].skew - channels[0].skew if channels else 0.0  # delay of the response (s)

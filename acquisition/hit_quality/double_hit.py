@@ -29,6 +29,8 @@ def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> floa
     Two equal touches with the time T between them cancel at 1/(2 T). A hole is 20 dB below the largest power, between
     lines less than 10 dB below it, which no single pulse has.
     """
+    if not _may_cancel(part):
+        return None
     delays = part.samples - part.samples[0]
     size = scipy.fft.next_fast_len(HOLE_RESOLUTION * (int(delays[-1]) + 1), real=True)
     force = np.zeros(size)
@@ -43,6 +45,22 @@ def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> floa
     first = np.split(deep, np.flatnonzero(np.diff(deep) > 1) + 1)[0]
     hole = float(first[np.argmin(power[first])]) * sample_rate / size
     return hole if hole < end else None
+
+
+def _may_cancel(part: WindowedForce) -> bool:
+    """Tell whether touches apart could make a hole whatever the time between them, by the spectra of each alone.
+
+    The spectrum of touches far apart has so many lines that it is computed only then.
+    """
+    parts = np.split(part.force, np.flatnonzero(np.diff(part.samples) > 1) + 1)
+    if len(parts) == 1:
+        return True
+    size = scipy.fft.next_fast_len(HOLE_RESOLUTION * max(map(len, parts)), real=True)
+    sizes = np.array([np.abs(np.fft.rfft(force, size)) for force in parts])
+    most = np.sum(sizes, axis=0)
+    least = np.maximum(2 * np.max(sizes, axis=0) - most, 0.0)
+    reach = np.flatnonzero(most**2 > MIN_LOBE_POWER * np.max(least) ** 2)[-1]
+    return bool(np.any(least[: reach + 1] ** 2 < HOLE_POWER * np.max(most) ** 2))
 
 
 PREDICTION_ORDER = 32

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hit import Hit
 from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, require_pulse
 from acquisition.hits.touches import Touch, find_touches
@@ -61,10 +61,12 @@ def _compute_windowed_force(hit: Hit) -> WindowedForce:
     pulse = require_pulse(hit)
     touches, width = find_touches(pulse), pulse.width
     contacts = sorted([(pulse.start, pulse.end), *((touch.start, touch.end) for touch in touches)])
-    samples = np.unique(np.concatenate([np.arange(start - 2 * width, end + 2 * width) for start, end in contacts]))
-    samples = samples[(samples >= 0) & (samples < hit.force.size)]
-    away = np.min([np.maximum(start - samples, samples - end) for start, end in contacts], axis=0)
-    window = 0.5 + 0.5 * np.cos(np.pi * np.clip(away / width - 1, 0.0, 1.0))
+    inside = np.zeros(hit.force.size, bool)
+    for start, end in contacts:
+        inside[max(start - 2 * width, 0) : max(end + 2 * width, 0)] = True
+    samples = inside.nonzero()[0]
+    away = np.minimum.reduce([np.maximum(start - samples, samples - end) for start, end in contacts])
+    window = 0.5 + 0.5 * np.cos(np.pi * np.minimum(np.maximum(away / width - 1, 0.0), 1.0))
     force = (hit.force[samples] - _follow_baseline(pulse, contacts, samples)) * window
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
     mean_noise = pulse.baseline_rms / float(np.sqrt(quiet.size))
@@ -97,5 +99,5 @@ def _measure_level(pulse: Pulse, start: int, end: int) -> float:
     rest = pulse.recorded[start:end]
     if rest.size < pulse.width:
         return pulse.offset
-    level, error = float(np.median(rest)), MEDIAN_ERROR * pulse.baseline_rms / float(np.sqrt(rest.size))
+    level, error = find_median(rest), MEDIAN_ERROR * pulse.baseline_rms / float(np.sqrt(rest.size))
     return level if abs(level - pulse.offset) > LEVEL_SIGNIFICANCE * error else pulse.offset

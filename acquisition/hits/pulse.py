@@ -58,8 +58,10 @@ def find_pulse(hit: Hit) -> Pulse | None:
     if not hit.has_force:
         return None
     top = int(np.argmax(hit.force))
-    quiet = _drop_touches(extract_baseline(hit.force, count_pre_hit_samples(hit)), float(hit.force[top]))
-    offset, rms = float(np.mean(quiet)), float(np.std(quiet))
+    quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
+    offset, rms = _measure_mean_and_rms(quiet)
+    if float(quiet.max()) > offset + TOUCH_DEVIATION * rms:
+        offset, rms = _measure_mean_and_rms(_drop_touches(quiet, float(hit.force[top])))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None
@@ -69,12 +71,17 @@ def find_pulse(hit: Hit) -> Pulse | None:
     return Pulse(hit.force, offset, top, peak, start, end, rms)
 
 
+def _measure_mean_and_rms(values: Floats) -> tuple[float, float]:
+    """Return the mean and the rms about it."""
+    mean = float(values.mean())
+    apart = values - mean
+    return mean, float(np.sqrt(np.mean(apart * apart)))
+
+
 def _drop_touches(quiet: Floats, top: float) -> Floats:
     """Return the samples of a baseline without those of a touch before the main pulse."""
-    if float(np.max(quiet)) <= float(np.mean(quiet)) + TOUCH_DEVIATION * float(np.std(quiet)):
-        return quiet
-    middle = float(np.median(quiet))
-    spread = 1.4826 * float(np.median(np.abs(quiet - middle)))
+    middle = find_median(quiet)
+    spread = 1.4826 * find_median(np.abs(quiet - middle))
     return quiet[np.abs(quiet - middle) <= max(TOUCH_SPREAD * spread, MIN_TOUCH_SHARE * (top - middle))]
 
 

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hits.pulse import MIN_TOUCH_SHARE, Pulse
 
 FALSE_TOUCH_RATE = 0.001
@@ -43,7 +43,7 @@ def find_touches(pulse: Pulse) -> list[Touch]:
     """
     step = max(1, pulse.width // BINS_PER_WIDTH)
     force = _remove_main_pulse(pulse)
-    force = force[: force.size // step * step].reshape(-1, step).mean(axis=1)
+    force = force[: force.size // step * step].reshape(-1, step) @ np.full(step, 1 / step)
     floor = MIN_TOUCH_SHARE * pulse.peak
     if np.ptp(force) < floor:
         return []
@@ -62,7 +62,7 @@ def find_touches(pulse: Pulse) -> list[Touch]:
 
 
 def _estimate_noise(values: Floats) -> float:
-    return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
+    return 1.4826 * find_median(np.abs(values)) if values.size else 0.0
 
 
 def _measure_touch(force: Floats, first: int, last: int, step: int) -> Touch:
@@ -78,7 +78,7 @@ def _remove_main_pulse(pulse: Pulse) -> Floats:
     before, after = force[max(low - half, 0) : low], force[high : high + half]
     ends = [float(np.mean(side)) if side.size else None for side in (before, after)]
     left, right = (end if end is not None else opposite or 0.0 for end, opposite in (ends, ends[::-1]))
-    force[low:high] = np.linspace(left, right, high - low)
+    force[low:high] = left + (right - left) / max(high - low - 1, 1) * np.arange(high - low)
     return force
 
 

@@ -42,6 +42,8 @@ class FileFrf:
     """Facts of the file with their origins."""
     recorded_window: float | None = None
     """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
+    n_found: int = 0
+    """Number of hits found, with those that cannot be used; 0 for an FRF."""
 
 
 @time_step("reading")
@@ -66,7 +68,8 @@ def read_file_frf(
         finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
         raise ValueError(f"{finding}. Leave out the number of averages.")
     frf = _average_hits(path, recording.hits, accepted, description)
-    return replace(frf, facts=recording.facts, recorded_window=recording.window)
+    facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
+    return replace(frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
 
 
 def _check_phase(path: Path, description: Description) -> str:
@@ -161,6 +164,8 @@ class FileModes:
     """Facts of the file with their origins."""
     by_hand: ModeEdits = NO_MODE_EDITS
     """Mode edits."""
+    n_found: int = 0
+    """Number of hits found, with those that cannot be used; 0 for an FRF or if unknown."""
 
 
 def fit_file_modes(
@@ -258,7 +263,9 @@ def fit_file_modes(
         windowed += ringing
     remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
     picked = tuple(modal.pick_peaks(frf, band))
-    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
+    return FileModes(
+        path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, n_found=file_frf.n_found
+    )
 
 
 def _fit_decay_modes(
@@ -271,7 +278,7 @@ def _fit_decay_modes(
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks)
-    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, n_found=decays.n_found)
 
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
@@ -348,7 +355,9 @@ def list_comparison_files(
         Path and missing data of each measurement.
     """
     return [
-        (file, replace(description, response=int(text))) if text.isdecimal() else (Path(text), description)
+        (file, replace(description, response=int(text)))
+        if text.isdecimal()
+        else (Path(text), replace(description, hit_files=()))
         for text in beside
     ]
 

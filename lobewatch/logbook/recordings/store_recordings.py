@@ -156,6 +156,8 @@ def store_recordings(
             results = (prepare_taps.prepare_tap(folder, file, description) for file in new.values())
         ready, faults = _store_each(folder, oldest_first, results, progress, on_stored)
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
+        if rejected and len(rejected) == len(files):
+            raise DataError(format_rejections(rejected, len(files)))
     finally:
         prepare_taps.remove_prepared_files(folder)
     ids = stored | {tap.digest: tap.entry.id for tap in ready}

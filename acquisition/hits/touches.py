@@ -11,7 +11,7 @@ from acquisition.hits.pulse import MIN_TOUCH_SHARE, Pulse
 FALSE_TOUCH_RATE = 0.001
 """Number of touches per hit that are noise. Each has some 6 times the noise power of the main pulse's window (chosen).
 """
-BINS_PER_WIDTH = 8
+BINS_PER_WIDTH = 4
 """Number of averaged samples per pulse width; fewer where it was recorded with fewer."""
 LEVEL_WIDTHS = 8
 """Pulse widths over which the level under a touch is a median: touches may fill half of them (chosen)."""
@@ -85,7 +85,8 @@ def _remove_main_pulse(pulse: Pulse) -> Floats:
 def _measure_level(force: Floats, length: int) -> Floats:
     """Return the medians of pieces of this length, joined by straight lines; 0 at the begin, NaN after the last one."""
     count = force.size // length
-    medians = np.median(force[force.size - count * length :].reshape(count, length), axis=1)
+    pieces = force[force.size - count * length :].reshape(count, length)
+    medians = np.partition(pieces, length // 2, axis=1)[:, length // 2]  # np.median takes 8 times as long
     middles = force.size + (np.arange(-count, 0) + 0.5) * length
     levels = np.concatenate([[0.0], medians])
     found = np.interp(np.arange(force.size), np.concatenate([[0.0], middles]), levels, right=np.nan)
@@ -94,6 +95,7 @@ def _measure_level(force: Floats, length: int) -> Floats:
 
 def _average(force: Floats, count: int) -> Floats:
     """Return the mean over so many values around each."""
-    padded = np.pad(force, (count // 2, count - 1 - count // 2))
-    sums = np.cumsum(np.concatenate(([0.0], padded)))
+    sums = np.zeros(force.size + count)
+    np.cumsum(force, out=sums[count // 2 + 1 : count // 2 + 1 + force.size])
+    sums[count // 2 + 1 + force.size :] = sums[count // 2 + force.size]
     return np.asarray((sums[count:] - sums[:-count]) / count)

@@ -113,7 +113,7 @@ def test_zeros_behind_a_recorder_s_own_window_make_no_touches() -> None:
 def test_noise_of_two_impulses() -> None:
     """Of impulses A and B samples apart: both windows count, over |A + B exp(-2 pi j f t)|^2.
 
-    The window of A has squares that add up to 23 (18 samples of weight 1, 7 on either side of weights cos^2(pi k / 16)).
+    The window of A has squares that add up to 23: 18 samples of weight 1, 7 on either side of cos^2(pi k / 16).
     That of B has 7 samples more, because B was found in averages of 8 samples.
     """
     rate, lines = 10_000.0, np.array([50.0, 300.0, 550.0])

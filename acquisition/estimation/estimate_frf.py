@@ -135,7 +135,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
         records[0, backwards] = 0.0
-        s_fx += np.multiply(*spectra, out=product)
+        s_fx += np.multiply(spectra[0], spectra[1], out=product)
         powers += np.square(parts, out=parts)
     channels = hits[0].channels
     skew = channels[1].skew - channels[0].skew if channels else 0.0  # delay of the response (s)

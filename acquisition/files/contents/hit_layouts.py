@@ -195,14 +195,14 @@ def find_named_hits(signals: Sequence[Signal], *, needs_force: bool) -> NamedHit
 
 
 def _group_by_name(signals: Sequence[Signal], split: _Split) -> NamedHits:
-    parts = {signal.name: split(signal.name) for signal in signals}
+    parts = {signal.name: split(signal.name) or ("", signal.name) for signal in signals}  # "Force", then "Force.1"
     keys: dict[str, set[str]] = {}
-    for key, channel in filter(None, parts.values()):
+    for key, channel in parts.values():
         keys.setdefault(channel, set()).add(key)
     hits, shared, channels = dict[str, Signals](), Signals(), dict[str, str]()
     for signal in signals:
-        key, channel = parts[signal.name] or ("", "")
-        if len(keys.get(channel, ())) > 1:
+        key, channel = parts[signal.name]
+        if len(keys[channel]) > 1:
             hits.setdefault(key, []).append(replace(signal, name=channel, array=None))
             channels[signal.name] = channel
         else:

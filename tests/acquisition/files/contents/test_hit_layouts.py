@@ -173,6 +173,15 @@ def test_channels_without_a_kind_are_named_once_for_all_hits(tmp_path: Path, col
     assert are(inspect_file(path, Description(rate=RATE, one_test=True, columns=columns)), HITS)
 
 
+def test_a_first_hit_without_a_number_belongs_to_the_numbered_ones(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    names = ["Force", "Acc", *(f"{name}.{k}" for k in range(1, 5) for name in ("Force", "Acc"))]
+    np.savetxt(path, HITS.reshape(-1, N).T, "%.12g", ",", header=",".join(names), comments="")
+    said = {"force_unit": "N", "unit": "m/s^2", "rate": RATE}
+    assert "Description.one_test" in inspect_file(path, Description(**said)).problems  # type: ignore[arg-type]
+    assert are(inspect_file(path, Description(one_test=True, **said)), HITS)  # type: ignore[arg-type]
+
+
 def test_repeated_headings_are_hits_in_their_order(tmp_path: Path) -> None:
     path = put_channels(tmp_path / "a.csv", "Force [N]", "Acc [m/s^2]", HITS[:1])
     names = ["Force [N]", "Acc [m/s^2]"] * len(HITS)

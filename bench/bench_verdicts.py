@@ -4,8 +4,8 @@
     python bench/bench_verdicts.py
 
 Ours: `evaluate_hit` with the mean of the session. Theirs: `FRF.is_data_ok` with its own limits. Second table: share of
-second touches refused, by size, distance and noise; and the error in K where all of ten hits have such a touch and are
-averaged, against the same hits without the second touch.
+further touches refused, by size, distance and noise; and the error in K where all of ten hits have such a touch and are
+averaged, against the same hits without it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Stiffness of simulated structures from hits with second touches: bias, and coverage of the interval."""
+"""Stiffness of simulated structures from hits with further touches: bias, and coverage of the interval."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 _RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
 
-SECOND_TOUCH_TEXT = "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)"
+TOUCH_TEXT = "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)"
 """Finding of a further touch, as a fault or as a note."""
 
 
@@ -118,9 +118,9 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "double hit",
         "Let the hammer bounce off after the hit.",
         {
-            "hole": f"{SECOND_TOUCH_TEXT} leaves a hole in the force spectrum at {{hole:.3g}} Hz",
+            "hole": f"{TOUCH_TEXT} leaves a hole in the force spectrum at {{hole:.3g}} Hz",
             "merged": "Two force peaks in one pulse leave a hole in the force spectrum at {hole:.3g} Hz",
-            "late": f"{SECOND_TOUCH_TEXT} leaves its response too little time to decay",
+            "late": f"{TOUCH_TEXT} leaves its response too little time to decay",
             "decay": "The decay is disturbed {delay:.2g} ms after the hit, probably by a double hit",
         },
     ),

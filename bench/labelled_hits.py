@@ -229,7 +229,7 @@ def double(one: Session) -> Hit:
 
 
 def touched(one: Session) -> Hit:
-    """A second touch of 3 to 30 %, from a pulse width to 20 ms after the first or as far before it."""
+    """A further touch of 3 to 30 %, from a pulse width to 20 ms after the first or as far before it."""
     first = one.blow()
     share = np.exp(one.random.uniform(np.log(0.03), np.log(0.3)))
     before = 0.7 * one.setting.pre_trigger / one.setting.sample_rate - 2 * first.width
@@ -241,7 +241,7 @@ def touched(one: Session) -> Hit:
 
 
 def touched_late(one: Session) -> Hit:
-    """A second touch of 20 to 60 % whose response has 5 to 50 % of the loudest of the record at its end."""
+    """A further touch of 20 to 60 % whose response has 5 to 50 % of the loudest of the record at its end."""
     structure, setting = one.setting.structure, one.setting
     slowest = 2 * np.pi * np.min(structure.frequency * structure.damping_ratio)
     while True:
@@ -256,7 +256,7 @@ def touched_late(one: Session) -> Hit:
 
 
 def second_blow(one: Session, first: Blow, share: float, gap: float, *, early: bool = False) -> Blow:
-    """A second touch whose 5 % level stands `gap` widths (at the 5 % level) from that of the first."""
+    """A further touch whose 5 % level stands `gap` widths (at the 5 % level) from that of the first."""
     width = first.width * one.random.uniform(0.8, 1.8)
     pause = gap * (1 - 2 * FALL) * first.width
     if early:
@@ -382,10 +382,10 @@ KINDS: Kinds = {
 }
 """By kind: how one is made, the flag that it must get, how many a session."""
 TOUCHES: Kinds = {
-    "second touch": (touched, HitFlags.OK, 8),
-    "second touch at the end": (touched_late, HitFlags.DOUBLE_HIT | HitFlags.NOT_DECAYED, 2),
+    "further touch": (touched, HitFlags.OK, 8),
+    "touch at the end": (touched_late, HitFlags.DOUBLE_HIT | HitFlags.NOT_DECAYED, 2),
 }
-"""Kinds of second touches: harmless ones, and those whose response the record does not hold (either flag will do)."""
+"""Kinds of further touches: harmless ones, and those whose response the record does not hold (either flag will do)."""
 
 
 def labelled_hits(setting: Setting, sessions: int, seed: int, kinds: Kinds = KINDS) -> Iterator[LabelledHit]:

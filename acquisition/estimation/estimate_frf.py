@@ -24,7 +24,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
 
     H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), and Hv is their geometric mean with
     the phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to
-    zero after its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
+    zero around each touch of the hammer, which keeps its noise out. Lines without excitation have receptance 0 and
+    coherence 0.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     Returns
     -------
     s_ff : ndarray, shape (n // 2 + 1,)
-        Auto-spectrum of the force (N^2), tapered to zero after its pulse.
+        Auto-spectrum of the force (N^2), tapered to zero around each touch.
     s_xx : ndarray, shape (n // 2 + 1,)
         Auto-spectrum of the response ((m/s^2)^2).
     s_fx : ndarray, shape (n // 2 + 1,)

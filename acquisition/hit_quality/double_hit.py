@@ -7,7 +7,7 @@ from acquisition.arrays import Floats, find_median
 from acquisition.hits.force_window import WindowedForce
 from acquisition.hits.touches import Touch
 
-SECOND_TOUCH_SHARE = 0.025
+NAMED_TOUCH_SHARE = 0.025
 """Height over the main pulse from which a further touch is named; smaller ones are kept as well (chosen)."""
 HOLE_POWER = 0.01
 """Power over the largest below which a line is not used, as for the usable band."""
@@ -17,10 +17,10 @@ HOLE_RESOLUTION = 32
 """Number of lines from hole to hole, so that one of them is 26 dB down."""
 
 
-def find_second_touch(part: WindowedForce) -> Touch | None:
+def find_highest_touch(part: WindowedForce) -> Touch | None:
     """Find the highest further touch; None without one of 2.5 % of the main pulse."""
     highest = max(part.touches, key=lambda touch: touch.height, default=None)
-    return highest if highest and highest.height >= SECOND_TOUCH_SHARE * part.pulse.peak else None
+    return highest if highest and highest.height >= NAMED_TOUCH_SHARE * part.pulse.peak else None
 
 
 def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> float | None:

@@ -14,8 +14,8 @@ from acquisition.errors import DataError, join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.hit_fault import HIT_FAULTS, SECOND_TOUCH_TEXT, HitFlags
-from acquisition.hit_quality.double_hit import find_force_hole, find_second_input, find_second_touch
+from acquisition.hit_fault import HIT_FAULTS, TOUCH_TEXT, HitFlags
+from acquisition.hit_quality.double_hit import find_force_hole, find_highest_touch, find_second_input
 from acquisition.hit_quality.overload_and_hum import find_overload, fit_mains_hum, is_like_hum
 from acquisition.hits.force_window import window_force
 from acquisition.hits.free_decay import MAX_CONTACT_TIME, extract_free_decay, measure_rest_noise
@@ -37,7 +37,7 @@ class HitVerdict:
     reasons: tuple[str, ...] = ()
     """Finding with its figures, and remedy, of each flag in their order."""
     notes: tuple[str, ...] = ()
-    """Findings that are no fault: a second touch that the FRF includes."""
+    """Findings that are no fault: a further touch that the FRF includes."""
 
     @classmethod
     def from_findings(cls, findings: Mapping[HitFlags, str], notes: tuple[str, ...] = ()) -> HitVerdict:
@@ -109,7 +109,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
         band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
         findings |= evaluate_spectrum(hit, mean if not findings else None, band)
-    return HitVerdict.from_findings(findings, () if HitFlags.DOUBLE_HIT in findings else describe_second_touch(hit))
+    return HitVerdict.from_findings(findings, () if HitFlags.DOUBLE_HIT in findings else describe_highest_touch(hit))
 
 
 def check_hit(hit: Hit) -> HitFlags:
@@ -280,12 +280,12 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
     return {}
 
 
-def describe_second_touch(hit: Hit) -> tuple[str, ...]:
+def describe_highest_touch(hit: Hit) -> tuple[str, ...]:
     """Return the note on the highest further touch of a hit with a pulse; none below 2.5 % of the main pulse."""
-    second = find_second_touch(window_force(hit))
+    second = find_highest_touch(window_force(hit))
     if second is None:
         return ()
-    return (join_sentences(SECOND_TOUCH_TEXT.format(**_measure_touch(hit, second)), "The FRF includes it"),)
+    return (join_sentences(TOUCH_TEXT.format(**_measure_touch(hit, second)), "The FRF includes it"),)
 
 
 def _measure_touch(hit: Hit, touch: Touch) -> dict[str, object]:
@@ -302,7 +302,7 @@ def _evaluate_touches(hit: Hit, band: tuple[float, float] | None) -> Findings:
     first = float(part.pulse.force[0]) / part.pulse.peak
     if part.pulse.start == 0 and first > cut:
         return _state(HitFlags.NO_HIT, "cut", share=first)
-    hole, second = find_force_hole(part, hit.sample_rate, band[1] if band else np.inf), find_second_touch(part)
+    hole, second = find_force_hole(part, hit.sample_rate, band[1] if band else np.inf), find_highest_touch(part)
     if hole is not None and second is not None:
         return _state(HitFlags.DOUBLE_HIT, "hole", hole=hole, **_measure_touch(hit, second))
     if hole is not None:

@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 
 _RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
 
+TOUCH_TEXT = "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)"
+"""Finding of a further touch, as a fault or as a note."""
+
 
 class HitFlags(enum.Flag):
     """Faults of a hit; falsy for a good hit. `str()` gives words and remedies.
@@ -24,7 +27,7 @@ class HitFlags(enum.Flag):
     OK = 0
     """No fault."""
     DOUBLE_HIT = enum.auto()
-    """The hammer touched twice."""
+    """The hammer touched twice, with a hole in the force spectrum or a response that the record does not hold."""
     OVERLOAD_FORCE = enum.auto()
     """The force is clipped."""
     OVERLOAD_RESPONSE = enum.auto()
@@ -115,7 +118,9 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "double hit",
         "Let the hammer bounce off after the hit.",
         {
-            "pulse": "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)",
+            "hole": f"{TOUCH_TEXT} leaves a hole in the force spectrum at {{hole:.3g}} Hz",
+            "merged": "Two force peaks in one pulse leave a hole in the force spectrum at {hole:.3g} Hz",
+            "late": f"{TOUCH_TEXT} leaves its response too little time to decay",
             "decay": "The decay is disturbed {delay:.2g} ms after the hit, probably by a double hit",
         },
     ),
@@ -160,7 +165,11 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     HitFlags.NO_HIT: HitFault(
         "no hit",
         "Check the hammer cable and the trigger level.",
-        {"": "No hammer pulse above the noise of the force signal"},
+        {
+            "": "No hammer pulse above the noise of the force signal",
+            "cut": "The record begins inside the force pulse, at {share:.0%} of its peak",
+        },
+        {"first_share": 0.1},
     ),
     HitFlags.SWAPPED_CHANNELS: HitFault(
         "swapped channels",
@@ -196,5 +205,5 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
 The limits are chosen. A peak below 2 % of the force range shows the steps of the converter. Above 90 % the sensor may
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
 noise. A hit 30 % away from the mean would move a mean of ten hits by 3 %. Its distance must also be 4 times what the
-scatter of the hits would give.
+scatter of the hits would give. A pulse whose first 10 % of the peak are missing has lost 1 % of its impulse.
 """

@@ -219,26 +219,44 @@ def good(one: Session) -> Hit:
 
 
 def double(one: Session) -> Hit:
-    """A second touch of 3 to 60 % and 6 times the noise or more, at least a pulse width away, after or before."""
+    """Two touches equal within 10 %, at least a pulse width apart: they cancel somewhere in the band."""
     first = one.blow()
-    least = max(0.03, 6 * one.force_noise / first.peak)
-    share = np.exp(one.random.uniform(np.log(least), np.log(max(0.6, 1.2 * least))))
     room = 0.8 * one.setting.record / one.setting.sample_rate
-    early = (
-        least < 0.2
-        and one.random.uniform() < 0.3
-        and 4 * first.width < 0.7 * one.setting.pre_trigger / one.setting.sample_rate
-    )
-    if early:
-        room = 0.7 * one.setting.pre_trigger / one.setting.sample_rate - 2 * first.width
-        share = one.random.uniform(least, 0.3)
-    second = second_blow(one, first, share, np.exp(one.random.uniform(0, np.log(room / first.width))), early=early)
+    gap = np.exp(one.random.uniform(0, np.log(room / first.width)))
+    second = second_blow(one, first, one.random.uniform(0.9, 1.1), gap)
     clean = one.signal([first, second], one.setting.structure)
     return one.take(clean + one.noise(clean.shape[1]))
 
 
+def touched(one: Session) -> Hit:
+    """A further touch of 3 to 30 %, from a pulse width to 20 ms after the first or as far before it."""
+    first = one.blow()
+    share = np.exp(one.random.uniform(np.log(0.03), np.log(0.3)))
+    before = 0.7 * one.setting.pre_trigger / one.setting.sample_rate - 2 * first.width
+    early = one.random.uniform() < 0.3 and before > 2 * first.width
+    longest = min(before, 20e-3) if early else max(20e-3, 2 * first.width)
+    gap = np.exp(one.random.uniform(0, np.log(longest / first.width)))
+    clean = one.signal([first, second_blow(one, first, share, gap, early=early)], one.setting.structure)
+    return one.take(clean + one.noise(clean.shape[1]))
+
+
+def touched_late(one: Session) -> Hit:
+    """A further touch of 20 to 60 % whose response has 5 to 50 % of the loudest of the record at its end."""
+    structure, setting = one.setting.structure, one.setting
+    slowest = 2 * np.pi * np.min(structure.frequency * structure.damping_ratio)
+    while True:
+        first, share = one.blow(), one.random.uniform(0.2, 0.6)
+        start = (setting.record - setting.pre_trigger) / setting.sample_rate - one.random.uniform(0, 3) / slowest
+        clean = one.signal([first, replace(first, peak=share * first.peak, start=start)], structure)
+        end = int(1.5 * setting.pre_trigger) + setting.record - setting.pre_trigger
+        tenths = [float(np.std(part)) for part in np.array_split(clean[1, end - setting.record : end], 10)]
+        left = float(np.std(clean[1, end - setting.record // 50 : end]))
+        if left > max(0.05 * max(tenths), 4 * one.response_noise):
+            return one.take(clean + one.noise(clean.shape[1]))
+
+
 def second_blow(one: Session, first: Blow, share: float, gap: float, *, early: bool = False) -> Blow:
-    """A second touch whose 5 % level stands `gap` widths (at the 5 % level) from that of the first."""
+    """A further touch whose 5 % level stands `gap` widths (at the 5 % level) from that of the first."""
     width = first.width * one.random.uniform(0.8, 1.8)
     pause = gap * (1 - 2 * FALL) * first.width
     if early:
@@ -345,7 +363,9 @@ def _wide(one: Session, clean: Signal) -> tuple[Channel, Channel]:
     return one.channels[0], replace(one.channels[1], full_scale=3e-3 * float(np.abs(clean[1]).max()))
 
 
-KINDS: dict[str, tuple[Callable[[Session], Hit], HitFlags, int]] = {
+Kinds = dict[str, tuple[Callable[[Session], Hit], HitFlags, int]]
+
+KINDS: Kinds = {
     "good": (good, HitFlags.OK, 10),
     "double hit": (double, HitFlags.DOUBLE_HIT, 8),
     "force clipped by the converter": (_clipped(0, amplifier=False), HitFlags.OVERLOAD_FORCE, 1),
@@ -361,13 +381,18 @@ KINDS: dict[str, tuple[Callable[[Session], Hit], HitFlags, int]] = {
     "other direction": (other_direction, HitFlags.INCONSISTENT, 1),
 }
 """By kind: how one is made, the flag that it must get, how many a session."""
+TOUCHES: Kinds = {
+    "further touch": (touched, HitFlags.OK, 8),
+    "touch at the end": (touched_late, HitFlags.DOUBLE_HIT | HitFlags.NOT_DECAYED, 2),
+}
+"""Kinds of further touches: harmless ones, and those whose response the record does not hold (either flag will do)."""
 
 
-def labelled_hits(setting: Setting, sessions: int, seed: int) -> Iterator[LabelledHit]:
-    """The hits of so many sessions, 29 each."""
+def labelled_hits(setting: Setting, sessions: int, seed: int, kinds: Kinds = KINDS) -> Iterator[LabelledHit]:
+    """The hits of so many sessions, 29 each of KINDS."""
     for number, random in enumerate(np.random.default_rng(seed).spawn(sessions)):
         one = session(setting, random, number)
         mean = estimate_frf([good(one) for _ in range(int(random.integers(3, 8)))])
-        for kind, (make, expected, count) in KINDS.items():
+        for kind, (make, expected, count) in kinds.items():
             for _ in range(count):
                 yield LabelledHit(kind, make(one), expected, mean)

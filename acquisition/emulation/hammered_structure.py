@@ -90,7 +90,7 @@ class Hammering:
     interval_range: tuple[float, float] = (0.4, 0.5)
     """Range of the time between impacts (s)."""
     double_hits: float = 0.05
-    """Share of double hits."""
+    """Share of double hits: two touches that are equal within 10 %."""
     overloads: float = 0.05
     """Share of impacts that are far too hard."""
     force_noise: float = 0.1
@@ -158,7 +158,7 @@ class HammeredStructure:
         wave = peak * self._pulse(time, width)
         if fault < self.hammering.double_hits:
             delay = self.random.uniform(4, 12) * width
-            wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
+            wave += self.random.uniform(0.9, 1.1) * peak * self._pulse(time - delay, width)
         return start, wave
 
     def _pulse(self, time: AnyFloats, width: float) -> Floats:

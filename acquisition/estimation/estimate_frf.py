@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition.arrays import Complexes, Flags, Floats
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.hits.pulse import window_force
+from acquisition.hits.force_window import window_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -24,7 +24,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
 
     H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), and Hv is their geometric mean with
     the phase of S_fx, where S_fx is the mean of conj(F) X. The response window is rectangular. The force is tapered to
-    zero after its pulse, which keeps its noise out. Lines without excitation have receptance 0 and coherence 0.
+    zero around each touch of the hammer, which keeps its noise out. Lines without excitation have receptance 0 and
+    coherence 0.
 
     Parameters
     ----------
@@ -94,7 +95,7 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     Returns
     -------
     s_ff : ndarray, shape (n // 2 + 1,)
-        Auto-spectrum of the force (N^2), tapered to zero after its pulse.
+        Auto-spectrum of the force (N^2), tapered to zero around each touch.
     s_xx : ndarray, shape (n // 2 + 1,)
         Auto-spectrum of the response ((m/s^2)^2).
     s_fx : ndarray, shape (n // 2 + 1,)
@@ -127,15 +128,15 @@ def compute_cross_spectra(hits: Sequence[Hit]) -> Spectra:
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
     parts = spectra.view(np.float64)
-    s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
+    s_fx, product, powers = np.zeros_like(spectra[0]), np.empty_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
         part = window_force(hit)
-        backwards = -np.arange(part.samples.start, part.samples.stop)
+        backwards = -part.samples
         records[0, backwards] = part.force  # in time: its spectrum is conj(F)
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
         records[0, backwards] = 0.0
-        s_fx += spectra[0] * spectra[1]
+        s_fx += np.multiply(spectra[0], spectra[1], out=product)
         powers += np.square(parts, out=parts)
     channels = hits[0].channels
     skew = channels[1].skew - channels[0].skew if channels else 0.0  # delay of the response (s)
@@ -330,10 +331,12 @@ def propagate_force_noise_through(
 ) -> Iterator[Complexes]:
     """Yield linear maps (k, n) of each array of `propagate_force_noise`, shape (k, samples + 1), without that array."""
     parts = [window_force(hit) for hit in hits]
-    time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
-    waves = np.exp(-2j * np.pi * np.outer(frequency, time))
-    spectra = [waves[:, : part.force.size] @ part.force for part in parts]
+    delays = [part.samples - part.samples[0] for part in parts]
+    used = np.unique(np.concatenate(delays))
+    waves = np.exp(-2j * np.pi * np.outer(frequency, used / hits[0].sample_rate))
+    columns = [np.searchsorted(used, delay) for delay in delays]
+    spectra = [waves[:, column] @ part.force for column, part in zip(columns, parts, strict=True)]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
-    for part, spectrum in zip(parts, spectra, strict=True):
-        response = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
+    for part, spectrum, column in zip(parts, spectra, columns, strict=True):
+        response = (rows * (np.conj(spectrum) / power)) @ waves[:, column]
         yield np.column_stack((response * (-part.noise * part.window), response @ (part.mean_noise * part.window)))

@@ -1,102 +1,66 @@
-"""Detect double hits in the force pulse and in the free decay."""
-
-from dataclasses import dataclass
-from statistics import NormalDist
+"""Detect touches that spoil the force spectrum, and double hits in the free decay."""
 
 import numpy as np
 import scipy
 
 from acquisition.arrays import Floats, find_median
-from acquisition.hits.pulse import Pulse
+from acquisition.hits.force_window import WindowedForce
+from acquisition.hits.touches import Touch
 
-DOUBLE_HIT_SHARE = 0.025
-"""Height over the first pulse from which a second pulse makes a double hit; 3 % is found for any shape."""
-HEIGHT_NOISE_MARGIN = 3.0
-"""Reduction of that height in noise, in multiples of the noise of the pulse height."""
-PULSE_WIDTH_RATIOS = (0.7, 1.0, 1.4, 2.0)
-"""Widths to search for, over that of the first pulse: a lighter touch lasts longer."""
-MIN_PULSE_PROMINENCE = 0.3
-"""Smallest prominence over either side, as a share of the height: 0.75 of a pulse, 0 of a recovering force."""
-PULSE_FALSE_ALARM_RATE = 1e-3
-"""Probability that noise passes for a second pulse in one hit."""
-BINS_PER_PULSE = 8
-"""Number of averaged samples per pulse width; fewer where it was recorded with fewer."""
+NAMED_TOUCH_SHARE = 0.025
+"""Height over the main pulse from which a further touch is named; smaller ones are kept as well (chosen)."""
+HOLE_POWER = 0.01
+"""Power over the largest below which a line is not used, as for the usable band."""
+MIN_LOBE_POWER = 0.1
+"""Power over the largest behind a hole; the lobes of no single pulse are as high (0.047 for a rectangle)."""
+HOLE_RESOLUTION = 32
+"""Number of lines from hole to hole, so that one of them is 26 dB down."""
 
 
-@dataclass(frozen=True)
-class SecondPulse:
-    """Second pulse of a hit."""
-
-    delay: float
-    """Samples from the peak of the main pulse, negative before it."""
-    share: float
-    """Height over that of the main pulse (-)."""
+def find_highest_touch(part: WindowedForce) -> Touch | None:
+    """Find the highest further touch; None without one of 2.5 % of the main pulse."""
+    highest = max(part.touches, key=lambda touch: touch.height, default=None)
+    return highest if highest and highest.height >= NAMED_TOUCH_SHARE * part.pulse.peak else None
 
 
-def find_second_pulse(pulse: Pulse) -> SecondPulse | None:
-    """Find the highest second pulse more than one pulse width away from the main one; None without one.
+def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> float | None:
+    """Find the first hole in the force spectrum below a frequency (Hz); None without one.
 
-    The force is correlated with a raised-cosine bump less its own mean over three times its length. Offset, drift and
-    mains hum drop out, and noise is averaged over a pulse. The bump must be higher than either side: behind a
-    conditioner with a high pass the force sinks below zero after the main pulse and recovers, which is no touch. A
-    pulse counts where it is farther out of the noise of that estimate (median absolute deviation in the same record)
-    than noise would reach in one of a thousand hits, and is not certainly below 2.5 % of the main pulse.
-
-    Source of the matched filter: Turin, IRE Trans. Inform. Theory 6 (1960) 311.
+    Two equal touches with the time T between them cancel at 1/(2 T). A hole is 20 dB below the largest power, between
+    lines less than 10 dB below it, which no single pulse has.
     """
-    width = pulse.end - pulse.start
-    step = max(1, width // BINS_PER_PULSE)
-    force = _remove_main_pulse(pulse, width)
-    force = force[: force.size // step * step].reshape(-1, step).mean(axis=1)
-    span = width / step
-    near = (np.array([pulse.start - width, pulse.end + width]) / step).astype(int)
-    limit = NormalDist().inv_cdf(1 - PULSE_FALSE_ALARM_RATE / (force.size * len(PULSE_WIDTH_RATIOS)))
-    best = SecondPulse(0.0, 0.0)
-    for relative in PULSE_WIDTH_RATIOS:
-        heights = _fit_bump_heights(force, 1.4 * relative * span)
-        outside, rise = np.concatenate((heights[:, : max(near[0], 0)], heights[:, near[1] :]), axis=1)
-        if outside.size < BINS_PER_PULSE:
-            continue
-        standing = np.where(rise > MIN_PULSE_PROMINENCE * outside, outside, 0.0)
-        at = int(np.argmax(standing))
-        share = float(standing[at]) / pulse.peak
-        if share <= max(best.share, DOUBLE_HIT_SHARE / (1 + HEIGHT_NOISE_MARGIN / limit)):
-            continue  # whatever the noise is
-        noise = 1.4826 * float(np.median(np.abs(outside - np.median(outside))))
-        if standing[at] > limit * noise and share > DOUBLE_HIT_SHARE - HEIGHT_NOISE_MARGIN * noise / pulse.peak:
-            bin_ = at if at < near[0] else at - max(near[0], 0) + near[1]
-            best = SecondPulse((bin_ + 0.5) * step - pulse.peak_index, share)
-    return best if best.share else None
+    if not _may_cancel(part):
+        return None
+    delays = part.samples - part.samples[0]
+    size = scipy.fft.next_fast_len(HOLE_RESOLUTION * (int(delays[-1]) + 1), real=True)
+    force = np.zeros(size)
+    force[delays] = part.force
+    spectrum = np.fft.rfft(force)
+    power = spectrum.real**2 + spectrum.imag**2
+    largest = float(np.max(power))
+    high = np.flatnonzero(power > MIN_LOBE_POWER * largest)
+    deep = high[0] + np.flatnonzero(power[high[0] : high[-1]] < HOLE_POWER * largest)
+    if not deep.size:
+        return None
+    first = np.split(deep, np.flatnonzero(np.diff(deep) > 1) + 1)[0]
+    hole = float(first[np.argmin(power[first])]) * sample_rate / size
+    return hole if hole < end else None
 
 
-def _remove_main_pulse(pulse: Pulse, width: int) -> Floats:
-    """Replace the main pulse and half its width on either side by a straight line."""
-    low, high = max(pulse.start - width // 2, 0), min(pulse.end + width // 2, pulse.recorded.size)
-    force = pulse.force
-    before, after = force[max(low - width // 2, 0) : low], force[high : high + max(width // 2, 1)]
-    ends = [float(np.mean(side)) if side.size else None for side in (before, after)]
-    left, right = (end if end is not None else opposite or 0.0 for end, opposite in (ends, ends[::-1]))
-    force[low:high] = np.linspace(left, right, high - low)
-    return force
+def _may_cancel(part: WindowedForce) -> bool:
+    """Tell whether touches apart could make a hole whatever the time between them, by the spectra of each alone.
 
-
-def _fit_bump_heights(force: Floats, foot: float) -> Floats:
-    """Fit a raised cosine around every sample, shape (2, n).
-
-    Rows: its least-squares height, and its prominence over the higher side. foot: width of the bump (samples).
+    The spectrum of touches far apart has so many lines that it is computed only then.
     """
-    half, wing = int(np.ceil(1.5 * foot)), int(np.ceil(foot / 2)) - 1
-    place = np.arange(-wing, wing + 1)
-    bump = 0.5 * (1 + np.cos(2 * np.pi * place / foot))
-    length, side = 2 * half + 1, half - wing
-    mean = bump.sum() / length
-    padded = np.pad(force, half, mode="reflect")
-    sums = np.concatenate(([0.0], np.cumsum(padded)))
-    weighed = np.convolve(padded[side : padded.size - side], bump, "valid")
-    parts = ((0, side), (length - side, length), (0, length))
-    left, right, whole = (sums[stop:][: force.size] - sums[start:][: force.size] for start, stop in parts)
-    height = (weighed - mean * whole) / (np.sum(bump**2) - length * mean**2)
-    return np.stack([height, weighed / bump.sum() - np.maximum(left, right) / side])
+    parts = np.split(part.force, np.flatnonzero(np.diff(part.samples) > 1) + 1)
+    if len(parts) == 1:
+        return True
+    size = scipy.fft.next_fast_len(HOLE_RESOLUTION * max(map(len, parts)), real=True)
+    sizes = np.array([np.abs(np.fft.rfft(force, size)) for force in parts])
+    most = np.sum(sizes, axis=0)
+    least = np.maximum(2 * np.max(sizes, axis=0) - most, 0.0)
+    reach = np.flatnonzero(most**2 > MIN_LOBE_POWER * np.max(least) ** 2)[-1]
+    return bool(np.any(least[: reach + 1] ** 2 < HOLE_POWER * np.max(most) ** 2))
 
 
 PREDICTION_ORDER = 32

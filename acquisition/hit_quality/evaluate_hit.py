@@ -14,11 +14,13 @@ from acquisition.errors import DataError, join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.hit_fault import HIT_FAULTS, HitFlags
-from acquisition.hit_quality.double_hit import find_second_input, find_second_pulse
+from acquisition.hit_fault import HIT_FAULTS, TOUCH_TEXT, HitFlags
+from acquisition.hit_quality.double_hit import find_force_hole, find_highest_touch, find_second_input
 from acquisition.hit_quality.overload_and_hum import find_overload, fit_mains_hum, is_like_hum
+from acquisition.hits.force_window import window_force
 from acquisition.hits.free_decay import MAX_CONTACT_TIME, extract_free_decay, measure_rest_noise
 from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, find_pulse
+from acquisition.hits.touches import Touch
 
 Findings = dict[HitFlags, str]
 """Finding with its figures for each fault of a hit, without the remedy."""
@@ -34,18 +36,22 @@ class HitVerdict:
     """Flags of the faults; falsy if the hit may be averaged."""
     reasons: tuple[str, ...] = ()
     """Finding with its figures, and remedy, of each flag in their order."""
+    notes: tuple[str, ...] = ()
+    """Findings that are no fault: a further touch that the FRF includes."""
 
     @classmethod
-    def from_findings(cls, findings: Mapping[HitFlags, str]) -> HitVerdict:
+    def from_findings(cls, findings: Mapping[HitFlags, str], notes: tuple[str, ...] = ()) -> HitVerdict:
         """Return the verdict with these findings.
 
         Parameters
         ----------
         findings
             Finding for each flag, without the remedy.
+        notes
+            Findings that are no fault.
         """
         flags = functools.reduce(operator.or_, findings, HitFlags.OK)
-        return cls(flags, tuple(join_sentences(findings[flag], flag.cure) for flag in flags))
+        return cls(flags, tuple(join_sentences(findings[flag], flag.cure) for flag in flags), notes)
 
     @property
     def text(self) -> str:
@@ -98,10 +104,12 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
     findings |= _evaluate_strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
-    findings |= _evaluate_pulses(hit, pulse) | _evaluate_decay(hit)
+    findings |= _evaluate_touches(hit, band) | _evaluate_decay(hit)
+    if HitFlags.DOUBLE_HIT in findings:
+        band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
         findings |= evaluate_spectrum(hit, mean if not findings else None, band)
-    return HitVerdict.from_findings(findings)
+    return HitVerdict.from_findings(findings, () if HitFlags.DOUBLE_HIT in findings else describe_highest_touch(hit))
 
 
 def check_hit(hit: Hit) -> HitFlags:
@@ -237,13 +245,15 @@ def _is_swapped(hit: Hit) -> bool:
     """Return whether the response is one short pulse of one sign while the force swings through both signs."""
     noise = float(np.std(extract_baseline(hit.acceleration, hit.pre_trigger)))
     smaller, larger = _measure_swings(hit.acceleration)
-    if smaller >= max(0.1 * larger, 6 * noise):
+    small = max(0.1 * larger, 6 * noise)
+    if smaller >= small:
         return False
     smaller, larger = _measure_swings(hit.force)
     if smaller <= 0.3 * larger:
         return False
-    force, response = (_measure_energy_duration(signal) for signal in (hit.force, hit.acceleration))
-    return force > 3 * response
+    force, response = (signal - find_median(signal) for signal in (hit.force, hit.acceleration))
+    pulse = np.where(np.abs(response) < small, 0.0, response)
+    return _measure_energy_duration(force) > 3 * _measure_energy_duration(pulse)
 
 
 def _measure_swings(signal: Floats) -> tuple[float, float]:
@@ -254,8 +264,8 @@ def _measure_swings(signal: Floats) -> tuple[float, float]:
 
 
 def _measure_energy_duration(signal: Floats) -> int:
-    """Count the samples that hold the central 90 % of the energy about the median."""
-    energy = np.cumsum((signal - find_median(signal)) ** 2)
+    """Count the samples that hold the central 90 % of the energy."""
+    energy = np.cumsum(signal**2)
     low, high = np.searchsorted(energy, [0.05 * energy[-1], 0.95 * energy[-1]])
     return int(high - low) + 1
 
@@ -272,12 +282,46 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
     return {}
 
 
-def _evaluate_pulses(hit: Hit, pulse: Pulse) -> Findings:
-    second = find_second_pulse(pulse)
+def describe_highest_touch(hit: Hit) -> tuple[str, ...]:
+    """Return the note on the highest further touch of a hit with a pulse; none below 2.5 % of the main pulse."""
+    second = find_highest_touch(window_force(hit))
     if second is None:
-        return {}
-    delay, side = abs(second.delay) / hit.sample_rate * 1e3, "after" if second.delay > 0 else "before"
-    return _state(HitFlags.DOUBLE_HIT, "pulse", delay=delay, side=side, percent=100 * second.share)
+        return ()
+    return (join_sentences(TOUCH_TEXT.format(**_measure_touch(hit, second)), "The FRF includes it"),)
+
+
+def _measure_touch(hit: Hit, touch: Touch) -> dict[str, object]:
+    """Return the figures of a touch."""
+    pulse = window_force(hit).pulse
+    delay = (touch.peak_index - pulse.peak_index) / hit.sample_rate
+    side = "after" if delay > 0 else "before"
+    return {"delay": 1e3 * abs(delay), "side": side, "percent": 100 * touch.height / pulse.peak}
+
+
+def _evaluate_touches(hit: Hit, band: tuple[float, float] | None) -> Findings:
+    """Evaluate the force of a hit: the begin of its pulse, and whether a further touch does harm."""
+    part, cut = window_force(hit), HIT_FAULTS[HitFlags.NO_HIT].limits["first_share"]
+    first = float(part.pulse.force[0]) / part.pulse.peak
+    if part.pulse.start == 0 and first > cut:
+        return _state(HitFlags.NO_HIT, "cut", share=first)
+    hole, second = find_force_hole(part, hit.sample_rate, band[1] if band else np.inf), find_highest_touch(part)
+    if hole is not None and second is not None:
+        return _state(HitFlags.DOUBLE_HIT, "hole", hole=hole, **_measure_touch(hit, second))
+    if hole is not None:
+        return _state(HitFlags.DOUBLE_HIT, "merged", hole=hole)
+    late = next(filter(functools.partial(_is_too_late, hit), part.touches), None)
+    return _state(HitFlags.DOUBLE_HIT, "late", **_measure_touch(hit, late)) if late else {}
+
+
+def _is_too_late(hit: Hit, touch: Touch) -> bool:
+    """Return whether the record cuts off the response to a touch in its second half.
+
+    Of that response the record holds as much as of the response to the main pulse up to an earlier end. What is left of
+    it there, times the relative height of the touch, may be as much as at the end of any hit.
+    """
+    pulse, limit = window_force(hit).pulse, HIT_FAULTS[HitFlags.NOT_DECAYED].limits["residual_share"]
+    end = max(pulse.peak_index + hit.force.size - int(touch.peak_index), pulse.end + pulse.width)
+    return end < touch.peak_index and touch.height * _measure_residual(hit, end)[0] > limit * pulse.peak
 
 
 def _evaluate_response(hit: Hit) -> Findings:
@@ -293,15 +337,17 @@ def _evaluate_response(hit: Hit) -> Findings:
 
 
 def _evaluate_decay(hit: Hit) -> Findings:
-    before = int(0.8 * count_pre_hit_samples(hit))
-    share = _compute_residual_share(hit.acceleration, before)
-    if share == 0:
-        return {}
-    hum = fit_mains_hum(hit, before)
-    if hum is not None:
-        share = _compute_residual_share(hit.acceleration - hum, before)
-    case = "hum" if hum is None and is_like_hum(hit) else ""
+    share, is_without_hum = _measure_residual(hit, hit.acceleration.size)
+    case = "hum" if share and not is_without_hum and is_like_hum(hit) else ""
     return _state(HitFlags.NOT_DECAYED, case, share=share) if share else {}
+
+
+def _measure_residual(hit: Hit, end: int) -> tuple[float, bool]:
+    """Return the residual share of the response up to a sample, and whether hum was removed from it."""
+    before = int(0.8 * count_pre_hit_samples(hit))
+    share = _compute_residual_share(hit.acceleration[:end], before)
+    hum = fit_mains_hum(hit, before) if share else None
+    return (share, False) if hum is None else (_compute_residual_share((hit.acceleration - hum)[:end], before), True)
 
 
 def _compute_residual_share(response: Floats, before: int) -> float:

@@ -12,6 +12,13 @@ PULSE_END_SHARE = 0.05
 """Share of the peak below which a pulse ends, unless the noise is larger."""
 BASELINE_NOISE_RATIO = 3.0
 """Level of the noise over the rms of the baseline, below which a pulse ends."""
+MIN_TOUCH_SHARE = 0.003
+"""Smallest height of a touch over that of the main pulse: one that is left out changes the FRF by its share (chosen).
+"""
+TOUCH_DEVIATION = 4.0
+"""Largest force of a baseline over its rms above which a touch is searched in it (chosen)."""
+TOUCH_SPREAD = 6.0
+"""Robust standard deviations from the median above which samples of a baseline are those of a touch (chosen)."""
 SEARCH_BLOCK_SIZE = 1024
 """Number of samples searched at once."""
 
@@ -36,6 +43,11 @@ class Pulse:
     """Rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
     @property
+    def width(self) -> int:
+        """Length between these (samples), at least 8."""
+        return max(self.end - self.start, 8)
+
+    @property
     def force(self) -> Floats:
         """Force without its offset (N), shape (n,)."""
         return self.recorded - self.offset
@@ -47,8 +59,9 @@ def find_pulse(hit: Hit) -> Pulse | None:
         return None
     top = int(np.argmax(hit.force))
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    offset = float(np.mean(quiet))
-    rms = float(np.sqrt(np.mean((quiet - offset) ** 2)))
+    offset, rms = _measure_mean_and_rms(quiet)
+    if float(quiet.max()) > offset + TOUCH_DEVIATION * rms:
+        offset, rms = _measure_mean_and_rms(_drop_touches(quiet, float(hit.force[top])))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None
@@ -56,6 +69,20 @@ def find_pulse(hit: Hit) -> Pulse | None:
     start = top - _count_above(foot, hit.force[top::-1]) + 1
     end = top + _count_above(foot, hit.force[top:])
     return Pulse(hit.force, offset, top, peak, start, end, rms)
+
+
+def _measure_mean_and_rms(values: Floats) -> tuple[float, float]:
+    """Return the mean and the rms about it."""
+    mean = float(values.mean())
+    apart = values - mean
+    return mean, float(np.sqrt(np.mean(apart * apart)))
+
+
+def _drop_touches(quiet: Floats, top: float) -> Floats:
+    """Return the samples of a baseline without those of a touch before the main pulse."""
+    middle = find_median(quiet)
+    spread = 1.4826 * find_median(np.abs(quiet - middle))
+    return quiet[np.abs(quiet - middle) <= max(TOUCH_SPREAD * spread, MIN_TOUCH_SHARE * (top - middle))]
 
 
 def require_pulse(hit: Hit) -> Pulse:
@@ -103,46 +130,3 @@ def extract_baseline(signal: Floats, before: int) -> Floats:
     """Return the first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
     quiet = signal[: int(0.8 * before)]
     return quiet if quiet.size >= 8 else signal[-max(signal.size // 10, 8) :]
-
-
-@dataclass(frozen=True, eq=False)
-class WindowedForce:
-    """Tapered samples around the pulse of a hit; all others count as zero."""
-
-    samples: slice
-    """Place in the hit."""
-    force: Floats
-    """Force without its offset times the window (N), shape (m,)."""
-    window: Floats
-    """Weight of each sample, 0 to 1, shape (m,)."""
-    noise: float
-    """Rms of the baseline (N)."""
-    mean_noise: float
-    """Standard error of the baseline's mean (N)."""
-
-
-def window_force(hit: Hit) -> WindowedForce:
-    """Return the pulse with one pulse width on either side, tapered to zero over one more (raised cosine).
-
-    A tight window matters: noise inside it is alike at neighbouring lines, and shifts the mode. The result is cached
-    per hit. Raises ValueError for a hit without a pulse.
-    """
-    if hit not in _windowed_forces:
-        _windowed_forces[hit] = _compute_windowed_force(hit)
-    return _windowed_forces[hit]
-
-
-_windowed_forces: WeakKeyDictionary[Hit, WindowedForce] = WeakKeyDictionary()
-
-
-def _compute_windowed_force(hit: Hit) -> WindowedForce:
-    pulse = require_pulse(hit)
-    width = max(pulse.end - pulse.start, 8)
-    corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
-    samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))
-    beyond = np.interp(np.arange(samples.start, samples.stop), corners, [1.0, 0.0, 0.0, 1.0])
-    window = 0.5 + 0.5 * np.cos(np.pi * beyond)
-    quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    noise = pulse.baseline_rms
-    force = (hit.force[samples] - pulse.offset) * window
-    return WindowedForce(samples, force, window, noise, noise / np.sqrt(quiet.size))

@@ -19,6 +19,7 @@ from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.recording_questions import check_quantity
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
+from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
 
@@ -264,7 +265,7 @@ def fit_file_modes(
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
     found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
-    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *found)
+    remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
     return FileModes(
         path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, n_found=file_frf.n_found

@@ -18,6 +18,7 @@ from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
+from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits
 
@@ -120,9 +121,10 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fit = partial(_fit_frf, by_hand=by_hand)
             *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
-            further = (*fitted.remarks, *hidden_window_remarks(tap.accepted, fitted.modes), *changes)
-            asked = (questions.check_quantity(fitted.modes),)
-            return TapFit(*named, fitted.modes, (*remarks, *further, *filter(None, asked)), frf=fitted.extraction.frf)
+            about_hits = (*hidden_window_remarks(tap.accepted, fitted.modes), *touch_remarks(tap.accepted), *changes)
+            asked = filter(None, [questions.check_quantity(fitted.modes)])
+            said = (*remarks, *fitted.remarks, *about_hits, *asked)
+            return TapFit(*named, fitted.modes, said, frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)

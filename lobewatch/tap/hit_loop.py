@@ -264,7 +264,7 @@ class TapPhases:
     def _take(self, hit: Hit) -> None:
         """Evaluate a hit and show the verdict at once. It counts when it is on the disk."""
         verdict = self._tap.evaluate(hit)
-        self._show_verdict(verdict.flags, verdict.text)
+        self._show_verdict(verdict.flags, verdict.text or " ".join(verdict.notes))
         self._tap.add(hit, verdict.flags, verdict.text)
         self._publisher.show(**self._tap.shown)
         self._show_curves(hit)

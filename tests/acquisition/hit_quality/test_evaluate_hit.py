@@ -61,12 +61,70 @@ def test_a_good_hit_has_no_reason() -> None:
 
 
 @pytest.mark.parametrize(("start", "when"), [(12e-3, "12 ms after"), (-8e-3, "8 ms before")])
-def test_a_double_hit_is_reported_with_its_time_and_size(start: float, when: str) -> None:
-    verdict = evaluate_hit(hit((200, 0, 0.6e-3), (36, start, 0.6e-3)))
-    assert verdict.flags == HitFlags.DOUBLE_HIT
-    told = re.fullmatch(rf".*\b{when} .*\((\d+) % .*", verdict.text)
+@pytest.mark.parametrize(("peak", "flags"), [(36, HitFlags.OK), (190, HitFlags.DOUBLE_HIT)])
+def test_a_second_touch_is_reported_with_its_time_and_size(
+    start: float, when: str, peak: float, flags: HitFlags
+) -> None:
+    verdict = evaluate_hit(hit((200, 0, 0.6e-3), (peak, start, 0.6e-3)))
+    assert verdict.flags == flags
+    (told,) = verdict.reasons or verdict.notes
+    found = re.fullmatch(rf".*\b{when} .*\((\d+) % .*", told)
+    assert found is not None
+    assert int(found[1]) == pytest.approx(peak / 2, rel=0.06)
+
+
+def test_a_touch_below_2_5_percent_is_not_named() -> None:
+    assert evaluate_hit(hit((200, 0, 0.6e-3), (4, 12e-3, 0.6e-3))).notes == ()
+
+
+def test_a_hole_counts_up_to_the_end_of_the_required_band() -> None:
+    """Two equal touches cancel at 1 / (2 T): at 250 Hz for 2 ms."""
+    double = hit((200, 0, 0.6e-3), (200, 2e-3, 0.6e-3))
+    told = re.search(r"at (\d+) Hz", evaluate_hit(double).text)
     assert told is not None
-    assert int(told[1]) == pytest.approx(18, abs=1)
+    assert int(told[1]) == pytest.approx(250, rel=0.01)
+    assert evaluate_hit(double, band=(20.0, 220.0)).flags == HitFlags.OK
+    assert evaluate_hit(double, band=(20.0, 260.0)).flags == HitFlags.DOUBLE_HIT
+
+
+def test_two_peaks_in_one_pulse_leave_a_hole() -> None:
+    """At 3 % of the peak between them they are one pulse: 1 / (2 T) = 1000 Hz."""
+    verdict = evaluate_hit(hit((200, 0, 0.6e-3), (200, 0.5e-3, 0.6e-3)))
+    assert verdict.flags == HitFlags.DOUBLE_HIT
+    assert verdict.notes == ()
+
+
+def test_one_flat_or_narrow_pulse_has_no_hole() -> None:
+    """The first lobe of a rectangle, behind its zero at 1 / T, is 13 dB below the largest power."""
+    one = hit((200, 0, 0.6e-3))
+    for samples in (1, 2, 20, 60):
+        force = 0.05 * np.random.default_rng(samples).normal(size=TIME.size)
+        force[512 : 512 + samples] = 200.0
+        assert HitFlags.DOUBLE_HIT not in check_hit(replace(one, force=force))
+
+
+def test_a_touch_whose_response_is_cut_off_is_a_double_hit() -> None:
+    decay, end = 60.0, TIME[-1]
+    for start, share, flags in ((0.12, 0.3, HitFlags.OK), (0.2, 0.3, HitFlags.DOUBLE_HIT), (0.2, 0.02, HitFlags.OK)):
+        one = hit((200, 0, 0.6e-3), (200 * share, start, 0.6e-3))
+        response = np.zeros(TIME.size)
+        for at, size in ((0.0, 1000.0), (start, 1000.0 * share)):
+            t = np.maximum(TIME - at, 0)
+            response += size * np.exp(-decay * t) * np.sin(2 * np.pi * 400 * t)
+        expected = share * np.exp(-decay * (end - start)) > 0.02
+        assert bool(flags) == expected
+        assert evaluate_hit(replace(one, acceleration=response)).flags & HitFlags.DOUBLE_HIT == flags
+
+
+def test_a_record_that_begins_inside_the_pulse_has_no_hit() -> None:
+    whole = hit((200, 0, 0.6e-3))
+    for first, flags in ((514, HitFlags.OK), (520, HitFlags.NO_HIT)):
+        cut = Hit(whole.force[first:], whole.acceleration[first:], RATE)
+        assert check_hit(cut) == flags
+
+
+def test_a_touch_before_the_hit_does_not_count_as_noise() -> None:
+    assert evaluate_hit(hit((200, 0, 0.6e-3), (60, -12e-3, 0.6e-3))).flags == HitFlags.OK
 
 
 @pytest.mark.parametrize("width", [1e-3, 2e-3, 4e-3])
@@ -75,20 +133,23 @@ def test_one_soft_pulse_is_one(width: float, noise: float) -> None:
     assert evaluate_hit(hit((200, 0, width), noise=noise)).flags == HitFlags.OK
 
 
-def test_drift_and_hum_are_no_double_hit_and_hide_none() -> None:
+def test_drift_and_hum_are_no_touch_and_hide_none() -> None:
     for second in (0.0, 40.0):
         one = hit((200, 0, 0.6e-3), (second, 15e-3, 0.6e-3))
         wandering = 5 * np.sin(2 * np.pi * 50 * TIME + 1) + 80 * TIME
-        expected = HitFlags.DOUBLE_HIT if second else HitFlags.OK
-        assert check_hit(replace(one, force=one.force + wandering)) == expected
+        verdict = evaluate_hit(replace(one, force=one.force + wandering))
+        assert verdict.flags == HitFlags.OK
+        assert bool(verdict.notes) == bool(second)
 
 
-def test_noise_alone_is_no_double_hit_however_long_the_record() -> None:
+def test_noise_alone_is_no_touch_however_long_the_record() -> None:
     random = np.random.default_rng(5)
     for _ in range(20):
         force = 5 * random.normal(size=65536)
         force[2000:2020] += 200 * np.sin(np.pi * np.arange(20) / 20) ** 2
-        assert HitFlags.DOUBLE_HIT not in check_hit(Hit(force, random.normal(size=65536), RATE, 1990))
+        verdict = evaluate_hit(Hit(force, random.normal(size=65536), RATE, 1990))
+        assert HitFlags.DOUBLE_HIT not in verdict.flags
+        assert verdict.notes == ()
 
 
 def test_strength_is_evaluated_against_the_range() -> None:

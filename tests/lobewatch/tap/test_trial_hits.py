@@ -131,5 +131,5 @@ def test_ranges_that_do_not_fit_are_reported_with_the_one_that_would(channels: P
 
 def test_a_double_hit_is_no_trial_hit(channels: Pair) -> None:
     trial = TrialHits(TapTable(), baseline(channels))
-    assert trial.add(hit(channels, 0.03, second=0.4)) & HitFlags.DOUBLE_HIT
+    assert trial.add(hit(channels, 0.03, second=1.0)) & HitFlags.DOUBLE_HIT
     assert "Trial hit 1" in trial.text

@@ -71,7 +71,7 @@ def test_hits_found_within_one_record_are_those_that_were_made_one_by_one(tmp_pa
     ("times", "seconds", "counts"),
     [
         ([0.3], 1.4, [1]),
-        ([0.3, 0.35], 1.4, [1]),  # a second touch
+        ([0.3, 0.35], 1.4, [1]),  # a further touch
         ([0.3, 1.4, 1.45], 2.5, [2]),
         ([0.3, 1.4, 2.4], 2.45, [2]),  # the record ends behind the last
         ([0.0005, 1.1], 2.2, [2]),

@@ -1,4 +1,4 @@
-"""Array types of this package."""
+"""Array types of this package, and the median of long arrays."""
 
 from typing import Any
 
@@ -15,3 +15,11 @@ Codes = NDArray[np.int32]
 """ADC codes (int32), of any shape."""
 Flags = NDArray[np.bool_]
 """Truth values, of any shape."""
+
+
+def find_median(values: Floats) -> float:
+    """Return the median of real values without NaN as `numpy.median` does, with one partition instead of three."""
+    middle = values.size // 2
+    ordered = np.partition(values, middle)
+    upper = float(ordered[middle])
+    return upper if values.size % 2 else (float(ordered[:middle].max()) + upper) / 2

@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hit import Hit
 from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, require_pulse
 from acquisition.hits.touches import Touch, find_touches
@@ -97,5 +97,5 @@ def _measure_level(pulse: Pulse, start: int, end: int) -> float:
     rest = pulse.recorded[start:end]
     if rest.size < pulse.width:
         return pulse.offset
-    level, error = float(np.median(rest)), MEDIAN_ERROR * pulse.baseline_rms / float(np.sqrt(rest.size))
+    level, error = find_median(rest), MEDIAN_ERROR * pulse.baseline_rms / float(np.sqrt(rest.size))
     return level if abs(level - pulse.offset) > LEVEL_SIGNIFICANCE * error else pulse.offset

@@ -5,7 +5,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hit import Hit
 
 PULSE_END_SHARE = 0.05
@@ -59,7 +59,8 @@ def find_pulse(hit: Hit) -> Pulse | None:
         return None
     top = int(np.argmax(hit.force))
     quiet = _drop_touches(extract_baseline(hit.force, count_pre_hit_samples(hit)), float(hit.force[top]))
-    offset, rms = float(np.mean(quiet)), float(np.std(quiet))
+    offset = float(np.mean(quiet))
+    rms = float(np.sqrt(np.mean((quiet - offset) ** 2)))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None
@@ -73,8 +74,8 @@ def _drop_touches(quiet: Floats, top: float) -> Floats:
     """Return the samples of a baseline without those of a touch before the main pulse."""
     if float(np.max(quiet)) <= float(np.mean(quiet)) + TOUCH_DEVIATION * float(np.std(quiet)):
         return quiet
-    middle = float(np.median(quiet))
-    spread = 1.4826 * float(np.median(np.abs(quiet - middle)))
+    middle = find_median(quiet)
+    spread = 1.4826 * find_median(np.abs(quiet - middle))
     return quiet[np.abs(quiet - middle) <= max(TOUCH_SPREAD * spread, MIN_TOUCH_SHARE * (top - middle))]
 
 
@@ -109,9 +110,9 @@ def count_pre_hit_samples(hit: Hit) -> int:
 
 def _find_rise(hit: Hit) -> int:
     if not hit.has_force:
-        size = np.abs(hit.acceleration - np.median(hit.acceleration))
+        size = np.abs(hit.acceleration - find_median(hit.acceleration))
         return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
-    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - find_median(hit.force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
 

@@ -5,7 +5,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hits.pulse import MIN_TOUCH_SHARE, Pulse
 
 FALSE_TOUCH_RATE = 0.001
@@ -62,7 +62,7 @@ def find_touches(pulse: Pulse) -> list[Touch]:
 
 
 def _estimate_noise(values: Floats) -> float:
-    return 1.4826 * float(np.median(np.abs(values))) if values.size else 0.0
+    return 1.4826 * find_median(np.abs(values)) if values.size else 0.0
 
 
 def _measure_touch(force: Floats, first: int, last: int, step: int) -> Touch:

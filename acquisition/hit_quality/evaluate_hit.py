@@ -131,7 +131,7 @@ def check_hit(hit: Hit) -> HitFlags:
     >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> response = 200 * structure.response(time, 1e-3)
-    >>> again = 80 * np.roll(pulse, 60)  # N, 6 ms later
+    >>> again = 190 * np.roll(pulse, 60)  # N, 6 ms later
     >>> [check_hit(Hit(force, response, 10240.0, 100)).words for force in (200 * pulse, 200 * pulse + again)]
     ['good', 'double hit']
     """
@@ -164,7 +164,7 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
     >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
     >>> response = 200 * structure.response(time, 1e-3)
-    >>> forces = 200 * pulse, 200 * pulse + 80 * np.roll(pulse, 60), 201 * pulse
+    >>> forces = 200 * pulse, 200 * pulse + 190 * np.roll(pulse, 60), 201 * pulse
     >>> frf, flags = average_good_hits([Hit(force, response, 10240.0, 100) for force in forces])
     >>> frf.n_averages, [flag.words for flag in flags]
     (2, ['good', 'double hit', 'good'])

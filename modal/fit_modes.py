@@ -12,7 +12,15 @@ from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting.band_fit import BandFit
-from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
+from modal.hit_scatter import (
+    HitsOfFrf,
+    add_linearity_remarks,
+    decay_covariance,
+    hit_covariances,
+    leave_one_out_frfs,
+    merge_scattered_pairs,
+    single_hit_variance,
+)
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 
@@ -97,6 +105,7 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
         found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
         raise ValueError(f"{found}. Give one list of hits per FRF, even an empty list.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
+    state = merge_scattered_pairs(state, pairs)
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
     return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
@@ -113,8 +122,10 @@ def modes_from_band(
 ) -> list[Mode]:
     """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
-    covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
-    scatter = None if over_hits is None else over_hits + beyond.covariance
+    noise, shape = fit.covariance * beyond.factor + by_hammer, beyond.shape
+    covariance, scatter = noise + beyond.covariance + np.diag(shape), None
+    if over_hits is not None:
+        scatter = over_hits + beyond.covariance + np.diag(single_hit_variance(fit, noise, over_hits, n_hits, shape))
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"

@@ -8,8 +8,14 @@ import scipy
 from acquisition import Frf, Hit, remove_sensor_mass
 from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.arrays import Complexes, Floats
-from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.dense_bands import MAX_HIDDEN_MODE_ERROR
+from modal.bands.extraction import Extraction, FittedBand, replace_band
+from modal.bands.fit_peaks import refit_real_constants
+from modal.bands.merge_modes import merge_pair, overlapping_pairs
+from modal.bands.residual_analysis import moving_mode_variance
+from modal.fitting.band_fit import BandFit
 from modal.modes.mode import Mode, add_remark
+from modal.quality.assess_mode import MAX_HIT_SCATTER_RATIO
 from modal.quality.trust import Trust, assess_trust
 
 HitsOfFrf = tuple[Sequence[Hit], list[Frf]]
@@ -98,6 +104,47 @@ def decay_covariance(band: FittedBand) -> Floats | None:
     pulls = [part @ fit.influence_of(i).T for i, part in enumerate(parts)]
     outer = np.transpose(pulls) @ np.array(pulls)
     return np.asarray(count / (count - 1) * fit.residual.size / fit.degrees_of_freedom * outer)
+
+
+def single_hit_variance(fit: BandFit, noise: Floats, over_hits: Floats, n_hits: int, shape: Floats) -> Floats:
+    """Return the variances by which hits differ beyond noise, in the order of `BandFit`.
+
+    Noise averages out over the hits. A machine that changes from hit to hit, or a hit beside its point, does not: the
+    next test differs from this one as a hit from another. noise, over_hits: covariances of the mean of n hits; shape:
+    variances of merged modes, whose frequencies are already known apart.
+    """
+    m, half_width = fit.frequency.size, np.prod(fit.poles, axis=0)
+    beyond = np.diag(over_hits) - MAX_HIT_SCATTER_RATIO**2 * np.diag(noise)
+    variance = n_hits * np.maximum(beyond, 0.0)
+    shift = np.sqrt(variance[:m]) / half_width
+    spread = np.where(shape[:m] > 0, np.sqrt(shape[:m]), half_width * shift / (1 + shift**2))
+    variance[:m] = 0.0
+    return np.asarray(variance + moving_mode_variance(fit, spread))
+
+
+def merge_scattered_pairs(state: Extraction, pairs: Sequence[HitsOfFrf]) -> Extraction:
+    """Merge pairs of overlapping modes whose sizes differ from hit to hit: the one mode of a hit is now here, now there.
+
+    Each of two modes that exist in every hit keeps its size. pairs: as `hit_covariances`.
+    """
+    for band in state.bands:
+        state = replace_band(state, band, _merge_scattered_pairs(state, band, pairs))
+    return state
+
+
+def _merge_scattered_pairs(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> FittedBand:
+    near = [] if band.edits else [*overlapping_pairs(band.fit)]
+    _, over_hits, _ = hit_covariances(state, band, pairs) if near else (0, None, 0)
+    if over_hits is None:
+        return band
+    p, m = band.fit.constant.shape
+    error = np.sqrt(np.diag(over_hits)).reshape(-1, m)[2 : 2 + p] / np.abs(band.fit.constant)
+    is_unsteady = np.all((error > MAX_HIDDEN_MODE_ERROR) & (error > MAX_HIT_SCATTER_RATIO * band.fit.size_error), axis=0)
+    for i, j in near:
+        merged = merge_pair(band, i, j) if is_unsteady[i] and is_unsteady[j] else None
+        if merged is not None:
+            return _merge_scattered_pairs(state, refit_real_constants(merged), pairs)
+    return band
 
 
 def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:

@@ -1,0 +1,91 @@
+"""Replace two fitted modes by one if they are the halves of one uneven peak."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from modal.arrays import Floats
+from modal.bands.extraction import FittedBand, MergedPair
+from modal.bands.fit_peaks import are_modes
+from modal.bands.residual_analysis import has_rounding_residual, residual_near_mode
+from modal.fitting.band_fit import BandFit
+from modal.fitting.fit_band import fit_band
+
+MAX_MERGED_RESIDUAL = 1 / 12
+"""Largest residual (rms) near the mode that replaces a pair, over its peak; chosen."""
+MIN_TURNED_PHASE = np.radians(10.0)
+"""Least angle between the modal constants of a pair, beyond 0 and 180 degrees, of modes that are no real modes (rad).
+
+Modes of machine structures have phases of a few degrees. The halves of an uneven peak differ by 20 to 160 degrees.
+"""
+TURNED_PHASE_SIGNIFICANCE = 2.0
+"""Standard errors that this angle must exceed."""
+MIN_OPPOSITE_DISTANCE = 0.5
+"""Least distance of two modes with opposite constants, over the sum of their half-widths; closer ones cancel."""
+MIN_SHAPE_MAC = 0.9
+"""Least MAC over several FRFs of the halves of one peak; modes of their own have shapes of their own; chosen."""
+
+
+def merge_phantom_pairs(band: FittedBand) -> FittedBand:
+    """Merge pairs of overlapping modes whose constants no two real modes have, until none is left.
+
+    A resonance that moves during the measurement (drift, force), or was seen through a window or a smoothing of the
+    lines, is no exact pole. The fit replaces it by two modes closer than their half-power widths. The constants of such
+    a pair are turned against each other, or nearly cancel. One mode that explains the peak replaces them.
+    """
+    if has_rounding_residual(band):
+        return band
+    for i, j in overlapping_pairs(band.fit):
+        merged = merge_pair(band, i, j) if _is_phantom(band.fit, i, j) else None
+        if merged is not None:
+            return merge_phantom_pairs(merged)
+    return band
+
+
+def overlapping_pairs(fit: BandFit) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of modes of a fit that are closer than their half-power widths and were not given."""
+    half_width = np.prod(fit.poles, axis=0)
+    for i, j in combinations(range(half_width.size), 2):
+        is_near = abs(fit.frequency[i] - fit.frequency[j]) < half_width[i] + half_width[j]
+        if is_near and not (fit.held[i] or fit.held[j]):
+            yield i, j
+
+
+def merge_pair(band: FittedBand, i: int, j: int) -> FittedBand | None:
+    """Return the band with one mode in place of the modes i and j, its last one; None if one does not explain them."""
+    fit, data = band.fit, band.data
+    share = np.abs(fit.constant[:, [i, j]]).sum(axis=0)
+    middle = fit.poles[:, [i, j]] @ share / share.sum()
+    starts = np.column_stack([np.delete(fit.poles, [i, j], axis=1), middle])
+    height = np.append(np.delete(band.height, [i, j]), np.max(band.height[[i, j]]))
+    one = fit_band(data.frequency, data.target, data.weight, starts, band.terms)
+    if one is None or not np.all(are_modes(one, data.frequency, height)):
+        return None
+    pair = MergedPair(*np.sort(fit.frequency[[i, j]]).tolist())
+    merged = replace(band, fit=one, height=height, merged=(*band.merged, pair))
+    return merged if residual_near_mode(merged, height.size - 1)[0] < MAX_MERGED_RESIDUAL else None
+
+
+def _is_phantom(fit: BandFit, i: int, j: int) -> bool:
+    """Return whether two overlapping modes have the constants of one uneven peak."""
+    first, second = fit.constant[:, i], fit.constant[:, j]
+    product = np.vdot(first, second)
+    if abs(product) ** 2 < MIN_SHAPE_MAC * np.vdot(first, first).real * np.vdot(second, second).real:
+        return False
+    angle = float(abs(np.angle(product)))
+    reach = float(np.sum(np.prod(fit.poles[:, [i, j]], axis=0)))
+    if angle > np.pi / 2 and abs(fit.frequency[i] - fit.frequency[j]) < MIN_OPPOSITE_DISTANCE * reach:
+        return True
+    turned = min(angle, np.pi - angle)
+    return turned > max(MIN_TURNED_PHASE, TURNED_PHASE_SIGNIFICANCE * _angle_error(fit, i, j))
+
+
+def _angle_error(fit: BandFit, i: int, j: int) -> float:
+    """Return the standard error of the angle between two constants, in the FRF that shows them best (rad)."""
+    p, m = fit.constant.shape
+    q = int(np.argmax(np.abs(fit.constant[:, i] * fit.constant[:, j])))
+    places = np.array([i, j]) + (2 + p + q) * m
+    slope: Floats = np.array([1.0, -1.0]) / np.abs(fit.constant[q, [i, j]])
+    return float(np.sqrt(slope @ fit.covariance[np.ix_(places, places)] @ slope))

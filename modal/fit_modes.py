@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -125,20 +126,41 @@ def modes_from_band(
     noise, shape = fit.covariance * beyond.factor + by_hammer, beyond.shape
     covariance, scatter = noise + beyond.covariance + np.diag(shape), None
     if over_hits is not None:
-        scatter = over_hits + beyond.covariance + np.diag(single_hit_variance(fit, noise, over_hits, n_hits, shape))
+        by_hits = over_hits + np.diag(single_hit_variance(fit, noise, over_hits, n_hits, shape))
+        scatter = HitScatter(by_hits + beyond.covariance, by_hits, n_hits)
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
-    modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
+    modes = [_mode_from_fit(fit, i, covariance, freedom, scatter) for i in range(fit.frequency.size)]
     return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]
 
 
-def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: Floats | None, n_hits: int) -> Mode:
+class HitScatter(NamedTuple):
+    """Covariance of a band over the hits, in the order of `BandFit`."""
+
+    covariance: Floats
+    """Covariance with systematic errors."""
+    by_hits: Floats
+    """Part of it that was estimated from the hits."""
+    n_hits: int
+    """Number of hits."""
+
+    def freedom(self, fit: BandFit, i: int) -> float:
+        """Return the degrees of freedom of mode i, the least of its values.
+
+        Source: Welch (1947), Biometrika 34, 28; Satterthwaite (1946), Biometrics Bulletin 2, 110.
+        """
+        every, by_hits = (np.diag(_mode_covariance(part, fit, i))[:3] for part in (self.covariance, self.by_hits))
+        share = np.max(ratio_or_zero(by_hits, every))
+        return float((self.n_hits - 1) / share**2) if share > 0 else np.inf
+
+
+def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: HitScatter | None) -> Mode:
     """Return mode i of a band as seen at the driving point."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
     of_fit = _mode_covariance(cov, fit, i)
-    over_hits = None if scatter is None else _mode_covariance(scatter, fit, i)
+    over_hits = None if scatter is None else _mode_covariance(scatter.covariance, fit, i)
     best = of_fit if over_hits is None else over_hits
     error = np.sqrt(np.diag(best))
     error[3] = np.hypot(error[3], np.degrees(fit.phase_if_complex[0, i]))
@@ -149,7 +171,8 @@ def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: F
         of_fit[:3, :3],
         freedom,
         jackknife=None if over_hits is None else over_hits[:3, :3],
-        n_hits=n_hits,
+        n_hits=0 if scatter is None else scatter.n_hits,
+        scatter_freedom=None if scatter is None else scatter.freedom(fit, i),
         phase_deg=float(np.degrees(np.angle(sign * constant))),
         phase_deg_std=min(float(error[3]), UNKNOWN_PHASE_STD_DEG),
         phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),

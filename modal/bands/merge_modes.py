@@ -15,14 +15,16 @@ from modal.fitting.fit_band import fit_band
 
 MAX_MERGED_RESIDUAL = 1 / 12
 """Largest residual (rms) near the mode that replaces a pair, over its peak; chosen."""
-MIN_TURNED_PHASE = np.radians(10.0)
-"""Least angle between the modal constants of a pair, beyond 0 and 180 degrees, of modes that are no real modes (rad).
+SPREAD_PEAK_PHASE = np.radians(20.0), np.radians(70.0)
+"""Angles between the constants of the halves of a peak that is spread by drift or by smoothing of the lines (rad).
 
-Modes of machine structures have phases of a few degrees. The halves of an uneven peak differ by 20 to 160 degrees.
+Drift over 1 and 3 half-widths gives 35 and 69 degrees. Modes of machine structures differ by a few degrees.
 """
+OPPOSITE_PHASE = np.radians(90.0), np.radians(160.0)
+"""Angles between the constants of the halves of a peak that moves during the decay, by its force for example (rad)."""
 TURNED_PHASE_SIGNIFICANCE = 2.0
 """Standard errors that this angle must exceed."""
-MIN_OPPOSITE_DISTANCE = 0.5
+MIN_OPPOSITE_DISTANCE = 0.4
 """Least distance of two modes with opposite constants, over the sum of their half-widths; closer ones cancel."""
 MIN_SHAPE_MAC = 0.9
 """Least MAC over several FRFs of the halves of one peak; modes of their own have shapes of their own; chosen."""
@@ -74,12 +76,12 @@ def _is_phantom(fit: BandFit, i: int, j: int) -> bool:
     product = np.vdot(first, second)
     if abs(product) ** 2 < MIN_SHAPE_MAC * np.vdot(first, first).real * np.vdot(second, second).real:
         return False
-    angle = float(abs(np.angle(product)))
-    reach = float(np.sum(np.prod(fit.poles[:, [i, j]], axis=0)))
-    if angle > np.pi / 2 and abs(fit.frequency[i] - fit.frequency[j]) < MIN_OPPOSITE_DISTANCE * reach:
+    angle, distance = float(abs(np.angle(product))), abs(fit.frequency[i] - fit.frequency[j])
+    if angle > np.pi / 2 and distance < MIN_OPPOSITE_DISTANCE * np.sum(np.prod(fit.poles[:, [i, j]], axis=0)):
         return True
+    is_turned = any(low < angle < high for low, high in (SPREAD_PEAK_PHASE, OPPOSITE_PHASE))
     turned = min(angle, np.pi - angle)
-    return turned > max(MIN_TURNED_PHASE, TURNED_PHASE_SIGNIFICANCE * _angle_error(fit, i, j))
+    return is_turned and turned > TURNED_PHASE_SIGNIFICANCE * _angle_error(fit, i, j)
 
 
 def _angle_error(fit: BandFit, i: int, j: int) -> float:

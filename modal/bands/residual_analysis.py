@@ -54,7 +54,7 @@ MIN_CORRELATION_SIGNIFICANCE = 3.0
 
 White noise reaches it once in 700 cases.
 """
-HIDDEN_ERROR_FACTOR = 2.0
+HIDDEN_ERROR_FACTOR = 2.5
 """Standard error of a mode over the non-noise part of its residual, as a share of its peak."""
 MAX_UNEVEN_NOISE_RATIO = 2.0
 """Residual over noise near a mode that uneven noise may cause by itself."""
@@ -89,7 +89,7 @@ def systematic_error(band: FittedBand) -> SystematicError:
     The residual does not show how far such structure shifts the modes. So each band is fitted again with fewer and more
     residual terms and on parts of its lines. Each value gets the rms shift as its error; a part that cuts a peak
     does not count for that mode. The residual near a mode beyond twice the noise, in squares, as a share
-    of its peak, may hide an error of twice that share of its half-width, its damping ratio and its size, whatever
+    of its peak, may hide an error of 2.5 times that share of its half-width, its damping ratio and its size, whatever
     its correlation: repeated measurements of the same point differ by that.
     """
     hidden, independent, freedom = _hidden_error(band), _count_independent_values(band.fit), band.fit.degrees_of_freedom

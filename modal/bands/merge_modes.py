@@ -24,18 +24,21 @@ OPPOSITE_PHASE = np.radians(90.0), np.radians(160.0)
 """Angles between the constants of the halves of a peak that moves during the decay, by its force for example (rad)."""
 TURNED_PHASE_SIGNIFICANCE = 2.0
 """Standard errors that this angle must exceed."""
-MIN_OPPOSITE_DISTANCE = 0.4
-"""Least distance of two modes with opposite constants, over the sum of their half-widths; closer ones cancel."""
+MIN_MODE_DISTANCE, MIN_OPPOSITE_DISTANCE = 0.25, 0.4
+"""Least distance of two modes over the sum of their half-widths, and of two with opposite constants; chosen.
+
+Closer ones nearly cancel, or are told apart only by a shape of the peak that no measured resonance has so exactly.
+"""
 MIN_SHAPE_MAC = 0.9
 """Least MAC over several FRFs of the halves of one peak; modes of their own have shapes of their own; chosen."""
 
 
 def merge_phantom_pairs(band: FittedBand) -> FittedBand:
-    """Merge pairs of overlapping modes whose constants no two real modes have, until none is left.
+    """Merge pairs of overlapping modes that no two real modes are, until none is left.
 
     A resonance that moves during the measurement (drift, force), or was seen through a window or a smoothing of the
-    lines, is no exact pole. The fit replaces it by two modes closer than their half-power widths. The constants of such
-    a pair are turned against each other, or nearly cancel. One mode that explains the peak replaces them.
+    lines, is no exact pole. The fit replaces it by two modes closer than their half-power widths. Such a pair is very close, or its
+    constants are turned against each other. One mode that explains the peak replaces the two.
     """
     if has_rounding_residual(band):
         return band
@@ -76,8 +79,9 @@ def _is_phantom(fit: BandFit, i: int, j: int) -> bool:
     product = np.vdot(first, second)
     if abs(product) ** 2 < MIN_SHAPE_MAC * np.vdot(first, first).real * np.vdot(second, second).real:
         return False
-    angle, distance = float(abs(np.angle(product))), abs(fit.frequency[i] - fit.frequency[j])
-    if angle > np.pi / 2 and distance < MIN_OPPOSITE_DISTANCE * np.sum(np.prod(fit.poles[:, [i, j]], axis=0)):
+    angle = float(abs(np.angle(product)))
+    distance = abs(fit.frequency[i] - fit.frequency[j]) / np.sum(np.prod(fit.poles[:, [i, j]], axis=0))
+    if distance < (MIN_OPPOSITE_DISTANCE if angle > np.pi / 2 else MIN_MODE_DISTANCE):
         return True
     is_turned = any(low < angle < high for low, high in (SPREAD_PEAK_PHASE, OPPOSITE_PHASE))
     turned = min(angle, np.pi - angle)

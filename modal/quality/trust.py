@@ -34,7 +34,7 @@ MAX_MISFIT_RATIO = 2.0
 """Residual rms over noise rms above which the residual is more than noise."""
 MIN_MISFIT_SHARE = 0.01
 """Residual rms over the peak from which a misfit counts."""
-DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
+DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines", "not-found-again")
 """Codes of remarks that make a mode doubtful."""
 COMMON_REMARK_CODES = ("smoothed-lines",)
 """Codes of remarks on all FRFs of a structure, for which a match in another FRF proves nothing."""

@@ -122,6 +122,10 @@ def single_hit_variance(fit: BandFit, noise: Floats, over_hits: Floats, n_hits: 
     return np.asarray(variance + moving_mode_variance(fit, spread))
 
 
+MAX_UNSTEADY_RESIDUAL = 0.15
+"""Largest residual near the mode that replaces an unsteady pair, over its peak; two half-widths apart leave 0.1."""
+
+
 def merge_scattered_pairs(state: Extraction, pairs: Sequence[HitsOfFrf]) -> Extraction:
     """Merge pairs of overlapping modes whose sizes differ from hit to hit: the one mode of a hit is now here, now there.
 
@@ -141,7 +145,8 @@ def _merge_scattered_pairs(state: Extraction, band: FittedBand, pairs: Sequence[
     error = np.sqrt(np.diag(over_hits)).reshape(-1, m)[2 : 2 + p] / np.abs(band.fit.constant)
     is_unsteady = np.all((error > MAX_HIDDEN_MODE_ERROR) & (error > MAX_HIT_SCATTER_RATIO * band.fit.size_error), axis=0)
     for i, j in near:
-        merged = merge_pair(band, i, j) if is_unsteady[i] and is_unsteady[j] else None
+        is_one = is_unsteady[i] and is_unsteady[j]
+        merged = merge_pair(band, i, j, MAX_UNSTEADY_RESIDUAL) if is_one else None
         if merged is not None:
             return _merge_scattered_pairs(state, refit_real_constants(merged), pairs)
     return band

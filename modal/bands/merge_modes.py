@@ -58,8 +58,11 @@ def overlapping_pairs(fit: BandFit) -> Iterator[tuple[int, int]]:
             yield i, j
 
 
-def merge_pair(band: FittedBand, i: int, j: int) -> FittedBand | None:
-    """Return the band with one mode in place of the modes i and j, its last one; None if one does not explain them."""
+def merge_pair(band: FittedBand, i: int, j: int, largest: float = MAX_MERGED_RESIDUAL) -> FittedBand | None:
+    """Return the band with one mode in place of the modes i and j, its last one; None if one does not explain them.
+
+    largest: residual near the one mode over its peak.
+    """
     fit, data = band.fit, band.data
     share = np.abs(fit.constant[:, [i, j]]).sum(axis=0)
     middle = fit.poles[:, [i, j]] @ share / share.sum()
@@ -70,7 +73,7 @@ def merge_pair(band: FittedBand, i: int, j: int) -> FittedBand | None:
         return None
     pair = MergedPair(*np.sort(fit.frequency[[i, j]]).tolist())
     merged = replace(band, fit=one, height=height, merged=(*band.merged, pair))
-    return merged if residual_near_mode(merged, height.size - 1)[0] < MAX_MERGED_RESIDUAL else None
+    return merged if residual_near_mode(merged, height.size - 1)[0] < largest else None
 
 
 def _is_phantom(fit: BandFit, i: int, j: int) -> bool:

@@ -14,6 +14,7 @@ from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting.band_fit import BandFit
 from modal.hit_scatter import (
+    HitCovariance,
     HitsOfFrf,
     add_linearity_remarks,
     decay_covariance,
@@ -113,21 +114,21 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
-    by_hammer, over_hits, n_hits = hit_covariances(state, band, pairs)
-    modes = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, modes, *pairs[0]) if n_hits else modes
+    by_hammer, over_hits = hit_covariances(state, band, pairs)
+    modes = modes_from_band(state, band, by_hammer, over_hits)
+    return add_linearity_remarks(state, band, modes, *pairs[0]) if over_hits else modes
 
 
 def modes_from_band(
-    state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: Floats | None, n_hits: int
+    state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: HitCovariance | None
 ) -> list[Mode]:
     """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
-    noise, shape = fit.covariance * beyond.factor + by_hammer, beyond.shape
-    covariance, scatter = noise + beyond.covariance + np.diag(shape), None
+    noise, scatter = fit.covariance * beyond.factor + by_hammer, None
+    covariance = noise + beyond.covariance + np.diag(beyond.shape)
     if over_hits is not None:
-        by_hits = over_hits + np.diag(single_hit_variance(fit, noise, over_hits, n_hits, shape))
-        scatter = HitScatter(by_hits + beyond.covariance, by_hits, n_hits)
+        by_hits = over_hits.of_mean + np.diag(single_hit_variance(fit, noise, over_hits, beyond.shape))
+        scatter = ModeScatter(by_hits + beyond.covariance, by_hits, over_hits.n_hits)
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
@@ -135,7 +136,7 @@ def modes_from_band(
     return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]
 
 
-class HitScatter(NamedTuple):
+class ModeScatter(NamedTuple):
     """Covariance of a band over the hits, in the order of `BandFit`."""
 
     covariance: Floats
@@ -155,7 +156,7 @@ class HitScatter(NamedTuple):
         return float((self.n_hits - 1) / share**2) if share > 0 else np.inf
 
 
-def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: HitScatter | None) -> Mode:
+def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: ModeScatter | None) -> Mode:
     """Return mode i of a band as seen at the driving point."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
@@ -353,7 +354,7 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
     """Return the modes of a band with their peak heights, rms over the decays."""
     scatter = decay_covariance(band)
-    modes = modes_from_band(state, band, 0, scatter, 0 if scatter is None else len(state.frfs))
+    modes = modes_from_band(state, band, 0, scatter)
     heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
     return list(zip(modes, heights.tolist(), strict=True))
 

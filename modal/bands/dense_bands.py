@@ -101,7 +101,11 @@ def mark_close_modes(band: FittedBand) -> FittedBand:
     Conditions: a single mode does not explain the peak, two leave white noise, and neither is as large as the one.
     """
     fit, data = band.fit, band.data
-    i = None if band.close_frequencies or band.merged or has_rounding_residual(band) else _least_likely_single_mode(band)
+    i = (
+        None
+        if band.close_frequencies or band.merged or has_rounding_residual(band)
+        else _least_likely_single_mode(band)
+    )
     if i is None:
         return band
     pair = fit_band(data.frequency, data.target, data.weight, split_pole(fit.poles, i), band.terms)

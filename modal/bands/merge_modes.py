@@ -37,8 +37,8 @@ def merge_phantom_pairs(band: FittedBand) -> FittedBand:
     """Merge pairs of overlapping modes that no two real modes are, until none is left.
 
     A resonance that moves during the measurement (drift, force), or was seen through a window or a smoothing of the
-    lines, is no exact pole. The fit replaces it by two modes closer than their half-power widths. Such a pair is very close, or its
-    constants are turned against each other. One mode that explains the peak replaces the two.
+    lines, is no exact pole. The fit replaces it by two modes closer than their half-power widths. Such a pair is very
+    close, or its constants are turned against each other. One mode that explains the peak replaces the two.
     """
     if has_rounding_residual(band):
         return band

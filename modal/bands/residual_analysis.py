@@ -55,7 +55,7 @@ MIN_CORRELATION_SIGNIFICANCE = 3.0
 White noise reaches it once in 700 cases.
 """
 HIDDEN_POLE_ERROR_FACTOR, HIDDEN_SIZE_ERROR_FACTOR = 2.5, 4.0
-"""Standard errors of the pole and of the size of a mode over the non-noise part of its residual, as a share of its peak.
+"""Standard errors of pole and size of a mode over the non-noise part of its residual, as a share of its peak.
 
 Repeated measurements agree with them (docs/studies/modal.md). Sizes differ more, as no hit meets the same place.
 """
@@ -92,7 +92,7 @@ def systematic_error(band: FittedBand) -> SystematicError:
     The residual does not show how far such structure shifts the modes. So each band is fitted again with fewer and more
     residual terms and on parts of its lines. Each value gets the rms shift as its error; a part that cuts a peak
     does not count for that mode. The residual near a mode beyond twice the noise, in squares, as a share
-    of its peak, may hide an error of 2.5 times that share of its half-width and its damping ratio, and of 4 times of its size,
+    of its peak, may hide an error of 2.5 times that share of its half-width and its zeta, and of 4 times of its size,
     whatever its correlation: repeated measurements of the same point differ by that.
     """
     hidden, independent, freedom = _hidden_error(band), _count_independent_values(band.fit), band.fit.degrees_of_freedom

@@ -89,6 +89,12 @@ class FittedBand:
         own = [pair for pair in self.merged if pair.low - half_width < frequency < pair.high + half_width]
         return max(own, key=lambda pair: pair.spread, default=None)
 
+    def frequency_spread(self, i: int) -> float:
+        """Return the standard deviation of the frequencies that mode i stands for, merged or suspected (Hz)."""
+        pair, frequency = self.merged_pair(i), self.fit.frequency[i]
+        near = [f for f in self.close_frequencies if abs(f - frequency) < frequency * self.fit.damping_ratio[i]]
+        return float(np.ptp(near)) / 2 if near and pair is None else 0.0 if pair is None else pair.spread
+
     @cached_property
     def receptance(self) -> Complexes:
         """Receptance of these modes alone on all lines of the FRFs (m/N), shape (p, n)."""

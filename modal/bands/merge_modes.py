@@ -73,7 +73,8 @@ def merge_pair(band: FittedBand, i: int, j: int, largest: float = MAX_MERGED_RES
         return None
     pair = MergedPair(*np.sort(fit.frequency[[i, j]]).tolist())
     merged = replace(band, fit=one, height=height, merged=(*band.merged, pair))
-    return merged if residual_near_mode(merged, height.size - 1)[0] < largest else None
+    is_there = abs(one.frequency[-1] - middle[0]) < np.sum(np.prod(fit.poles[:, [i, j]], axis=0))
+    return merged if is_there and residual_near_mode(merged, height.size - 1)[0] < largest else None
 
 
 def _is_phantom(fit: BandFit, i: int, j: int) -> bool:

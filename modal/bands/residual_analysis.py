@@ -81,7 +81,7 @@ class SystematicError(NamedTuple):
     covariance: Floats
     """Covariance of the errors in the order of `BandFit`, from trial fits; 0 for white noise."""
     shape: Floats
-    """Variances of the errors in the same order, because merged modes are no exact poles; 0 for the others."""
+    """Variances of the errors in the same order, because merged or suspected modes are no exact poles; else 0."""
 
 
 def systematic_error(band: FittedBand) -> SystematicError:
@@ -107,9 +107,9 @@ def systematic_error(band: FittedBand) -> SystematicError:
 
 
 def _shape_variance(band: FittedBand) -> Floats:
-    """Return the variances of merged modes in the order of `BandFit`, 0 for the others."""
-    pairs = [band.merged_pair(i) for i in range(band.fit.frequency.size)]
-    return moving_mode_variance(band.fit, np.array([pair.spread if pair else 0.0 for pair in pairs]))
+    """Return the variances of modes that may be several in the order of `BandFit`, 0 for the others."""
+    spread = [band.frequency_spread(i) for i in range(band.fit.frequency.size)]
+    return moving_mode_variance(band.fit, np.array(spread))
 
 
 def moving_mode_variance(fit: BandFit, spread: Floats) -> Floats:

@@ -17,8 +17,8 @@ MAX_ROTATED_MODE_ERROR, REJECTED_MODE_ERROR = 0.1, 1 / 3
 """Largest relative standard error of damping ratio or stiffness of a rotated mode, and of any mode."""
 REJECTED_MATCHED_MODE_ERROR = 0.5
 """Rejected relative standard error of a mode that other FRFs have, too, or that moves during the measurement."""
-MOVING_MODE_CODES = ("uneven-peak", "scatter")
-"""Codes of remarks on modes that exist, but differ during the measurement by much of their errors."""
+MOVING_MODE_CODES = ("uneven-peak", "several-modes", "scatter")
+"""Codes of remarks on modes that exist, but stand for several modes or states, whose spread is in their errors."""
 MIN_OTHER_FRFS, MIN_MATCHED_SHARE = 2, 0.75
 """Number of other FRFs, and their share with the mode, from which it is matched.
 

@@ -29,7 +29,7 @@ class HitCovariance(NamedTuple):
     of_mean: Floats
     """Jackknife covariance of the fit to all hits."""
     of_single: Floats
-    """Covariance of single hits about that fit."""
+    """Covariance of single hits about that fit, soft hits as much as hard ones."""
     noise_gain: float
     """Variance of noise in a single hit, mean over the hits, over that of their mean."""
     n_hits: int
@@ -142,13 +142,15 @@ def single_hit_variance(fit: BandFit, noise: Floats, hits: HitCovariance, shape:
     """Return the variances by which hits differ beyond noise, in the order of `BandFit`.
 
     Noise averages out over the hits. A machine that changes from hit to hit, or a hit beside its point, does not: the
-    next test differs from this one as a hit from another. noise: covariance of the mean of the hits; shape: variances
+    next test differs from this one as a hit from another. Frequencies count alike for all hits, as the softest may have
+    met the lowest one, sizes and damping ratios by power. noise: covariance of the mean of the hits; shape: variances
     of merged modes, whose frequencies are already known apart. From the widened peak of the mean, a Gauss-Newton step
     overstates a change of a pole by x half-widths, as about x (1 + x^2).
     """
     m, half_width = fit.frequency.size, np.prod(fit.poles, axis=0)
-    by_noise = MAX_HIT_SCATTER_RATIO**2 * hits.noise_gain * np.diag(noise)
-    variance = np.maximum(np.diag(hits.of_single) - by_noise, 0.0)
+    by_noise = MAX_HIT_SCATTER_RATIO**2 * np.diag(noise)
+    variance = hits.n_hits * np.maximum(np.diag(hits.of_mean) - by_noise, 0.0)
+    variance[:m] = np.maximum(np.diag(hits.of_single) - hits.noise_gain * by_noise, 0.0)[:m]
     scale = np.concatenate([half_width, fit.damping_ratio])
     variance[: 2 * m] /= (1 + variance[: 2 * m] / scale**2) ** 2
     spread = np.sqrt(np.where(shape[:m] > 0, shape[:m], variance[:m]))

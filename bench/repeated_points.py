@@ -44,8 +44,8 @@ def distances(some: list[Mode], others: list[Mode]) -> Iterator[NDArray[np.float
         other = nearest(others, mode)
         if other is not None and nearest(some, other) is mode:
             reach = np.hypot(*(np.ptp(each.interval(), axis=1) / 2 for each in (mode, other)))
-            values = [(each.frequency, each.damping_ratio, each.stiffness) for each in (mode, other)]
-            yield np.abs(np.subtract(*values)) / reach
+            apart = mode.frequency - other.frequency, mode.damping_ratio - other.damping_ratio
+            yield np.abs([*apart, mode.stiffness - other.stiffness]) / reach
 
 
 def main() -> None:

@@ -30,11 +30,11 @@ def at(*shifts: float, stiffness: float = STIFFNESS, scale: float = 1.0) -> Comp
 
 
 def drift(span: float) -> list[float]:
-    return np.linspace(-span / 2, span / 2, 20).tolist()
+    return [float(shift) for shift in np.linspace(-span / 2, span / 2, 20)]
 
 
 def smoothed(receptance: Complexes, lines: int) -> Complexes:
-    return np.convolve(np.pad(receptance, lines // 2, mode="edge"), np.ones(lines) / lines, "valid")
+    return np.asarray(np.convolve(np.pad(receptance, lines // 2, mode="edge"), np.ones(lines) / lines, "valid"))
 
 
 def softening(share: float) -> Complexes:

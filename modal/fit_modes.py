@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from acquisition import Frf, Hit, from_accelerance
 from modal.arrays import Complexes, Floats
+from modal.bands.edge_tails import edge_covariance
 from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
@@ -25,6 +26,7 @@ from modal.hit_scatter import (
 )
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
+from modal.quality.quantity_remarks import add_quantity_remarks
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
@@ -58,8 +60,8 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     Raises
     ------
     ValueError
-        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase, and hits
-        with other lines than the FRF or without a pulse.
+        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase or without any coherence,
+        and hits with other lines than the FRF or without a pulse.
 
     References
     ----------
@@ -110,7 +112,7 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     state = merge_scattered_pairs(state, pairs)
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
-    return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
+    return add_quantity_remarks(state.frf, add_smoothing_remarks(state, add_phase_remarks(rising)))
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
@@ -125,10 +127,11 @@ def modes_from_band(
     """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
     noise, scatter = fit.covariance * beyond.factor + by_hammer, None
-    covariance = noise + beyond.covariance + np.diag(beyond.shape)
+    common = beyond.covariance + edge_covariance(state, band)
+    covariance = noise + common + np.diag(beyond.shape)
     if over_hits is not None:
         by_hits = over_hits.of_mean + np.diag(single_hit_variance(fit, noise, over_hits, beyond.shape))
-        scatter = ModeScatter(by_hits + beyond.covariance, by_hits, over_hits.n_hits)
+        scatter = ModeScatter(by_hits + common, by_hits, over_hits.n_hits)
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"

@@ -42,14 +42,16 @@ def replay(
     """Store recorded files as tap tests.
 
     All files are checked before the first one is stored, in order of date. If data is missing, an error names the
-    option for the data. An implausible recording is stored with a question. Answer the question with --accept, now or
-    later.
+    option for the data. Repeat an interrupted command to continue after the last stored test. An implausible recording
+    is stored with a question. Answer the question with --accept, now or later.
 
     Examples
     --------
       lobewatch replay mill-3 acceleration.lvm
       lobewatch replay mill-3 2024 --dry-run --unit g/N --date-pattern "%Y%m%d"
       lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
+      lobewatch replay mill-3 hit1.csv hit2.csv hit3.csv --one-test --date 2026-11-20 --direction x
+      lobewatch replay mill-3 hits.npy --axes hits,channels,samples --columns "force [N],acceleration [g]" --rate 51200
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
     from acquisition import Conditions, DataError
@@ -69,6 +71,8 @@ def replay(
     description = file_options.description(**known, conditions=conditions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
+    n_files = len(recordings)
+    recordings, description = shared.join_hit_files(recordings, description)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -80,10 +84,13 @@ def replay(
     with publish_on_change(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
-        not_chosen = store_edits(logbook, outcome.tap_ids, edits)
-        unasked = logbook.accept(outcome.tap_ids, codes)
+            not_chosen = store_edits(logbook, outcome.tap_ids, edits)
+            unasked = logbook.accept(outcome.tap_ids, codes)
+            if outcome.new_tap_ids:
+                bar("measure", 0, len(outcome.new_tap_ids))
+                _ = logbook.history
         accepted = [code for code in codes if code not in unasked]
-        emit_replay(outcome, logbook, len(recordings), passed, accepted, as_json)
+        emit_replay(outcome, logbook, n_files, passed, accepted, as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
             raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

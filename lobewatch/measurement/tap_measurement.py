@@ -1,21 +1,23 @@
 """Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 import modal
-from acquisition import CROSS_TAP, Frf, Remark, TapTest
+from acquisition import CROSS_TAP, Frf, Hit, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
+from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
-from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits
 
@@ -47,6 +49,13 @@ class TapFit:
     """Remarks on missing and doubtful results."""
     failed: bool = False
     """True if the fit was impossible."""
+    frf: Frf | None = None
+    """FRF that was fitted, in its usable band and without the mass of the sensor; None without force."""
+
+    @property
+    def uncovered(self) -> tuple[Remark, ...]:
+        """Remarks that say the modes do not cover the measurement (`coverage.UNCOVERED_CODES`)."""
+        return find_uncovered(self.remarks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,21 +113,24 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
+            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.flags))
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-                said = (*edited, *decay_remarks(machine.tap.sensor))
+                said = (*edited, *decay_remarks(machine.tap.sensor), *changes)
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
-            fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
-            windows = hidden_window_remarks(tap.accepted, fitted.modes)
-            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
+            fit = partial(_fit_frf, by_hand=by_hand)
+            *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
+            further = (*fitted.remarks, *hidden_window_remarks(tap.accepted, fitted.modes), *changes)
+            asked = (questions.check_quantity(fitted.modes),)
+            return TapFit(*named, fitted.modes, (*remarks, *further, *filter(None, asked)), frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
 
 
-def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
+def _fit_frf(frf: Frf, hits: Sequence[Hit], by_hand: ModeEdits) -> FrfFit:
     state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
-    return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
+    return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), remarks)
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
@@ -148,8 +160,22 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
+        remarks += _coverage_remarks(fit, trusted, machine)
     results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
     return Measurement(**vars(fit) | results)
+
+
+def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
+    """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
+    if fit.frf is None or (questions.check_quantity(fit.modes) is not None and not trusted.modes):
+        return
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):
+        if low <= peak.frequency <= high:
+            explained = f"the modes explain {1e6 * peak.explained:.2g} um/N"
+            text = f"peak not explained, real part of the FRF {1e6 * peak.measured:.2g} um/N, {explained}"
+            cure = "Warm up the spindle, check the clamping, and tap again"
+            yield Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, cure)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
@@ -261,14 +287,15 @@ def is_fit_of(answer: object, entry: TapEntry) -> bool:
         and (answer.tap_id, answer.time.isoformat()) == (entry.id, entry.time)
         and (answer.tool, answer.direction) == (entry.tool, entry.direction)
         and isinstance(answer.failed, bool)
+        and (answer.frf is None or (isinstance(answer.frf, Frf) and _is_valid(answer.frf)))
         and all(isinstance(remark, Remark) for remark in answer.remarks)
-        and all(isinstance(mode, Mode) and _is_valid_mode(mode) for mode in answer.modes)
+        and all(isinstance(mode, Mode) and _is_valid(mode) for mode in answer.modes)
     )
 
 
-def _is_valid_mode(mode: Mode) -> bool:
+def _is_valid(part: Mode | Frf) -> bool:
     try:
-        replace(mode)  # what has come from elsewhere was never checked
+        replace(part)  # what has come from elsewhere was never checked
     except (TypeError, ValueError):
         return False
     return True

@@ -1,5 +1,6 @@
 """Show replays, replay previews and rebuilds, with their progress."""
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
@@ -14,6 +15,7 @@ from acquisition.files.contents.contents import Origin
 from dsm import format_rounded
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
+from lobewatch.logbook.recordings.prepare_taps import HitCount
 from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
 from lobewatch.logbook.replay_preview import ReplayPreview
 from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
@@ -23,20 +25,26 @@ from lobewatch.show.programs.verdicts import program_texts, verdict_json
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, emit, new_table, notes, remark_lines
 from modal import Mode
 
-REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "evaluating"}
+REPLAY_STEP_NAMES = {"read": "reading", "store": "fitting and storing", "measure": "evaluating"}
 """Names of the steps of a replay."""
+FIRST_LINE_DELAY, LINE_INTERVAL = 0.5, 2.0
+"""Time before the first line of progress and from line to line (s); chosen."""
 
 
 class ReplayProgress(Progress):
-    """Progress bar of each step of a replay, shown on a terminal only."""
+    """Progress of each step of a replay: bars on a terminal, else lines."""
 
     def __init__(self) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         super().__init__(*columns, console=notes, transient=True, disable=not notes.is_terminal)
         self._step_ids: dict[str, TaskID] = {}
+        self._next_line = time.monotonic() + FIRST_LINE_DELAY
 
     def __call__(self, step: str, done: int, of: int) -> None:
-        """Update the bar of a step: so many files are done, of so many."""
+        """Show the progress of a step: so many files are done, of so many."""
+        if self.disable and of and time.monotonic() >= self._next_line:
+            notes.print(f"{REPLAY_STEP_NAMES[step]}: {done} of {count_noun(of, 'file')} done", markup=False)
+            self._next_line = time.monotonic() + LINE_INTERVAL
         if step not in self._step_ids:
             self._step_ids[step] = self.add_task(REPLAY_STEP_NAMES[step], total=of)
         self.update(self._step_ids[step], completed=done, total=of)
@@ -81,6 +89,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
         "tool": measurement.tool,
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
+        "remarks": recording.remarks,
         "lines": tap.frf and tap.frf.frequency.size,
         "averages": tap.frf and tap.frf.n_averages,
         "modes": list(map(mode_json, measurement.modes)),
@@ -121,7 +130,11 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
     followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
     details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
-    details += [f"followed mode: {followed}", *(questions or ["plausible for this machine, no questions"])]
+    details += [
+        *map(str, recording.remarks),
+        f"followed mode: {followed}",
+        *(questions or ["plausible for this machine, no questions"]),
+    ]
     words = Counter(flags.words for flags in preview.tap.flags)
     hits = f"{count_noun(len(preview.tap.hits), 'hit')}: " + ", ".join(
         f"{count} {word}" for word, count in words.items()
@@ -196,8 +209,16 @@ def emit_replay(
         {},
         as_json,
         *texts,
-        f"{len(outcome.new_tap_ids)} of {count_noun(n_files, 'file')} stored in {logbook.folder.path}",
+        f"{_stored_summary(outcome, n_files)} in {logbook.folder.path}",
     )
+
+
+def _stored_summary(outcome: ReplayOutcome, n_files: int) -> str:
+    """Return how many files were stored, or that they are one tap test."""
+    n_stored, n_taps = len(outcome.new_tap_ids), len(outcome.tap_ids) + len(outcome.rejected)
+    if n_taps < n_files:
+        return f"{n_files} files {'' if n_stored else 'already '}stored as one tap test"
+    return f"{n_stored} of {count_noun(n_files, 'file')} stored"
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
@@ -209,6 +230,8 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
         "known": {str(file): tap_id for file, tap_id in outcome.already_stored.items()},
         "refused": {str(file): reason for file, reason in outcome.rejected.items()},
         "taken": outcome.assumed_facts,
+        "hits": {tap_id: count._asdict() for tap_id, count in outcome.hit_counts.items()},
+        "remarks": outcome.remarks,
     }
 
 
@@ -218,15 +241,24 @@ def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
     if len(set(stored)) <= MAX_TAPS_IN_FULL:
         for tap_id in stored:
             texts += measurement_texts(logbook.measurement(tap_id), logbook)
+            texts += _hit_count_texts([outcome.hit_counts[tap_id]])
     else:
         rows = logbook.history.rows
         asked = {row.tap_id: row.questions for row in rows}
         texts.append(_series_table([row for row in rows if row.tap_id in set(stored)]))
         questions = question_remarks(asked, logbook.folder.path, [tap_id for tap_id in stored if tap_id in asked])
         texts += [f"question on {question.finding}" for question in questions]
+        texts += _hit_count_texts([*outcome.hit_counts.values()])
+    texts += remark_lines(outcome.remarks)
     if outcome.assumed_facts:
         texts.append(f"assumed, not in the files: {', '.join(outcome.assumed_facts)}")
     return [*texts, *(program_texts(logbook) if stored else [])]
+
+
+def _hit_count_texts(counts: Sequence[HitCount]) -> list[str]:
+    """Return how many hits were found and used; nothing for FRFs."""
+    found, used = (sum(numbers) for numbers in zip(*counts, strict=True))
+    return [f"hits: {found} found, {used} used"] if found else []
 
 
 def _series_table(rows: Sequence[HistoryRow]) -> Table:

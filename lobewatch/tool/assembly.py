@@ -15,6 +15,7 @@ from dsm import Calibration, calibrate, modes_at
 from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
+from lobewatch.measurement.coverage import label_direction
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
 from lobewatch.measurement.spindle_model import build_model_state
@@ -117,11 +118,13 @@ class Assembly:
     """Followed modes of tap tests without force, by direction."""
     questions: tuple[Remark, ...] = ()
     """Open questions about these tap tests."""
+    uncovered: tuple[Remark, ...] = ()
+    """Remarks that say the modes do not cover the measurement; no answer silences them."""
 
     @property
     def is_complete(self) -> bool:
-        """True if both directions are known from tap tests without open questions."""
-        return len(self.directions) == 2 and not self.questions
+        """True if both directions are known from tap tests without open questions, and their modes cover them."""
+        return len(self.directions) == 2 and not self.questions and not self.uncovered
 
     @property
     def missing_direction(self) -> tuple[str, str]:
@@ -171,6 +174,7 @@ def assemble(
     direction are shifted by the change of the newest one since.
     """
     taps = [newest, *([across] if across is not None else [])]
+    all_taps = [*taps, *([cross] if cross is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
     points = series.get(newest.direction, ())
     then = None if across is None else interpolate_frequency(points, across.time)
@@ -192,6 +196,7 @@ def assemble(
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
         questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
+        uncovered=tuple(label_direction(own, tap.direction) for tap in all_taps for own in tap.uncovered),
     )
 
 

@@ -12,7 +12,7 @@ from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
-from lobewatch.verdicts.uncertainty_causes import QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
+from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -141,6 +141,8 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
     """
     if case.assembly.questions:
         return QUESTION.name
+    if case.assembly.uncovered:
+        return COVERAGE.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
@@ -163,5 +165,8 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    uncovered = assembly.uncovered
+    values |= {"uncovered": ", ".join(dict.fromkeys(remark.about for remark in uncovered))}
+    values |= {"uncovered_remedy": next((remark.cure for remark in uncovered), "")}
     values |= {"missing": missing, "missing_remedy": missing_remedy}
     return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

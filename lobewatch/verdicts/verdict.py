@@ -226,7 +226,7 @@ def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Return whether the compliance is known: both directions tapped, no open question, no thin wall."""
+    """Return whether the compliance is known: both directions tapped and covered, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
@@ -240,6 +240,9 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         codes = dict.fromkeys(question.code for question in assembly.questions)
         cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
         return f"a tap test has an open question ({', '.join(codes)})", cure
+    if assembly.uncovered:
+        first = assembly.uncovered[0]
+        return f"{first.about}: {first.text}", first.cure
     return None
 
 
@@ -247,7 +250,7 @@ def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
     yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
-    yield from case.assembly.questions
+    yield from (*case.assembly.questions, *case.assembly.uncovered)
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark(

@@ -3,14 +3,16 @@
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from acquisition import DataError, Description
+from acquisition import DataError, Description, Remark
 from acquisition.errors import join_sentences
 from lobewatch.logbook.recordings import prepare_taps
-from lobewatch.logbook.recordings.prepare_taps import TapDraft
-from lobewatch.logbook.recordings.recorded_files import CHANGING_FILE_TEXT
+from lobewatch.logbook.recordings.prepare_taps import HitCount, TapDraft
+from lobewatch.logbook.recordings.recorded_files import CHANGING_FILE_TEXT, read_source
 from lobewatch.machine import MachineFolder
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
@@ -34,6 +36,8 @@ def _join_file_names(files: list[str]) -> str:
 
 ProgressCallback = Callable[[str, int, int], None]
 """Callback for progress: step ("read", "store", "measure"), number of finished files, and of all."""
+StoredCallback = Callable[[TapFit, bool], None]
+"""Callback for each stored tap test: its fit, and whether more tap tests follow."""
 
 LOCAL_WORKERS = Workers()
 """Workers of a replay without other processes."""
@@ -55,6 +59,10 @@ class ReplayOutcome:
     """Defaults assumed for facts that files do not state, each once."""
     fits: Mapping[str, TapFit] = field(default_factory=dict)
     """Fitted modes of the new tap tests, by identity."""
+    hit_counts: Mapping[str, HitCount] = field(default_factory=dict)
+    """Number of hits found and used in the new tap tests, by identity."""
+    remarks: Sequence[Remark] = ()
+    """Remarks on hits that are left out, and on tap tests of one hit each."""
 
 
 class ReplayPlan(NamedTuple):
@@ -75,7 +83,7 @@ class ReplayPlan(NamedTuple):
         plan = cls({}, {}, {}, {})
         for file in files:
             try:
-                plan.digests[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+                plan.digests[file] = hashlib.sha256(read_source(file, description)).hexdigest()
             except OSError as error:
                 plan.unread[file] = error
         for tap in reversed(folder.taps()):  # the first one counts
@@ -95,10 +103,12 @@ def store_recordings(
     workers: Workers = LOCAL_WORKERS,
     keep_going: bool = False,
     progress: ProgressCallback = lambda _what, _done, _of: None,
+    on_stored: StoredCallback = lambda _fit, _more: None,
 ) -> ReplayOutcome:
     """Store recorded files as tap tests, each once and oldest first. Call it under the lock.
 
-    All files are read and evaluated before the first one is stored.
+    All files are checked before the first one is stored. Each tap test is stored as soon as it is fitted, so an
+    interrupted call keeps the stored ones, and the next call continues.
 
     Parameters
     ----------
@@ -114,6 +124,8 @@ def store_recordings(
         Whether usable files are stored if others are rejected.
     progress
         Callback for progress.
+    on_stored
+        Callback for each stored tap test.
 
     Returns
     -------
@@ -123,7 +135,7 @@ def store_recordings(
     Raises
     ------
     DataError
-        If a file cannot be used. Nothing is stored then.
+        If a check finds a file that cannot be used. Nothing is stored then.
     """
     prepare_taps.remove_prepared_files(folder)
     digests, unread, stored, new = ReplayPlan.of(folder, files, description)
@@ -132,16 +144,20 @@ def store_recordings(
     rejected = {file: prepare_taps.explain_file_error(file, error) for file, error in unread.items()}
     try:
         if len(files) > 1 or workers.scheduler:
-            ready, faults = _prepare_files(folder, new, description, workers, progress)
+            dates, faults = _check_files(folder, new, description, progress)
+            rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
+            if rejected and not (keep_going and len(rejected) < len(files)):
+                why = {file: rejected[file] for file in files if file in rejected}
+                raise DataError(format_rejections(why, len(files)))
+            oldest_first = {digest: new[digest] for digest in sorted(dates, key=dates.__getitem__)}
+            results = prepare_taps.prepare_all_taps(folder, [*oldest_first.values()], description, workers)
         else:
-            ready, faults = [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
+            oldest_first = new
+            results = (prepare_taps.prepare_tap(folder, file, description) for file in new.values())
+        ready, faults = _store_each(folder, oldest_first, results, progress, on_stored)
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
-        if rejected and not (keep_going and len(rejected) < len(files)):
-            raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
-        ready.sort(key=lambda tap: tap.created)
-        if ready:
-            folder.commit_files({prepare_taps.prepared_path(folder, tap): tap.entry for tap in ready})
-            progress("store", len(ready), len(ready))
+        if rejected and len(rejected) == len(files):
+            raise DataError(format_rejections(rejected, len(files)))
     finally:
         prepare_taps.remove_prepared_files(folder)
     ids = stored | {tap.digest: tap.entry.id for tap in ready}
@@ -150,24 +166,66 @@ def store_recordings(
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
     tap_ids = [used[file] for file in files if file in used]
-    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits)
+    counts = {tap.entry.id: tap.hit_count for tap in ready}
+    remarks = [*chain.from_iterable(tap.remarks for tap in ready), *find_one_hit_tests(ready)]
+    return ReplayOutcome(
+        tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, hit_counts=counts, remarks=remarks
+    )
 
 
-def _prepare_files(
-    folder: MachineFolder, new: dict[str, Path], description: Description, workers: Workers, progress: ProgressCallback
+MAX_HIT_PAUSE = timedelta(hours=1)
+"""Largest time from one hit of a tap test to the next; chosen."""
+
+
+def find_one_hit_tests(stored: Sequence[TapDraft]) -> list[Remark]:
+    """Return a remark if several tap tests of one hit each follow each other, as the hits of one tap test do."""
+    series = {(tap.entry.tool, tap.entry.direction) for tap in stored}
+    times = sorted(tap.created for tap in stored)
+    is_close = all(later - earlier <= MAX_HIT_PAUSE for earlier, later in pairwise(times))
+    if len(stored) < 2 or len(series) > 1 or not is_close or any(tap.hit_count.found != 1 for tap in stored):
+        return []
+    text = f"{len(stored)} files with one hit each became {len(stored)} tap tests"
+    cure = "If they are hits of one tap test, exclude these tests and replay the files with Description.one_test"
+    return [Remark("one-hit-tests", "", text, cure)]
+
+
+def _check_files(
+    folder: MachineFolder, new: dict[str, Path], description: Description, progress: ProgressCallback
+) -> tuple[dict[str, datetime], dict[str, str]]:
+    """Return the date of each usable file and the reason for each other one, by digest."""
+    dates, faults = dict[str, datetime](), dict[str, str]()
+    progress("read", 0, len(new))
+    checks = prepare_taps.check_files(folder, [*new.values()], description)
+    for number, (digest, result) in enumerate(zip(new, checks, strict=True), 1):
+        if isinstance(result, str):
+            faults[digest] = result
+        else:
+            dates[digest] = result
+        progress("read", number, len(new))
+    return dates, faults
+
+
+def _store_each(
+    folder: MachineFolder,
+    new: dict[str, Path],
+    results: Iterable[TapDraft | str],
+    progress: ProgressCallback,
+    on_stored: StoredCallback,
 ) -> tuple[list[TapDraft], dict[str, str]]:
-    """Prepare files by digest. Return the reason for each unusable file too."""
-    ready, faults = list[TapDraft](), dict[str, str]()
-    results = zip(new, prepare_taps.prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
-    for number, (digest, result) in enumerate(results, 1):
+    """Store each tap test as soon as it is prepared. Return the reason for each file that changed meanwhile too."""
+    stored, faults = list[TapDraft](), dict[str, str]()
+    progress("store", 0, len(new))
+    for number, (digest, result) in enumerate(zip(new, results, strict=True), 1):
         if isinstance(result, str):
             faults[digest] = result
         elif result.digest != digest:
             faults[digest] = CHANGING_FILE_TEXT
         else:
-            ready.append(result)
-        progress("read", number, len(new))
-    return ready, faults
+            folder.commit_files({prepare_taps.prepared_path(folder, result): result.entry})
+            stored.append(result)
+            on_stored(result.fit, number < len(new))
+        progress("store", number, len(new))
+    return stored, faults
 
 
 def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = False) -> str:

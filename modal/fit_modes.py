@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,16 @@ from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
 from modal.fitting.band_fit import BandFit
-from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
+from modal.hit_scatter import (
+    HitCovariance,
+    HitsOfFrf,
+    add_linearity_remarks,
+    decay_covariance,
+    hit_covariances,
+    leave_one_out_frfs,
+    merge_scattered_pairs,
+    single_hit_variance,
+)
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
 from modal.quality.quantity_remarks import add_quantity_remarks
@@ -99,38 +109,62 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
         found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
         raise ValueError(f"{found}. Give one list of hits per FRF, even an empty list.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
+    state = merge_scattered_pairs(state, pairs)
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
     return add_quantity_remarks(state.frf, add_smoothing_remarks(state, add_phase_remarks(rising)))
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
-    by_hammer, over_hits, n_hits = hit_covariances(state, band, pairs)
-    modes = modes_from_band(state, band, by_hammer, over_hits, n_hits)
-    return add_linearity_remarks(state, band, modes, *pairs[0]) if n_hits else modes
+    by_hammer, over_hits = hit_covariances(state, band, pairs)
+    modes = modes_from_band(state, band, by_hammer, over_hits)
+    return add_linearity_remarks(state, band, modes, *pairs[0]) if over_hits else modes
 
 
 def modes_from_band(
-    state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: Floats | None, n_hits: int
+    state: Extraction, band: FittedBand, by_hammer: Floats | int, over_hits: HitCovariance | None
 ) -> list[Mode]:
     """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
+    noise, scatter = fit.covariance * beyond.factor + by_hammer, None
     common = beyond.covariance + edge_covariance(state, band)
-    covariance = fit.covariance * beyond.factor + by_hammer + common
-    scatter = None if over_hits is None else over_hits + common
+    covariance = noise + common + np.diag(beyond.shape)
+    if over_hits is not None:
+        by_hits = over_hits.of_mean + np.diag(single_hit_variance(fit, noise, over_hits, beyond.shape))
+        scatter = ModeScatter(by_hits + common, by_hits, over_hits.n_hits)
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
-    modes = [_mode_from_fit(fit, i, covariance, freedom, scatter, n_hits) for i in range(fit.frequency.size)]
+    modes = [_mode_from_fit(fit, i, covariance, freedom, scatter) for i in range(fit.frequency.size)]
     return [assess_mode(state, band, i, replace(mode, method=method)) for i, mode in enumerate(modes)]
 
 
-def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: Floats | None, n_hits: int) -> Mode:
+class ModeScatter(NamedTuple):
+    """Covariance of a band over the hits, in the order of `BandFit`."""
+
+    covariance: Floats
+    """Covariance with systematic errors."""
+    by_hits: Floats
+    """Part of it that was estimated from the hits."""
+    n_hits: int
+    """Number of hits."""
+
+    def freedom(self, fit: BandFit, i: int) -> float:
+        """Return the degrees of freedom of mode i, the least of its values.
+
+        Source: Welch (1947), Biometrika 34, 28; Satterthwaite (1946), Biometrics Bulletin 2, 110.
+        """
+        every, by_hits = (np.diag(_mode_covariance(part, fit, i))[:3] for part in (self.covariance, self.by_hits))
+        share = np.max(ratio_or_zero(by_hits, every))
+        return float((self.n_hits - 1) / share**2) if share > 0 else np.inf
+
+
+def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: ModeScatter | None) -> Mode:
     """Return mode i of a band as seen at the driving point."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
     of_fit = _mode_covariance(cov, fit, i)
-    over_hits = None if scatter is None else _mode_covariance(scatter, fit, i)
+    over_hits = None if scatter is None else _mode_covariance(scatter.covariance, fit, i)
     best = of_fit if over_hits is None else over_hits
     error = np.sqrt(np.diag(best))
     error[3] = np.hypot(error[3], np.degrees(fit.phase_if_complex[0, i]))
@@ -141,7 +175,8 @@ def _mode_from_fit(fit: BandFit, i: int, cov: Floats, freedom: float, scatter: F
         of_fit[:3, :3],
         freedom,
         jackknife=None if over_hits is None else over_hits[:3, :3],
-        n_hits=n_hits,
+        n_hits=0 if scatter is None else scatter.n_hits,
+        scatter_freedom=None if scatter is None else scatter.freedom(fit, i),
         phase_deg=float(np.degrees(np.angle(sign * constant))),
         phase_deg_std=min(float(error[3]), UNKNOWN_PHASE_STD_DEG),
         phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),
@@ -322,7 +357,7 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
 def _decay_modes(state: Extraction, band: FittedBand) -> Sequence[tuple[Mode, float]]:
     """Return the modes of a band with their peak heights, rms over the decays."""
     scatter = decay_covariance(band)
-    modes = modes_from_band(state, band, 0, scatter, 0 if scatter is None else len(state.frfs))
+    modes = modes_from_band(state, band, 0, scatter)
     heights = np.sqrt(np.mean(np.abs(band.fit.constant) ** 2, axis=0)) / (2 * band.fit.damping_ratio)
     return list(zip(modes, heights.tolist(), strict=True))
 

@@ -17,6 +17,7 @@ from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.find_resonances import Resonance, add_residual_resonances, find_resonances
 from modal.bands.fit_peaks import fit_peaks, group_into_bands, iterate_bands, refit_real_constants
 from modal.bands.frf_lines import line_weights, usable_lines
+from modal.bands.merge_modes import merge_phantom_pairs
 from modal.bands.residual_analysis import has_rounding_residual
 
 
@@ -149,6 +150,9 @@ def _extract_bands(lines: tuple[Frf, ...]) -> Extraction:
     if np.any(stray):
         state = iterate_bands(replace(state, weight=np.where(stray, 0.0, state.weight)))
     state = _reweight(state)
+    merged = tuple(merge_phantom_pairs(band) for band in state.bands)
+    if any(new is not old for new, old in zip(merged, state.bands, strict=True)):
+        state = iterate_bands(replace(state, bands=merged))
     return replace(state, bands=tuple(refit_real_constants(mark_close_modes(band)) for band in state.bands))
 
 

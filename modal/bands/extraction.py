@@ -42,6 +42,21 @@ class BandData:
         return fit_lscf_poles(self.frequency, self.target, self.weight, MAX_LSCF_ORDER)
 
 
+@dataclass(frozen=True)
+class MergedPair:
+    """Two fitted modes that one mode replaced."""
+
+    low: float
+    """Lower natural frequency (Hz)."""
+    high: float
+    """Higher natural frequency (Hz)."""
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation of a mode that is at one of the two frequencies as often as at the other (Hz)."""
+        return (self.high - self.low) / 2
+
+
 @dataclass(frozen=True, eq=False)
 class FittedBand:
     """Neighbouring modes that were fitted together."""
@@ -60,11 +75,25 @@ class FittedBand:
     """Frequencies of close modes that may replace the fitted ones but are too uncertain (Hz)."""
     edits: tuple[str, ...] = ()
     """Mark of what a person did to each mode, "" for nothing; empty if no mode was edited."""
+    merged: tuple[MergedPair, ...] = ()
+    """Pairs of modes that one of the fitted modes replaces each."""
 
     @property
     def lines(self) -> slice:
         """Lines of the band on the frequency axis."""
         return self.data.lines
+
+    def merged_pair(self, i: int) -> MergedPair | None:
+        """Return the widest pair that mode i replaces; None if it replaces none."""
+        frequency, half_width = self.fit.frequency[i], np.prod(self.fit.poles[:, i])
+        own = [pair for pair in self.merged if pair.low - half_width < frequency < pair.high + half_width]
+        return max(own, key=lambda pair: pair.spread, default=None)
+
+    def frequency_spread(self, i: int) -> float:
+        """Return the standard deviation of the frequencies that mode i stands for, merged or suspected (Hz)."""
+        pair, frequency = self.merged_pair(i), self.fit.frequency[i]
+        near = [f for f in self.close_frequencies if abs(f - frequency) < frequency * self.fit.damping_ratio[i]]
+        return float(np.ptp(near)) / 2 if near and pair is None else 0.0 if pair is None else pair.spread
 
     @cached_property
     def receptance(self) -> Complexes:

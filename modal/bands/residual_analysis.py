@@ -54,8 +54,11 @@ MIN_CORRELATION_SIGNIFICANCE = 3.0
 
 White noise reaches it once in 700 cases.
 """
-HIDDEN_ERROR_FACTOR = 4.0
-"""Standard error of a mode over the non-noise part of its residual, as a share of its peak."""
+HIDDEN_POLE_ERROR_FACTOR, HIDDEN_SIZE_ERROR_FACTOR = 2.5, 4.0
+"""Standard errors of pole and size of a mode over the non-noise part of its residual, as a share of its peak.
+
+Repeated measurements agree with them (docs/studies/modal.md). Sizes differ more, as no hit meets the same place.
+"""
 MAX_UNEVEN_NOISE_RATIO = 2.0
 """Residual over noise near a mode that uneven noise may cause by itself."""
 RESIDUAL_ROUNDING_SHARE = 1e-7
@@ -77,6 +80,8 @@ class SystematicError(NamedTuple):
     """Remaining degrees of freedom."""
     covariance: Floats
     """Covariance of the errors in the order of `BandFit`, from trial fits; 0 for white noise."""
+    shape: Floats
+    """Variances of the errors in the same order, because merged or suspected modes are no exact poles; else 0."""
 
 
 def systematic_error(band: FittedBand) -> SystematicError:
@@ -85,18 +90,37 @@ def systematic_error(band: FittedBand) -> SystematicError:
     Structure that the model lacks leaves a residual that is alike over many lines. As many of its values are
     independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
     The residual does not show how far such structure shifts the modes. So each band is fitted again with fewer and more
-    residual terms and on parts of its lines. Each value gets the largest shift as its error; a part that cuts a peak
+    residual terms and on parts of its lines. Each value gets the rms shift as its error; a part that cuts a peak
     does not count for that mode. The residual near a mode beyond twice the noise, in squares, as a share
-    of its peak, may hide an error of four times that share of its half-width, its damping ratio and its size, whatever
-    its correlation: several sensors of the same hits differ by that.
+    of its peak, may hide an error of 2.5 times that share of its half-width and its zeta, and of 4 times of its size,
+    whatever its correlation: repeated measurements of the same point differ by that.
     """
     hidden, independent, freedom = _hidden_error(band), _count_independent_values(band.fit), band.fit.degrees_of_freedom
     share = 1 - MIN_CORRELATION_SIGNIFICANCE / np.sqrt(band.fit.residual.size / 2)
+    shape = _shape_variance(band)
     if independent > freedom * share or has_rounding_residual(band):
-        return SystematicError(1.0, freedom, np.diag(hidden**2))
+        return SystematicError(1.0, freedom, np.diag(hidden**2), shape)
     moved = np.array(list(_trial_changes(band))).reshape(-1, hidden.size)
-    most = np.max(np.abs(moved), axis=0, initial=0.0)
-    return SystematicError(max(freedom / independent, 1.0), min(freedom, independent), np.diag(most**2 + hidden**2))
+    by_trials = np.sum(moved**2, axis=0) / np.maximum(np.count_nonzero(moved, axis=0), 1)
+    factor, left = max(freedom / independent, 1.0), min(freedom, independent)
+    return SystematicError(factor, left, np.diag(by_trials + hidden**2), shape)
+
+
+def _shape_variance(band: FittedBand) -> Floats:
+    """Return the variances of modes that may be several in the order of `BandFit`, 0 for the others."""
+    spread = [band.frequency_spread(i) for i in range(band.fit.frequency.size)]
+    return moving_mode_variance(band.fit, np.array(spread))
+
+
+def moving_mode_variance(fit: BandFit, spread: Floats) -> Floats:
+    """Return the variances of modes whose frequency differs during the measurement, in the order of `BandFit`.
+
+    spread: standard deviation of the frequencies (Hz), shape (m,). The mean over 1 / (1 + i x), x in half-widths, has a
+    peak that is lower by the mean square of x: zeta is too large, and K too small, by up to that share.
+    """
+    share = (spread / np.prod(fit.poles, axis=0)) ** 2
+    sizes = (share * np.abs(fit.constant)).ravel()
+    return np.concatenate([spread, share * fit.damping_ratio, sizes, sizes]) ** 2
 
 
 def _hidden_error(band: FittedBand) -> Floats:
@@ -104,10 +128,9 @@ def _hidden_error(band: FittedBand) -> Floats:
     fit, left = band.fit, [residual_near_mode(band, i) for i in range(band.fit.frequency.size)]
     of_peak, of_noise = np.array(left).T
     noise_share = MAX_UNEVEN_NOISE_RATIO / np.maximum(of_noise, MAX_UNEVEN_NOISE_RATIO)
-    share = HIDDEN_ERROR_FACTOR * of_peak * np.sqrt(1 - noise_share**2)
-    share = np.zeros(share.size) if has_rounding_residual(band) else share
-    sizes = (share * np.abs(fit.constant)).ravel()
-    free = np.where(fit.held, 0.0, share)
+    share = of_peak * np.sqrt(1 - noise_share**2) * (not has_rounding_residual(band))
+    sizes = (HIDDEN_SIZE_ERROR_FACTOR * share * np.abs(fit.constant)).ravel()
+    free = HIDDEN_POLE_ERROR_FACTOR * np.where(fit.held, 0.0, share)
     return np.concatenate([free * np.prod(fit.poles, axis=0), free * fit.damping_ratio, sizes, sizes])
 
 

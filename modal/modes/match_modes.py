@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Remark
-from modal.modes.mode import Mode, mode_remark
+from modal.modes.mode import Mode, add_remark, mode_remark
 
 
 def mac(a: ArrayLike, b: ArrayLike) -> float:
@@ -142,10 +142,15 @@ MATCHED_FREQUENCY_SHARE = 0.005
 """Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
 
 
+MIN_FRFS_FOR_ABSENCE = 2
+"""Fewest other FRFs that make a mode doubtful because none of them has it; in one it may be at a node."""
+
+
 def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list[Mode]:
     """Count for each mode how many other FRFs have it within 0.5 %.
 
-    `assess_trust` trusts modes more that others have too.
+    `assess_trust` trusts modes more that others have too. A mode that none of two or more others has gets a remark,
+    which makes it doubtful.
 
     Parameters
     ----------
@@ -166,7 +171,16 @@ def match_modes(modes: Sequence[Mode], others: Sequence[Sequence[Mode]]) -> list
     >>> [mode.match_count for mode in match_modes([once, twice], others)]
     [(0, 2), (2, 2)]
     """
-    return [replace(m, match_count=(sum(_has_mode_near(o, m.frequency) for o in others), len(others))) for m in modes]
+    return [_with_match_count(mode, others) for mode in modes]
+
+
+def _with_match_count(mode: Mode, others: Sequence[Sequence[Mode]]) -> Mode:
+    found, of = sum(_has_mode_near(modes, mode.frequency) for modes in others), len(others)
+    counted = replace(mode, match_count=(found, of))
+    if found or of < MIN_FRFS_FOR_ABSENCE:
+        return counted
+    text = f"none of the {of} other measurements has a mode within {100 * MATCHED_FREQUENCY_SHARE:g} %"
+    return add_remark(counted, "not-found-again", text, "Check for mains hum and double hits, and tap again")
 
 
 def _has_mode_near(modes: Sequence[Mode], frequency: float) -> bool:

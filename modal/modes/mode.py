@@ -67,6 +67,11 @@ class Mode:
     """Covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
     """Number of hits of the jackknife, of the FRF with the fewest."""
+    scatter_freedom: float | None = None
+    """Degrees of freedom of the jackknife covariance; None for n_hits - 1.
+
+    More where the scatter of the hits is the smaller part of it (Welch-Satterthwaite).
+    """
     phase_deg: float = 0.0
     """Phase of the modal constant times the sign of K (degrees), -90 to 90; 0 for a real mode."""
     phase_deg_std: float = 0.0
@@ -204,13 +209,14 @@ class Mode:
         """
         if not 0 < level < 1:
             raise ValueError(f"level={level} is not between 0 and 1")
-        p = (1 + level) / 2
-        return float(scipy.special.stdtrit(self.degrees_of_freedom if self.jackknife is None else self.n_hits - 1, p))
+        over_hits = self.n_hits - 1 if self.scatter_freedom is None else self.scatter_freedom
+        freedom = self.degrees_of_freedom if self.jackknife is None else over_hits
+        return float(scipy.special.stdtrit(freedom, (1 + level) / 2))
 
     def interval(self, level: float = 0.95) -> Floats:
         """Return the confidence intervals of frequency, damping ratio and stiffness.
 
-        Student's t: with n_hits - 1 degrees of freedom over hits, else with those of the fit.
+        Student's t: with `scatter_freedom` (n_hits - 1 if unknown) over hits, else with those of the fit.
 
         Parameters
         ----------

@@ -58,7 +58,7 @@ REPORTED_MODE_ERROR = 0.2
 MIN_SMOOTHED_HALF_WIDTH_LINES = 12.0
 """Half-power half-width (lines) from which smoothing over five lines changes a mode by less than 2 %."""
 MAX_HIT_SCATTER_RATIO = 3.0
-"""Largest standard error over hits, over that of the fit, that is not reported."""
+"""Largest standard error over hits, over that of the fit, that noise may cause by itself."""
 MAX_HALF_POWER_DIFFERENCE, MIN_HALF_POWER_LINES = 0.25, 4
 """Largest relative difference of the half-power damping ratio, and fewest lines between its points."""
 
@@ -109,6 +109,11 @@ def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -
     if _has_unfitted_neighbour(state, band, i):
         text = "a much stronger neighbouring mode distorts the fit: zeta and stiffness K are less certain than stated"
         yield mode_remark(mode, "bent-by-neighbour", text)
+    pair = band.merged_pair(i)
+    if pair is not None:
+        text = f"uneven peak, fitted as one mode instead of two at {pair.low:.6g} and {pair.high:.6g} Hz"
+        cure = "Check for drift and loose clamping, and for a window or smoothing in the analyser"
+        yield mode_remark(mode, "uneven-peak", text, cure)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.close_frequencies):
         where = " and ".join(f"{suspect:.0f}" for suspect in band.close_frequencies)
         text = f"may be several modes near {where} Hz, too noisy to separate (stiffness K then combines all of them)"

@@ -16,7 +16,9 @@ ROTATED_PHASE_DEG = 30.0
 MAX_ROTATED_MODE_ERROR, REJECTED_MODE_ERROR = 0.1, 1 / 3
 """Largest relative standard error of damping ratio or stiffness of a rotated mode, and of any mode."""
 REJECTED_MATCHED_MODE_ERROR = 0.5
-"""Rejected relative standard error of a mode that other FRFs have, too."""
+"""Rejected relative standard error of a mode that other FRFs have, too, or that moves during the measurement."""
+MOVING_MODE_CODES = ("uneven-peak", "several-modes", "scatter")
+"""Codes of remarks on modes that exist, but stand for several modes or states, whose spread is in their errors."""
 MIN_OTHER_FRFS, MIN_MATCHED_SHARE = 2, 0.75
 """Number of other FRFs, and their share with the mode, from which it is matched.
 
@@ -34,7 +36,14 @@ MAX_MISFIT_RATIO = 2.0
 """Residual rms over noise rms above which the residual is more than noise."""
 MIN_MISFIT_SHARE = 0.01
 """Residual rms over the peak from which a misfit counts."""
-DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines", "wrong-quantity", "wrong-unit")
+DOUBTFUL_REMARK_CODES = (
+    "bent-by-neighbour",
+    "several-modes",
+    "smoothed-lines",
+    "not-found-again",
+    "wrong-quantity",
+    "wrong-unit",
+)
 """Codes of remarks that make a mode doubtful."""
 COMMON_REMARK_CODES = ("smoothed-lines", "wrong-quantity", "wrong-unit")
 """Codes of remarks on all FRFs of a structure, for which a match in another FRF proves nothing."""
@@ -121,9 +130,11 @@ def _figure_limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
     else:
         yield "misfit", share, MIN_MISFIT_SHARE, REJECTED_HIDDEN_MISFIT_SHARE
         yield "heavy-damping", mode.damping_ratio, DOUBTFUL_HIDDEN_DAMPING, REJECTED_HIDDEN_DAMPING
-    largest = REJECTED_MATCHED_MODE_ERROR if again else REJECTED_MODE_ERROR
+    doubtful = REJECTED_MATCHED_MODE_ERROR if again else REJECTED_MODE_ERROR
+    is_moving = any(remark.code in MOVING_MODE_CODES for remark in mode.remarks)
+    rejected = REJECTED_MATCHED_MODE_ERROR if is_moving else doubtful
     is_turned = abs(mode.phase_deg) > ROTATED_PHASE_DEG and not again
-    yield "uncertain", relative_error(mode), MAX_ROTATED_MODE_ERROR if is_turned else largest, largest
+    yield "uncertain", relative_error(mode), MAX_ROTATED_MODE_ERROR if is_turned else doubtful, rejected
     if mode.coherence is not None:
         yield "low-coherence", 1 - mode.coherence, 1 - MIN_TRUSTED_COHERENCE, never
     if mode.edge_distance is not None:

@@ -1,7 +1,7 @@
 """Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache
@@ -18,11 +18,13 @@ from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.step_times import time_step
-from modal import CredibleModes, Extraction, Mode, ModeEdits
+from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
 """Codes of the remarks on mode edits."""
+PEAK_REMEDY = "Warm up the spindle, check the clamping, and tap again"
+"""Remedy of an unexplained peak."""
 BEARING_STIFFNESS_RANGE = (1e5, 1e11)
 """Plausible bearing stiffness (N/m), from a plain bearing on a soft seat to a rigid seat."""
 MAX_STIFFNESS_CHANGE_RATIO = 2.0
@@ -66,7 +68,7 @@ class Measurement(TapFit):
     calibration: Calibration | None = None
     """Model calibrated to the followed mode; None if impossible or implausible."""
     at_tip: Sequence[Mode] = ()
-    """Modes at the tool tip for lobes; empty without any."""
+    """Modes at the tool tip for lobes, with one for each unexplained peak; empty without any."""
     cross: Sequence[Mode] | None = None
     """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
 
@@ -156,22 +158,26 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
-        remarks += _coverage_remarks(fit, trusted, machine)
+        unexplained = _find_unexplained_peaks(fit, trusted.modes, machine)
+        remarks += map(_peak_remark, unexplained)
+        if at_tip and machine.tap.position_mm == 0:
+            at_tip += [peak.missing for peak in unexplained]
     results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
     return Measurement(**vars(fit) | results)
 
 
-def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
-    """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
-    if fit.frf is None:
-        return
+def _find_unexplained_peaks(fit: TapFit, modes: Sequence[Mode], machine: Machine) -> list[UnexplainedPeak]:
+    """Find the measured peaks in [mode] band_hz that the accepted modes do not explain; none without force."""
+    rejected = [mode for mode in fit.modes if mode not in modes]
+    peaks = () if fit.frf is None else modal.find_unexplained_peaks(fit.frf, modes, rejected)
     low, high = machine.mode.band_hz or (0.0, np.inf)
-    for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):
-        if low <= peak.frequency <= high:
-            explained = f"the modes explain {1e6 * peak.explained:.2g} um/N"
-            text = f"peak not explained, real part of the FRF {1e6 * peak.measured:.2g} um/N, {explained}"
-            cure = "Warm up the spindle, check the clamping, and tap again"
-            yield Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, cure)
+    return [peak for peak in peaks if low <= peak.frequency <= high]
+
+
+def _peak_remark(peak: UnexplainedPeak) -> Remark:
+    measured, explained = (f"{format_rounded(value, scale=1e-6, digits=2)} um/N" for value in peak[1:3])
+    text = f"peak not explained by the accepted modes, least real part {measured} instead of {explained}"
+    return Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, PEAK_REMEDY)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache
+from typing import Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -14,7 +15,7 @@ from acquisition import CROSS_TAP, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
-from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
+from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.step_times import time_step
@@ -23,8 +24,6 @@ from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
 """Codes of the remarks on mode edits."""
-PEAK_REMEDY = "Warm up the spindle, check the clamping, and tap again"
-"""Remedy of an unexplained peak."""
 BEARING_STIFFNESS_RANGE = (1e5, 1e11)
 """Plausible bearing stiffness (N/m), from a plain bearing on a soft seat to a rigid seat."""
 MAX_STIFFNESS_CHANGE_RATIO = 2.0
@@ -71,6 +70,8 @@ class Measurement(TapFit):
     """Modes at the tool tip for lobes, with one for each unexplained peak; empty without any."""
     cross: Sequence[Mode] | None = None
     """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
+    unexplained: tuple[UnexplainedPeak, ...] = ()
+    """Measured peaks that the modes do not explain."""
 
 
 @cache
@@ -158,26 +159,13 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
-        unexplained = _find_unexplained_peaks(fit, trusted.modes, machine)
-        remarks += map(_peak_remark, unexplained)
-        if at_tip and machine.tap.position_mm == 0:
-            at_tip += [peak.missing for peak in unexplained]
-    results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
+        is_at_tip = machine.tap.position_mm == 0
+        used = trusted.modes if is_at_tip or followed is None else (followed,)
+        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, modes, machine)
+        at_tip += [peak.missing for peak in unexplained if is_at_tip]
+    results: dict[str, Any] = {"followed": followed, "calibration": calibration, "at_tip": at_tip}
+    results |= {"unexplained": unexplained, "remarks": (*remarks, *about_peaks)}
     return Measurement(**vars(fit) | results)
-
-
-def _find_unexplained_peaks(fit: TapFit, modes: Sequence[Mode], machine: Machine) -> list[UnexplainedPeak]:
-    """Find the measured peaks in [mode] band_hz that the accepted modes do not explain; none without force."""
-    rejected = [mode for mode in fit.modes if mode not in modes]
-    peaks = () if fit.frf is None else modal.find_unexplained_peaks(fit.frf, modes, rejected)
-    low, high = machine.mode.band_hz or (0.0, np.inf)
-    return [peak for peak in peaks if low <= peak.frequency <= high]
-
-
-def _peak_remark(peak: UnexplainedPeak) -> Remark:
-    measured, explained = (f"{format_rounded(value, scale=1e-6, digits=2)} um/N" for value in peak[1:3])
-    text = f"peak not explained by the accepted modes, least real part {measured} instead of {explained}"
-    return Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, PEAK_REMEDY)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
@@ -193,7 +181,9 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
         remarks.append(Remark("cross-beside-tip", "", text, "Repeat the cross tap at the tool tip"))
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
-    results = {"followed": followed, "cross": at_tip, "remarks": (*remarks, *trusted.remarks)}
+    unexplained, _ = find_uncovered_peaks(fit.frf, cross, fit.modes, machine)
+    results: dict[str, Any] = {"followed": followed, "cross": at_tip, "unexplained": unexplained}
+    results["remarks"] = (*remarks, *trusted.remarks)
     return Measurement(**vars(fit) | results)
 
 

@@ -103,7 +103,7 @@ def find_unexplained_peaks(
     counted = (lines.frequency >= lowest) & (noise < np.abs(lines.receptance))
     model = synthesize_frf(modes, lines.frequency).receptance.real
     compared = _Comparison(lines.frequency, lines.receptance.real, noise, counted, model, _model_error(lines, modes))
-    measured = [compared.measure(peak) for peak in find_resonances(lines)]
+    measured = [compared.measure(peak) for peak in find_resonances(lines, is_checked=True)]
     deepest = min((depth for depth, _ in measured), default=0.0)
     return tuple(peak for _, peak in measured if peak is not None and peak.measured < MIN_LIMITING_SHARE * deepest)
 

@@ -13,16 +13,15 @@ from datetime import UTC, datetime
 
 import milling_simulation
 import numpy as np
-from milling_simulation import Case, Modes
+from milling_simulation import Modes
 from milling_steps import Floats
 from random_milling import RandomMilling, random_case
-from verdict_study import MACHINE, limit_mm, program
+from verdict_study import MACHINE, limit_mm
 
 from acquisition import Circumstances, Hit, TapDirection, TapTest, check_hit, estimate_frf
 from lobewatch.machine import ProgramTable
-from lobewatch.measurement.tap_measurement import Measurement, measure
+from lobewatch.measurement.tap_measurement import measure
 from lobewatch.tool.assembly import Assembly, assemble
-from lobewatch.verdicts.verdict import evaluate_program
 
 RATE, SECONDS, OVERSAMPLING = 25600, 1.0, 2
 """Samples per second, length of a record (s), and factor at which it is made."""

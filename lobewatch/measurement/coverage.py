@@ -35,15 +35,14 @@ def label_direction(remark: Remark, direction: str) -> Remark:
 
 
 def find_uncovered_peaks(
-    frf: Frf | None, used: Sequence[Mode], fitted: Sequence[Mode], machine: Machine
+    frf: Frf | None, used: Sequence[Mode], machine: Machine
 ) -> tuple[tuple[UnexplainedPeak, ...], list[Remark]]:
     """Find the measured peaks in [mode] band_hz that the modes used for lobes do not explain, with their remarks.
 
     Peaks outside the band were left out on purpose: a remark names them, and no verdict depends on them. Without an
     FRF (no force) nothing is compared.
     """
-    rejected = [mode for mode in fitted if mode not in used]
-    peaks = () if frf is None else modal.find_unexplained_peaks(frf, used, rejected)
+    peaks = () if frf is None else modal.find_unexplained_peaks(frf, used)
     low, high = machine.mode.band_hz or (0.0, np.inf)
     inside = tuple(peak for peak in peaks if low <= peak.frequency <= high)
     outside = [f"{peak.frequency:.0f} Hz" for peak in peaks if peak not in inside]

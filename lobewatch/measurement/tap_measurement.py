@@ -161,7 +161,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
         is_at_tip = machine.tap.position_mm == 0
         used = trusted.modes if is_at_tip or followed is None else (followed,)
-        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, modes, machine)
+        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
         at_tip += [peak.missing for peak in unexplained if is_at_tip]
     results: dict[str, Any] = {"followed": followed, "calibration": calibration, "at_tip": at_tip}
     results |= {"unexplained": unexplained, "remarks": (*remarks, *about_peaks)}
@@ -181,7 +181,7 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
         remarks.append(Remark("cross-beside-tip", "", text, "Repeat the cross tap at the tool tip"))
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
-    unexplained, _ = find_uncovered_peaks(fit.frf, cross, fit.modes, machine)
+    unexplained, _ = find_uncovered_peaks(fit.frf, cross, machine)
     results: dict[str, Any] = {"followed": followed, "cross": at_tip, "unexplained": unexplained}
     results["remarks"] = (*remarks, *trusted.remarks)
     return Measurement(**vars(fit) | results)

@@ -14,8 +14,10 @@ from modal.bands.find_resonances import Resonance, find_resonances, mobility_noi
 from modal.bands.frf_lines import remove_drift, usable_lines
 from modal.modes.mode import Mode, synthesize_frf
 
-LOWEST_FREQUENCY_SHARE = 0.5
-"""Lowest compared frequency over the lowest natural frequency of the modes; chosen."""
+LOWEST_FREQUENCY_SHARE, MIN_LOW_PEAK_LINES = 0.5, 4.0
+"""Frequency over the lowest natural frequency below which the half-width of a peak must span these lines; chosen.
+
+Drift, hum and suspensions are narrower: 0.5 to 2.8 lines in nine measured FRFs."""
 PEAK_HALF_WIDTHS = 2.5
 """Half-widths around a peak in which the most negative real part is searched; a single mode has it at one."""
 SMOOTHED_HALF_WIDTHS = 0.5
@@ -51,15 +53,13 @@ class UnexplainedPeak(NamedTuple):
     """Real mode that explains the rest: with it the sum of the modes is as negative as the measured FRF."""
 
 
-def find_unexplained_peaks(
-    frf: Frf, modes: Sequence[Mode], rejected: Sequence[Mode] = ()
-) -> tuple[UnexplainedPeak, ...]:
+def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[UnexplainedPeak, ...]:
     """Find the measured peaks whose most negative real part the modes do not explain.
 
     The limiting depth of a cut is inversely proportional to the most negative real part of the receptance. Compared
-    are the lines from half the lowest natural frequency to the end of the usable band whose noise is below their
-    receptance. A peak counts if the modes miss more of its real part than their errors and the noise explain, if it is
-    deep enough to limit a cut, and if a machine may be so soft.
+    are the lines of the usable band whose noise is below their receptance. A peak counts if the modes miss more of its
+    real part than their errors and the noise explain, if it is deep enough to limit a cut, and if a machine may be so
+    soft. Below half the lowest natural frequency it counts only if its width is resolved.
 
     Parameters
     ----------
@@ -67,8 +67,6 @@ def find_unexplained_peaks(
         Measured FRF.
     modes : sequence of Mode
         Modes used for lobes, with stiffness; may be empty.
-    rejected : sequence of Mode, optional
-        Other modes of the fit: those with a clear peak and the stiffness of a machine widen the compared band.
 
     Returns
     -------
@@ -97,20 +95,16 @@ def find_unexplained_peaks(
     -0.162
     """
     lines = replace(remove_drift(usable_lines(frf, None)), coherence=None)  # low where hits differ, too
-    plain = [mode for mode in rejected if mode.half_power_damping is not None and _is_of_machine(mode)]
-    lowest = LOWEST_FREQUENCY_SHARE * min((mode.frequency for mode in (*modes, *plain)), default=0.0)
     noise = mobility_noise(lines) / (2 * np.pi * lines.frequency)
-    counted = (lines.frequency >= lowest) & (noise < np.abs(lines.receptance))
+    counted = noise < np.abs(lines.receptance)
     model = synthesize_frf(modes, lines.frequency).receptance.real
-    compared = _Comparison(lines.frequency, lines.receptance.real, noise, counted, model, _model_error(lines, modes))
+    lowest = LOWEST_FREQUENCY_SHARE * min((mode.frequency for mode in modes), default=0.0)
+    compared = _Comparison(
+        lowest, lines.frequency, lines.receptance.real, noise, counted, model, _model_error(lines, modes)
+    )
     measured = [compared.measure(peak) for peak in find_resonances(lines, is_checked=True)]
     deepest = min((depth for depth, _ in measured), default=0.0)
     return tuple(peak for _, peak in measured if peak is not None and peak.measured < MIN_LIMITING_SHARE * deepest)
-
-
-def _is_of_machine(mode: Mode) -> bool:
-    """Return whether a machine may have the stiffness of a mode; suspensions and drift are softer."""
-    return mode.has_stiffness and stiffness_remark(mode.stiffness) is None
 
 
 def _model_error(lines: Frf, modes: Sequence[Mode]) -> Floats:
@@ -141,6 +135,8 @@ def _slopes(mode: Mode, frequency: Floats) -> Iterator[Floats]:
 class _Comparison:
     """Real parts of the measured receptance and of the modes (m/N) on the same lines, shape (n,) each."""
 
+    lowest: float
+    """Frequency below which only resolved peaks count (Hz)."""
     frequency: Floats
     """Frequencies (Hz)."""
     measured: Floats
@@ -156,13 +152,15 @@ class _Comparison:
 
     def measure(self, peak: Resonance) -> tuple[float, UnexplainedPeak | None]:
         """Return the most negative real part near a peak (m/N), 0 without one, and the peak if it is unexplained."""
-        f = self.frequency
+        f, spacing = self.frequency, np.min(np.diff(self.frequency))
+        if peak.frequency < self.lowest and peak.half_width < MIN_LOW_PEAK_LINES * spacing:
+            return 0.0, None
         near = self.counted & (np.abs(f - peak.frequency) <= PEAK_HALF_WIDTHS * peak.half_width)
-        length = 1 + int(SMOOTHED_HALF_WIDTHS * peak.half_width / np.min(np.diff(f)))
+        length = 1 + int(SMOOTHED_HALF_WIDTHS * peak.half_width / spacing)
         measured, explained = (_running_mean(part, length) for part in (self.measured, self.explained))
         line = int(np.argmin(np.where(near, measured, 0.0)))
         deepest = float(measured[line])
-        if not near[line] or deepest >= 0 or not _is_of_machine(_mode_of(peak, f[line], deepest)):
+        if not near[line] or deepest >= 0 or stiffness_remark(_mode_of(peak, f[line], deepest).stiffness) is not None:
             return 0.0, None
         around = np.abs(f - f[line]) <= peak.half_width
         least = float(np.min(explained[around] - self.error[around]))

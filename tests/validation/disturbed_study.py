@@ -7,8 +7,9 @@ verdicts. A machine that met several states is as bad as the worst of them.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
 import milling_simulation
@@ -16,12 +17,13 @@ import numpy as np
 from milling_simulation import Modes
 from milling_steps import Floats
 from random_milling import RandomMilling, random_case
-from verdict_study import MACHINE, limit_mm
+from verdict_study import MACHINE, limit_mm, program
 
 from acquisition import Circumstances, Hit, TapDirection, TapTest, check_hit, estimate_frf
 from lobewatch.machine import ProgramTable
 from lobewatch.measurement.tap_measurement import measure
 from lobewatch.tool.assembly import Assembly, assemble
+from lobewatch.verdicts.verdict import Stability, evaluate_program
 
 RATE, SECONDS, OVERSAMPLING = 25600, 1.0, 2
 """Samples per second, length of a record (s), and factor at which it is made."""
@@ -32,6 +34,18 @@ FORCES = 150.0, 350.0
 """Peak forces (N)."""
 N_OBLIQUE = 3
 """Feed directions between x and y in which a program that feeds along both is judged."""
+
+
+@dataclass
+class Counts:
+    """Verdicts of a study."""
+
+    words: Counter[Stability] = field(default_factory=Counter)
+    """Number of programs by stability."""
+    uncovered: int = 0
+    """Tools whose modes do not cover their measurement."""
+    wrong: int = 0
+    """Programs called stable that chatter in a state that was met."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +73,6 @@ def disturb(milling: RandomMilling, kind: str, rng: np.random.Generator) -> Dist
     states = [_shifted(milling, 1 - shift * share) for share in course]
     if kind == "in some hits":
         silent = replace(milling, x=milling.x[1:], y=milling.y[1:])
-        states = [milling if k in rng.choice(N_HITS, 3, replace=False) else silent for k in range(N_HITS)]
         chosen = set(rng.choice(N_HITS, 3, replace=False).tolist())
         states = [milling if k in chosen else silent for k in range(N_HITS)]
     return Disturbed(tuple(states), tuple(forces.tolist()))
@@ -81,7 +94,7 @@ def make_hit(modes: Modes, peak: float, rng: np.random.Generator) -> Hit:
     rate, n = RATE * OVERSAMPLING, int(2 * SECONDS * RATE * OVERSAMPLING)
     u = (np.arange(n) / rate - 0.01) / rng.uniform(1.6e-4, 2.2e-4)
     spectrum = np.fft.rfft(np.where((u > 0) & (u < 1), peak * np.sin(np.pi * u) ** 2, 0.0))
-    f, keep = np.fft.rfftfreq(n, 1 / rate), int(SECONDS * RATE)
+    f, keep = np.asarray(np.fft.rfftfreq(n, 1 / rate), dtype=np.float64), int(SECONDS * RATE)
     spectrum /= np.sqrt(1 + (f / (0.45 * RATE)) ** 16)
     force = np.fft.irfft(spectrum, n)[::OVERSAMPLING][:keep]
     moved = np.fft.irfft(-((2 * np.pi * f) ** 2) * receptance(f, modes) * spectrum, n)[::OVERSAMPLING][:keep]
@@ -126,5 +139,29 @@ def chatters_in_any_state(disturbed: Disturbed, table: ProgramTable, rng: np.ran
 
 
 def _feeds(milling: RandomMilling, rng: np.random.Generator) -> Sequence[float]:
-    oblique = rng.uniform(0, math.pi, N_OBLIQUE) if milling.feed == "both" else []
-    return (*milling.feed_angles, *oblique)
+    oblique = rng.uniform(0, math.pi, N_OBLIQUE if milling.feed == "both" else 0)
+    return (*milling.feed_angles, *oblique.tolist())
+
+
+def judge_disturbed(kind: str, count: int, seed: int) -> Counts:
+    """Judge a program of 105 to 300 % of the least limit on each of some machines disturbed in one way."""
+    counts = Counts()
+    for milling, rng in drawn_machines(count, seed):
+        disturbed = disturb(milling, kind, rng)
+        tool, table = measured(disturbed, rng), program(milling, disturbed.limit_mm * rng.uniform(1.05, 3))
+        word = evaluate_program(table, tool, MACHINE).stability
+        counts.words[word] += 1
+        counts.uncovered += bool(tool.uncovered)
+        counts.wrong += word is Stability.STABLE and chatters_in_any_state(disturbed, table, rng)
+    return counts
+
+
+def judge_undisturbed(part: float, count: int, seed: int) -> Counts:
+    """Judge a program of a part of the limit on each of some machines that stay as they are."""
+    counts = Counts()
+    for milling, rng in drawn_machines(count, seed):
+        disturbed = disturb(milling, "", rng)
+        tool = measured(disturbed, rng)
+        counts.words[evaluate_program(program(milling, part * disturbed.limit_mm), tool, MACHINE).stability] += 1
+        counts.uncovered += bool(tool.uncovered)
+    return counts

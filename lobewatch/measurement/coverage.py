@@ -37,17 +37,23 @@ def label_direction(remark: Remark, direction: str) -> Remark:
 def find_uncovered_peaks(
     frf: Frf | None, used: Sequence[Mode], machine: Machine
 ) -> tuple[tuple[UnexplainedPeak, ...], list[Remark]]:
-    """Find the measured peaks in [mode] band_hz that the modes used for lobes do not explain, with their remarks.
+    """Find the measured peaks in [mode] band_hz that the modes used for lobes do not explain.
 
-    Peaks outside the band were left out on purpose: a remark names them, and no verdict depends on them. Without an
-    FRF (no force) nothing is compared.
+        A remark names each peak that they do not even explain within their errors.
+
+    Peaks outside the band were left out on purpose: a remark names them, and no
+        verdict depends on them. Without an FRF (no force) nothing is compared.
     """
     peaks = () if frf is None else modal.find_unexplained_peaks(frf, used)
     low, high = machine.mode.band_hz or (0.0, np.inf)
     inside = tuple(peak for peak in peaks if low <= peak.frequency <= high)
     outside = [f"{peak.frequency:.0f} Hz" for peak in peaks if peak not in inside]
     cure = PEAK_REMEDY_BESIDE_TIP if machine.tap.position_mm else PEAK_REMEDY
-    remarks = [Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", _peak_text(peak), cure) for peak in inside]
+    remarks = [
+        Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", _peak_text(peak), cure)
+        for peak in inside
+        if not peak.is_within_errors
+    ]
     if outside:
         text = f"peak outside [mode] band_hz {low:g}..{high:g} Hz is not in the stability lobes"
         cure = "Widen [mode] band_hz if the peak belongs to the machine"
@@ -57,4 +63,4 @@ def find_uncovered_peaks(
 
 def _peak_text(peak: UnexplainedPeak) -> str:
     measured, explained = (f"{format_rounded(value, scale=1e-6, digits=2)} um/N" for value in peak[1:3])
-    return f"peak not explained by the modes used for lobes, least real part {measured} instead of {explained}"
+    return f"peak not explained by the modes used for lobes, most negative real part {measured} instead of {explained}"

@@ -72,7 +72,7 @@ def _find_missing_cross_peaks(modes: Sequence[Mode], tap: Measurement) -> Iterat
     deepest = min(-1 / (4 * mode.stiffness * mode.damping_ratio * (1 + mode.damping_ratio)) for mode in modes)
     yield from (f"{remark.about} {remark.text}".strip() for remark in tap.uncovered)
     for peak in tap.unexplained:
-        if peak.measured < MIN_LIMITING_SHARE * deepest:
+        if peak.measured < MIN_LIMITING_SHARE * deepest and not peak.is_within_errors:
             yield f"its modes do not explain its peak at {peak.frequency:.0f} Hz"
 
 

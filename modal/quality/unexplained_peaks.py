@@ -28,7 +28,7 @@ MIN_LIMITING_SHARE = 0.1
 A cut in the best pocket of one mode is up to ten times as deep as its lowest limit.
 """
 MAX_UNEXPLAINED_SHARE = 0.15
-"""Share of the most negative real part that the modes may miss beyond their uncertainty; chosen.
+"""Share of the most negative real part that the modes may miss; chosen.
 
 The default scatter between tap tests changes it by 13 %.
 """
@@ -48,7 +48,9 @@ class UnexplainedPeak(NamedTuple):
     measured: float
     """Most negative real part of the measured receptance near it (m/N)."""
     explained: float
-    """Most negative real part there of the modes, within their uncertainty (m/N)."""
+    """Most negative real part there of the modes (m/N)."""
+    is_within_errors: bool
+    """True if the modes explain it within their 95 % errors."""
     missing: Mode
     """Real mode that explains the rest: with it the sum of the modes is as negative as the measured FRF."""
 
@@ -58,7 +60,7 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
 
     The limiting depth of a cut is inversely proportional to the most negative real part of the receptance. Compared
     are the lines of the usable band whose noise is below their receptance. A peak counts if the modes miss more of its
-    real part than their errors and the noise explain, if it is deep enough to limit a cut, and if a machine may be so
+    real part than noise explains, if it is deep enough to limit a cut, and if a machine may be so
     soft. Below half the lowest natural frequency it counts only if its width is resolved.
 
     Parameters
@@ -71,7 +73,7 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
     Returns
     -------
     tuple of UnexplainedPeak
-        Peaks by rising frequency; empty if the modes cover the measurement.
+        Peaks by rising frequency; empty if the modes cover the measurement without help of their errors.
 
     Raises
     ------
@@ -163,12 +165,13 @@ class _Comparison:
         if not near[line] or deepest >= 0 or stiffness_remark(_mode_of(peak, f[line], deepest).stiffness) is not None:
             return 0.0, None
         around = np.abs(f - f[line]) <= peak.half_width
-        least = float(np.min(explained[around] - self.error[around]))
-        surely = deepest + NOISE_QUANTILE * self.noise[line] / np.sqrt(2 * length)
-        if (1 - MAX_UNEXPLAINED_SHARE) * surely >= least:
+        least = float(np.min(explained[around]))
+        surely = (1 - MAX_UNEXPLAINED_SHARE) * (deepest + NOISE_QUANTILE * self.noise[line] / np.sqrt(2 * length))
+        if surely >= least:
             return deepest, None
         missing = _mode_of(peak, float(f[line]), deepest - float(explained[line]))
-        return deepest, UnexplainedPeak(peak.frequency, deepest, least, missing)
+        is_within = bool(surely >= np.min((explained - self.error)[around]))
+        return deepest, UnexplainedPeak(peak.frequency, deepest, least, is_within, missing)
 
 
 def _running_mean(values: Floats, length: int) -> Floats:

@@ -5,7 +5,9 @@ from .bands.extraction import Extraction, FittedBand, candidate_frequencies, sta
 from .bands.find_resonances import ConjugateError
 from .edit_modes import edit_modes
 from .fit_modes import decay_spectra, fit_common_modes, fit_decays, fit_modes, modes_from_decays, modes_from_extraction
+from .frequency_series import HitChangeKind
 from .frf_peaks import find_peaks_above_band, find_truncated_peaks, mode_indicator, pick_peaks
+from .hit_changes import HitChange, find_hit_changes
 from .modes.match_modes import ModeMatch, follow_mode, mac, match_modes, predominant_mode
 from .modes.measurement_effects import (
     CommonDelay,
@@ -29,6 +31,8 @@ __all__ = [
     "CredibleModes",
     "Extraction",
     "FittedBand",
+    "HitChange",
+    "HitChangeKind",
     "MassLoading",
     "Mode",
     "ModeEdits",
@@ -44,6 +48,7 @@ __all__ = [
     "decay_spectra",
     "edit_modes",
     "extract_modes",
+    "find_hit_changes",
     "find_peaks_above_band",
     "find_truncated_peaks",
     "find_unexplained_peaks",

@@ -148,7 +148,7 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     Raises
     ------
     DataError
-        If no hit is good; its text has the reasons.
+        If no hit is good; its text has the reasons. If the response of all good hits is constant.
 
     Examples
     --------
@@ -166,6 +166,8 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     if not good:
         reasons = (f"Hit {i} ({verdict.flags.words}): {verdict.text}" for i, verdict in enumerate(verdicts, 1))
         raise DataError(join_sentences(f"no good hit among {len(hits)}", *reasons))
+    if not any(np.ptp(hit.acceleration) for hit in good):
+        raise DataError("the response is constant, so no response was measured. Check the sensor and its cable.")
     return estimate_frf(good) if good[0].has_force else None, tuple(verdict.flags for verdict in verdicts)
 
 

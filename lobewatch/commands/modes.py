@@ -1,5 +1,6 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ from lobewatch.show.terminal.output import Json, emit
 from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
+    from lobewatch.measurement import FileModes
     from modal import ModeEdits
 
 
@@ -21,7 +23,13 @@ def modes(
         Path,
         Argument(help="Machine folder, or recorded hits or FRF: UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
     ],
-    tap: Annotated[str, Argument(help="Tap test of a machine folder: ID, or a unique part of it.")] = "",
+    names: Annotated[
+        list[str] | None,
+        Argument(
+            metavar="[TAP]...",
+            help="Tap test of a machine folder: ID, or a unique part of it. With --one-test: more files of the test.",
+        ),
+    ] = None,
     band: Annotated[tuple[float, float] | None, Option(help="Frequency band (Hz).")] = None,
     figure: Annotated[Path | None, Option(help="Figure of FRF, fit and poles (.svg, .png, .pdf).")] = None,
     window: Annotated[
@@ -69,6 +77,7 @@ def modes(
       lobewatch modes decays.csv --hammer none
       lobewatch modes h.mat --response 2 --unit g/N
       lobewatch modes point1.uff --beside point2.uff --beside point3.uff
+      lobewatch modes hit1.csv hit2.csv hit3.csv --one-test
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
     """
@@ -83,6 +92,7 @@ def modes(
     if beside is not None and len(beside) == 1:
         raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
+    file, tap, hit_files = _resolve_names(file, names or (), one_test=file_options.one_test)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
@@ -95,7 +105,7 @@ def modes(
         text = "--by-fit needs a stored tap test" if by_fit else f"{file} is a folder"
         raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
     else:
-        said = file_options.description(averages=averages, without_force=hammer == "none")
+        said = file_options.description(averages=averages, without_force=hammer == "none", hit_files=hit_files)
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
@@ -106,11 +116,28 @@ def modes(
     if beside:
         file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:
-        from lobewatch.show.figures.drawing import save_figure
-        from lobewatch.show.figures.spindle_figures import plot_modes
-
-        save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
+        _save_figure(file_modes, file.name, figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
+
+
+def _resolve_names(file: Path, names: Sequence[str], *, one_test: bool) -> tuple[Path, str, tuple[Path, ...]]:
+    """Return the file or folder, the tap test of the folder, and the further files of one tap test."""
+    from lobewatch.logbook.recordings.recorded_files import find_recordings
+
+    if one_test:
+        first, *others = find_recordings([file, *names])[0]
+        return first, "", tuple(others)
+    if len(names) > 1:
+        text = f"{len(names) + 1} files. Give --one-test if they are hits of one tap test, or name a single file"
+        raise ValueError(f"{text}, or a machine folder and one tap test.")
+    return file, names[0] if names else "", ()
+
+
+def _save_figure(file_modes: "FileModes", name: str, figure: Path) -> None:
+    from lobewatch.show.figures.drawing import save_figure
+    from lobewatch.show.figures.spindle_figures import plot_modes
+
+    save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, name), figure)
 
 
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":

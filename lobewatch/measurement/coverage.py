@@ -9,13 +9,14 @@ import modal
 from acquisition import Frf, Remark
 from dsm import format_rounded
 from lobewatch.machine import Machine
+from lobewatch.measurement.hit_remarks import HIT_CHANGE_CODES
 from modal import Mode, UnexplainedPeak
 
 PEAK_CODE = "peak-not-explained"
 """Code of the remark on a measured peak that the accepted modes do not explain."""
 PEAK_REMEDY, PEAK_REMEDY_BESIDE_TIP = "Warm up the spindle, check the clamping, and tap again", "Tap at the tool tip"
 """Remedies of such a peak, at the tool tip and with [tap] position_mm, where one mode goes to the tip."""
-UNCOVERED_CODES = (PEAK_CODE,)
+UNCOVERED_CODES = (PEAK_CODE, *HIT_CHANGE_CODES.values())
 """Codes of remarks after which no program is stable: only another tap test or better modes end them, no answer does.
 
 To add a reason, put its remark among those of `fit_tap` or `interpret_fit`, about the frequency ("1500 Hz") or empty,

@@ -15,6 +15,7 @@ from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
+from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.step_times import time_step
@@ -41,6 +42,8 @@ class FileFrf:
     """Facts of the file with their origins."""
     recorded_window: float | None = None
     """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
+    n_found: int = 0
+    """Number of hits found, with those that cannot be used; 0 for an FRF."""
 
 
 @time_step("reading")
@@ -65,7 +68,8 @@ def read_file_frf(
         finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
         raise ValueError(f"{finding}. Leave out the number of averages.")
     frf = _average_hits(path, recording.hits, accepted, description)
-    return replace(frf, facts=recording.facts, recorded_window=recording.window)
+    facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
+    return replace(frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
 
 
 def _check_phase(path: Path, description: Description) -> str:
@@ -160,6 +164,8 @@ class FileModes:
     """Facts of the file with their origins."""
     by_hand: ModeEdits = NO_MODE_EDITS
     """Mode edits."""
+    n_found: int = 0
+    """Number of hits found, with those that cannot be used; 0 for an FRF or if unknown."""
 
 
 def fit_file_modes(
@@ -255,9 +261,12 @@ def fit_file_modes(
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
-    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
+    found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
+    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
-    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
+    return FileModes(
+        path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, n_found=file_frf.n_found
+    )
 
 
 def _fit_decay_modes(
@@ -269,8 +278,8 @@ def _fit_decay_modes(
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
-    remarks = (*decays.remarks, *fit_remarks)
-    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
+    remarks = (*decays.remarks, *fit_remarks, *find_hit_remarks(decays.hits, band))
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, n_found=decays.n_found)
 
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
@@ -347,7 +356,9 @@ def list_comparison_files(
         Path and missing data of each measurement.
     """
     return [
-        (file, replace(description, response=int(text))) if text.isdecimal() else (Path(text), description)
+        (file, replace(description, response=int(text)))
+        if text.isdecimal()
+        else (Path(text), replace(description, hit_files=()))
         for text in beside
     ]
 

@@ -17,6 +17,7 @@ from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
+from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
@@ -115,13 +116,15 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
+            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.flags))
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-                said = (*edited, *decay_remarks(machine.tap.sensor))
+                said = (*edited, *decay_remarks(machine.tap.sensor), *changes)
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
             windows = hidden_window_remarks(tap.accepted, fitted.modes)
-            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows), frf=fitted.extraction.frf)
+            said = (*remarks, *fitted.remarks, *windows, *changes)
+            return TapFit(*named, fitted.modes, said, frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)

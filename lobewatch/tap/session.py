@@ -174,7 +174,7 @@ class TapSession:
 
     def _finish(self, in_progress: TapInProgress) -> TapTest:
         """Average, commit and evaluate the test."""
-        self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None)
+        self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None, hit_change=None)
         tap = in_progress.finish()
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None

@@ -66,14 +66,15 @@ class Resonance:
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 
 
-def find_resonances(frf: Frf, *, is_checked: bool = False) -> list[Resonance]:
+def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = False) -> list[Resonance]:
     """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
     The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
     r - 1/r = -+ 2 zeta. Peaks are searched line by line and then in ever longer running means of the complex
     mobility, which reveals a wide mode that noise hides from single lines. Two modes with no dip between
-    them are one peak. A mode much narrower than the line spacing is not found. is_checked: the modes were fitted
-    before, so that a rising phase is that of a disturbance.
+    them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
+    mobility are ignored, which saves time. is_checked: the modes were fitted before, so that a rising phase is that of
+    a disturbance.
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
     """
@@ -85,7 +86,7 @@ def find_resonances(frf: Frf, *, is_checked: bool = False) -> list[Resonance]:
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
     frf = remove_drift(frf)
-    peaks = _find_peaks_at_all_scales(frf)
+    peaks = _find_peaks_at_all_scales(frf, least_share * float(np.max(np.abs(frf.mobility))))
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
             "the FRF is real on every line, so the phase is missing. "

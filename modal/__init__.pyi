@@ -21,6 +21,7 @@ from .modes.measurement_effects import (
 )
 from .modes.mode import Mode, synthesize_frf
 from .modes.mode_edits import ModeEdits, parse_mode_edits
+from .modes.response_delay import find_delay
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
 from .quality.unexplained_peaks import UnexplainedPeak, find_unexplained_peaks
@@ -48,6 +49,7 @@ __all__ = [
     "decay_spectra",
     "edit_modes",
     "extract_modes",
+    "find_delay",
     "find_hit_changes",
     "find_peaks_above_band",
     "find_truncated_peaks",

@@ -40,10 +40,8 @@ def find_uncovered_peaks(
 ) -> tuple[tuple[UnexplainedPeak, ...], list[Remark]]:
     """Find the measured peaks in [mode] band_hz that the modes used for lobes do not explain.
 
-        A remark names each peak that they do not even explain within their errors.
-
-    Peaks outside the band were left out on purpose: a remark names them, and no
-        verdict depends on them. Without an FRF (no force) nothing is compared.
+    A remark names each peak that they do not even explain within their errors. Peaks outside the band were left out on
+    purpose: a remark names them, and no verdict depends on them. Without an FRF (no force) nothing is compared.
     """
     peaks = () if frf is None else modal.find_unexplained_peaks(frf, used)
     low, high = machine.mode.band_hz or (0.0, np.inf)

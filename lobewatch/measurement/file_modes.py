@@ -16,7 +16,8 @@ from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from lobewatch.measurement.hit_remarks import find_hit_remarks
-from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.recording_questions import check_quantity
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.step_times import time_step
 from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
@@ -61,6 +62,7 @@ def read_file_frf(
         phase = "" if conjugate else _check_phase(path, description)
         missing = missing_window_text(recording.window, window)
         raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
+    recording.require_measurable()
     if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
@@ -245,11 +247,11 @@ def fit_file_modes(
         frf = acquisition.correct_windowed_receptance(frf, tau)
     edits = by_hand if tau is None else by_hand.with_window(tau)
 
-    def fit(bare: Frf) -> FrfFit:
+    def fit(bare: Frf, of: Sequence[Hit]) -> FrfFit:
         state = modal.edit_modes(modal.extract_modes([bare], band), edits)
-        return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), mode_edits_remarks(by_hand))
+        return FrfFit(state, tuple(modal.modes_from_extraction(state, [of])), mode_edits_remarks(by_hand))
 
-    extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
+    frf, hits, (extraction, modes, fit_remarks) = fit_on_time(frf, hits, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
     frf = acquisition.remove_sensor_mass(frf, mass)
     if window is not None:
@@ -323,7 +325,9 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     list of Remark
         Remarks on wrong signs and on a common delay.
     """
-    remarks = []
+    remarks: list[Remark] = []
+    if check_quantity(modes) is not None:
+        return remarks
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
         text = "stiffness K is negative for all modes, because hammer or sensor is mounted or wired in reverse"
         remarks.append(Remark("sign-swapped", "", text, "Reverse the sensor, or change the sign of its sensitivity"))

@@ -4,21 +4,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 import modal
-from acquisition import CROSS_TAP, Frf, Remark, TapTest
+from acquisition import CROSS_TAP, Frf, Hit, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_remarks import find_hit_remarks
-from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
 
@@ -121,18 +121,19 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
                 said = (*edited, *decay_remarks(machine.tap.sensor), *changes)
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
-            fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
-            windows = hidden_window_remarks(tap.accepted, fitted.modes)
-            said = (*remarks, *fitted.remarks, *windows, *changes)
-            return TapFit(*named, fitted.modes, said, frf=fitted.extraction.frf)
+            fit = partial(_fit_frf, by_hand=by_hand)
+            *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
+            further = (*fitted.remarks, *hidden_window_remarks(tap.accepted, fitted.modes), *changes)
+            asked = (questions.check_quantity(fitted.modes),)
+            return TapFit(*named, fitted.modes, (*remarks, *further, *filter(None, asked)), frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
 
 
-def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
+def _fit_frf(frf: Frf, hits: Sequence[Hit], by_hand: ModeEdits) -> FrfFit:
     state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
-    return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
+    return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), remarks)
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:

@@ -186,6 +186,15 @@ def interpret_content(
     return InterpretedFile(tap, replace(recording, path=file), fit_tap(round_as_stored(tap), context.machine))
 
 
+def check_files(folder: MachineFolder, files: Sequence[Path], description: Description) -> Iterator[datetime | str]:
+    """Read each file as a tap test without a fit. Yield its date, or the reason why it cannot be used."""
+    return work_on_files(folder, files, description, Workers(), _read_date, lambda *_: True)
+
+
+def _read_date(context: MachineContext, file: Path, description: Description, content: bytes, at: Path) -> datetime:
+    return read_tap_test(context, file, description, content, at)[0].circumstances.created
+
+
 def prepare_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:
     """Write a recorded file as a tap file with a temporary name. DataError, OSError or ValueError if it is unusable."""
     return _write_draft(

@@ -13,6 +13,7 @@ from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
 from lobewatch.machine.settings.setting_questions import hash_programs
+from lobewatch.measurement.software import ANALYSIS_REVISION
 from lobewatch.tool.tap_series import TapPlace
 
 MAX_OBSOLETE_BYTES = 1_000_000
@@ -141,4 +142,4 @@ def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]
 
 
 def _cache_header(history: History) -> bytes:
-    return f"{history.settings_hash} {history.software}".encode()
+    return f"{history.settings_hash}/{ANALYSIS_REVISION} {history.software}".encode()

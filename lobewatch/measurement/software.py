@@ -4,6 +4,9 @@ import platform
 from importlib.metadata import version
 from typing import NamedTuple
 
+ANALYSIS_REVISION = 2
+"""Number that rises when results of the same tap tests change within a version: stored rows are computed again."""
+
 
 class SoftwareVersions(NamedTuple):
     """Versions of this program and of its numerical libraries."""

@@ -1,10 +1,11 @@
 """Measure one tap test: modes, followed mode, bearing stiffness and modes at the tool tip."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -14,13 +15,13 @@ from acquisition import CROSS_TAP, Frf, Hit, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
-from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
+from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
-from modal import CredibleModes, Extraction, Mode, ModeEdits
+from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
@@ -68,9 +69,11 @@ class Measurement(TapFit):
     calibration: Calibration | None = None
     """Model calibrated to the followed mode; None if impossible or implausible."""
     at_tip: Sequence[Mode] = ()
-    """Modes at the tool tip for lobes; empty without any."""
+    """Modes at the tool tip for lobes, with one for each unexplained peak; empty without any."""
     cross: Sequence[Mode] | None = None
     """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
+    unexplained: tuple[UnexplainedPeak, ...] = ()
+    """Measured peaks that the modes do not explain."""
 
 
 @cache
@@ -162,22 +165,13 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         followed = _follow_mode(trusted, modes, machine, remarks, last)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
-        remarks += _coverage_remarks(fit, trusted, machine)
-    results = {"followed": followed, "calibration": calibration, "at_tip": at_tip, "remarks": tuple(remarks)}
+        is_at_tip = machine.tap.position_mm == 0
+        used = trusted.modes if is_at_tip or followed is None else (followed,)
+        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
+        at_tip += [peak.missing for peak in unexplained if is_at_tip]
+    results: dict[str, Any] = {"followed": followed, "calibration": calibration, "at_tip": at_tip}
+    results |= {"unexplained": unexplained, "remarks": (*remarks, *about_peaks)}
     return Measurement(**vars(fit) | results)
-
-
-def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
-    """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
-    if fit.frf is None or (questions.check_quantity(fit.modes) is not None and not trusted.modes):
-        return
-    low, high = machine.mode.band_hz or (0.0, np.inf)
-    for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):
-        if low <= peak.frequency <= high:
-            explained = f"the modes explain {1e6 * peak.explained:.2g} um/N"
-            text = f"peak not explained, real part of the FRF {1e6 * peak.measured:.2g} um/N, {explained}"
-            cure = "Warm up the spindle, check the clamping, and tap again"
-            yield Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", text, cure)
 
 
 def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
@@ -193,7 +187,9 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
         remarks.append(Remark("cross-beside-tip", "", text, "Repeat the cross tap at the tool tip"))
     knows_size = all(mode.has_stiffness for mode in cross)
     at_tip = cross if knows_size and not machine.tap.position_mm else None
-    results = {"followed": followed, "cross": at_tip, "remarks": (*remarks, *trusted.remarks)}
+    unexplained, _ = find_uncovered_peaks(fit.frf, cross, machine)
+    results: dict[str, Any] = {"followed": followed, "cross": at_tip, "unexplained": unexplained}
+    results["remarks"] = (*remarks, *trusted.remarks)
     return Measurement(**vars(fit) | results)
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from itertools import chain
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from lobewatch.tool import principal_directions as principal
 from lobewatch.tool.principal_directions import PrincipalDirections, TipModes
 from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, interpolate_frequency
 from modal import Mode
+from modal.quality.unexplained_peaks import MIN_LIMITING_SHARE
 
 MAX_CROSS_FREQUENCY_DISTANCE = 0.01
 """Relative distance of a cross mode from all modes of x and y that proves another clamping; chosen."""
@@ -35,16 +37,16 @@ MIN_CROSS_PEAK_RATIO = 0.3
 """Peak of a checked cross mode over the largest peak."""
 
 
-def _check_cross_tap(x: TipModes, y: TipModes, cross: TipModes) -> tuple[TipModes, tuple[Remark, ...]]:
-    """Return the cross FRF modes if they fit those of x and y; else None with a remark.
+def _check_cross_tap(x: TipModes, y: TipModes, tap: Measurement | None) -> tuple[TipModes, tuple[Remark, ...]]:
+    """Return the cross FRF modes if they fit those of x and y and cover the cross FRF; else None with a remark.
 
     None without a remark if one of the three is missing.
     """
-    if not x or not y or cross is None:
+    if not x or not y or tap is None or tap.cross is None:
         return None, ()
-    problem = next(_find_cross_tap_problems(x, y, cross), None)
+    problem = next(chain(_find_cross_tap_problems(x, y, tap.cross), _find_missing_cross_peaks((*x, *y), tap)), None)
     if problem is None:
-        return cross, ()
+        return tap.cross, ()
     cure = "Tap x, y and xy again without reclamping the tool"
     return None, (Remark("cross-other-clamping", "", f"cross tap not used, because {problem}", cure),)
 
@@ -63,6 +65,15 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
             yield f"its mode at {at:.0f} Hz is {100 * apart:.1f} % off the nearest mode of x and y (another clamping?)"
         if share > MAX_CROSS_RESIDUE_RATIO:
             yield f"its mode at {at:.0f} Hz is {share:.1f} times larger than possible (other sensors or clamping?)"
+
+
+def _find_missing_cross_peaks(modes: Sequence[Mode], tap: Measurement) -> Iterator[str]:
+    """Yield the reasons why the modes of a cross tap do not cover it; peaks far below those of x and y do not count."""
+    deepest = min(-1 / (4 * mode.stiffness * mode.damping_ratio * (1 + mode.damping_ratio)) for mode in modes)
+    yield from (f"{remark.about} {remark.text}".strip() for remark in tap.uncovered)
+    for peak in tap.unexplained:
+        if peak.measured < MIN_LIMITING_SHARE * deepest and not peak.is_within_errors:
+            yield f"its modes do not explain its peak at {peak.frequency:.0f} Hz"
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
@@ -174,14 +185,13 @@ def assemble(
     direction are shifted by the change of the newest one since.
     """
     taps = [newest, *([across] if across is not None else [])]
-    all_taps = [*taps, *([cross] if cross is not None else [])]
     modes: dict[str, TipModes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
     points = series.get(newest.direction, ())
     then = None if across is None else interpolate_frequency(points, across.time)
     moved = None if then is None else points[-1].frequency / then
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
-    signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
+    signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), cross)
     calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
     direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
     followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
@@ -196,7 +206,7 @@ def assemble(
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
         questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
-        uncovered=tuple(label_direction(own, tap.direction) for tap in all_taps for own in tap.uncovered),
+        uncovered=tuple(label_direction(own, tap.direction) for tap in taps for own in tap.uncovered),
     )
 
 

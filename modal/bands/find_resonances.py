@@ -66,14 +66,15 @@ class Resonance:
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 
 
-def find_resonances(frf: Frf, least_share: float = 0.0) -> list[Resonance]:
+def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = False) -> list[Resonance]:
     """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
     The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
     r - 1/r = -+ 2 zeta. Peaks are searched line by line and then in ever longer running means of the complex
     mobility, which reveals a wide mode that noise hides from single lines. Two modes with no dip between
     them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
-    mobility are ignored, which saves time.
+    mobility are ignored, which saves time. is_checked: the modes were fitted before, so that a rising phase is that of
+    a disturbance.
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
     ConjugateError.
@@ -95,7 +96,8 @@ def find_resonances(frf: Frf, least_share: float = 0.0) -> list[Resonance]:
             "the FRF is real on every line, so the phase is missing. "
             "Export real and imaginary part, or magnitude and phase."
         )
-    _check_phase(frf, peaks)
+    if not is_checked:
+        _check_phase(frf, peaks)
     turning = (peak for peak in peaks if peak.turn < -MIN_PHASE_TURN or peak.turn > MAX_PHASE_TURN)
     return sorted(turning, key=lambda r: r.frequency)
 

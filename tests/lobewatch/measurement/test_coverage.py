@@ -1,0 +1,127 @@
+"""Tap tests whose modes do not cover the measured FRF, and what follows for verdicts and recommendations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from acquisition import Circumstances, Frf, Remark, TapDirection, TapTest
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.measurement import Measurement, measure
+from lobewatch.measurement.coverage import UNCOVERED_CODES, find_uncovered
+from lobewatch.tool.assembly import Assembly, assemble
+from lobewatch.verdicts import Stability, advise
+from lobewatch.verdicts.program_case import NO_TEST_CUTS
+from lobewatch.verdicts.recommendation import find_stable_pockets, recommend
+from lobewatch.verdicts.verdict import evaluate_program
+from modal import Mode, ModeEdits, synthesize_frf
+
+LINES = np.arange(1.0, 4000.0, 1.0)
+STRONG, OTHER = Mode(900.0, 0.02, 2e7), Mode(1700.0, 0.03, 4e7)
+DROP = ModeEdits(drop=(900.0,))
+SETTINGS = '[machine]\nname = "m"\n[speed]\nlow_rpm = 3000\nhigh_rpm = 12000\n'
+PROGRAM = ProgramTable(
+    name="slot",
+    tool="T",
+    teeth=2,
+    radial_depth_mm=20.0,
+    tool_diameter_mm=20.0,
+    direction="down",
+    tangential_n_per_mm2=1000.0,
+    radial_n_per_mm2=300.0,
+    helix_deg=30.0,
+    speed_rpm=6000.0,
+    depth_mm=0.05,
+)
+
+
+def machine(*settings: str) -> Machine:
+    return parse_machine_file(SETTINGS + "\n".join(settings))
+
+
+def tapped(direction: TapDirection = "x", edits: ModeEdits | None = None, on: Machine | None = None) -> Measurement:
+    """Return the measurement of an FRF of both modes, with or without the stronger one."""
+    about = Circumstances("m", datetime(2026, 1, 15, tzinfo=UTC), "T", direction)
+    frf = Frf(LINES, synthesize_frf([STRONG, OTHER], LINES).receptance)
+    return measure(TapTest(direction, about, frf), on or machine(), None, edits or ModeEdits())
+
+
+def assembled(edits: ModeEdits | None = None) -> Assembly:
+    return assemble(tapped("y"), tapped("x", edits), {})
+
+
+def test_a_dropped_mode_leaves_a_remark_and_a_mode_for_lobes_with_its_real_part() -> None:
+    whole, part = tapped(), tapped(edits=DROP)
+    assert whole.uncovered == ()
+    (remark,) = part.uncovered
+    assert (remark.code, remark.about) == ("peak-not-explained", "900 Hz")
+    assert [round(mode.frequency) for mode in part.modes] == [1700]
+    least = [min(synthesize_frf(fit.at_tip, LINES).receptance.real) for fit in (whole, part)]
+    assert least[1] == pytest.approx(least[0], rel=0.03)
+
+
+def test_peaks_outside_the_band_are_said_and_left_out() -> None:
+    found = tapped(on=machine("[mode]", "band_hz = [1200, 2200]"))
+    assert found.uncovered == ()
+    assert [remark.about for remark in found.remarks if remark.code == "peak-outside-band"] == ["900 Hz"]
+    assert [round(mode.frequency) for mode in found.at_tip] == [1700]
+
+
+def test_verdicts_and_recommendations_rest_on_both_directions() -> None:
+    covered, open_tool = assembled(), assembled(DROP)
+    assert [evaluate_program(PROGRAM, tool, machine()).stability for tool in (covered, open_tool)] == [
+        Stability.STABLE,
+        Stability.DOUBTFUL,
+    ]
+    verdict = evaluate_program(PROGRAM, open_tool, machine())
+    assert verdict.decisive_cause == "coverage"
+    assert [(remark.code, remark.about) for remark in verdict.remarks if remark.code in UNCOVERED_CODES] == [
+        ("peak-not-explained", "900 Hz in x")
+    ]
+    assert advise(verdict, machine()).best is None
+    assert find_stable_pockets(PROGRAM, covered, machine())
+    assert find_stable_pockets(PROGRAM, open_tool, machine()) == []
+    answer = recommend(PROGRAM, open_tool, machine(), NO_TEST_CUTS)
+    assert (answer.setting, answer.remedies) == (None, (open_tool.uncovered[0].cure,))
+
+
+def test_the_limit_is_that_of_the_measured_frf() -> None:
+    limits = [evaluate_program(PROGRAM, tool, machine()).limit for tool in (assembled(), assembled(DROP))]
+    assert limits[1] == pytest.approx(limits[0], rel=0.1)
+
+
+@pytest.mark.parametrize("code", UNCOVERED_CODES)
+def test_any_reason_keeps_a_program_doubtful(code: str) -> None:
+    remark = Remark(code, "", "a finding", "Do something")
+    x = replace(tapped("x"), remarks=(remark,))
+    tool = assemble(tapped("y"), x, {})
+    assert find_uncovered(tool.uncovered) == tool.uncovered != ()
+    assert evaluate_program(PROGRAM, tool, machine()).stability is Stability.DOUBTFUL
+
+
+@pytest.mark.parametrize(
+    ("break_it", "is_used"),
+    [
+        (lambda tap: tap, True),
+        (lambda tap: replace(tap, unexplained=tapped(edits=DROP).unexplained), False),
+        (lambda tap: replace(tap, unexplained=weak(tapped(edits=DROP))), True),
+        (lambda tap: replace(tap, remarks=(Remark(UNCOVERED_CODES[0], "", "a finding"),)), False),
+    ],
+)
+def test_a_cross_tap_is_used_if_its_modes_cover_it_up_to_what_hardly_counts(
+    break_it: Callable[[Measurement], Measurement], is_used: bool
+) -> None:
+    half = [replace(mode, stiffness=2 * mode.stiffness) for mode in (STRONG, OTHER)]
+    cross = break_it(replace(tapped("xy"), cross=half))
+    tool = assemble(tapped("y"), tapped("x"), {}, cross)
+    assert (tool.cross is not None) is is_used
+    assert tool.uncovered == ()
+
+
+def weak(tap: Measurement) -> tuple[object, ...]:
+    return tuple(peak._replace(measured=peak.measured / 100) for peak in tap.unexplained)

@@ -300,14 +300,15 @@ def _read_source(file: h5py.File) -> SourceFile | None:
 
 
 _NON_SIGNAL_FLAGS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_EVALUATED
+_NON_SIGNAL_FLAGS |= HitFlags.SURPLUS
 """Faults that the time signals of a hit do not show."""
 
 
 def read_tap_recording(path: Path) -> list[Hit] | Frf:
     """Read the hits of a tap file without those that were rejected for other reasons than their time signals.
 
-    Such hits were undone, hit another spot, had too narrow a force band, or were not evaluated. Without hits the FRF is
-    read.
+    Such hits were undone, hit another spot, had too narrow a force band, were not evaluated, or were not needed.
+    Without hits the FRF is read.
     """
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _NON_SIGNAL_FLAGS]

@@ -102,8 +102,11 @@ def _get_software_name() -> str:
 
 
 def round_as_stored(tap: TapTest) -> TapTest:
-    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32."""
-    if not tap.hits or tap.frf is None or tap.frf.coherence is None:
+    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32.
+
+    After decisions the FRF is not that of the file.
+    """
+    if not tap.hits or tap.decisions or tap.frf is None or tap.frf.coherence is None:
         return tap
     return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 

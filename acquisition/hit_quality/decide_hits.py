@@ -5,6 +5,8 @@ from dataclasses import replace
 
 from acquisition.errors import join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
+from acquisition.frf import Frf
+from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
 from acquisition.tap_test import HitDecision, TapTest, decide_flags
 
@@ -102,11 +104,16 @@ def decide_hits(tap: TapTest, decisions: Sequence[HitDecision]) -> TapTest:
     """
     if decisions == tap.decisions:
         return tap
-    decided = replace(tap, decisions=tuple(decisions))
-    used = decided.accepted
+    frf, _ = average_decided_hits(tap.hits, decide_flags(tap.flags, decisions))
+    return replace(tap, frf=frf, decisions=tuple(decisions))
+
+
+def average_decided_hits(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> tuple[Frf | None, tuple[Hit, ...]]:
+    """Return the FRF of the hits without a flag, None without force, and these hits; ValueError if none remains."""
+    used = tuple(hit for hit, found in zip(hits, flags, strict=True) if not found)
     if not used:
-        raise ValueError(f"no hit of {len(tap.hits)} remains. Keep one, or exclude the tap test with exclude_entry.")
-    return replace(decided, frf=estimate_frf(used) if used[0].has_force else None)
+        raise ValueError(f"none of {len(hits)} hits remains. Keep one, or leave out the file or tap test.")
+    return estimate_frf(used) if used[0].has_force else None, used
 
 
 def add_decisions(
@@ -147,7 +154,7 @@ def add_decisions(
             raise ValueError(f"hit {decision.hit} does not exist, because {has}. Give the number of a hit.")
         now = current[decision.hit - 1]
         if decision.decision == "accept":
-            _check_acceptance(decision, now | faults[decision.hit - 1])
+            _check_acceptance(decision, faults[decision.hit - 1], now)
         elif decision.decision == "reject" and now:
             raise ValueError(f"hit {decision.hit} is already rejected ({now.words}). Leave out this hit.")
         elif decision.decision == "undo" and decision.hit not in [past.hit for past in earlier]:
@@ -155,15 +162,17 @@ def add_decisions(
     return merge_decisions([*earlier, *new])
 
 
-def _check_acceptance(decision: HitDecision, faults: HitFlags) -> None:
-    """Raise ValueError if accepting these codes of a hit with these faults is impossible, or does not make it good."""
+def _check_acceptance(decision: HitDecision, faults: HitFlags, now: HitFlags) -> None:
+    """Raise ValueError if accepting these codes of a hit with these faults does not make it good; now: flags so far."""
     hit, codes = decision.hit, decision.codes
+    if now and not faults:
+        raise ValueError(f"hit {hit} was rejected by hand. Withdraw that decision with decide_hits.undo {hit}.")
     if unusable := faults & UNUSABLE_HIT_FLAGS:
         finding = f"hit {hit} cannot be accepted, because it has no usable force or response ({unusable.words})"
         raise ValueError(join_sentences(finding, "Leave out this hit"))
     if absent := [code for code in codes if code not in faults.codes]:
         has = f"has {' and '.join(faults.codes)}, not {absent[0]}" if faults else f"is good and has no {absent[0]}"
         raise ValueError(f"hit {hit} {has}. Give only codes of the hit.")
-    if left := HitFlags(faults & ~HitFlags.from_codes(codes)).codes:
+    if left := (faults & ~HitFlags.from_codes(codes)).codes:
         also = " ".join(f"decide_hits.accept {hit}:{code}" for code in left)
         raise ValueError(f"hit {hit} also has {' and '.join(left)}. Accept each fault: add {also}.")

@@ -49,6 +49,9 @@ def modes(
             help="Another measurement (file, response number or tap test) to confirm modes. Give two or more --beside."
         ),
     ] = None,
+    accept_hit: shared.AcceptedHits = None,
+    reject_hit: shared.RejectedHits = None,
+    undo_hit: Annotated[list[int] | None, Option(help="Withdraw the decision on this hit of TAP, repeatable.")] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
@@ -59,7 +62,7 @@ def modes(
     """Fit the modes of a recorded file or a stored tap test.
 
     The least-squares fit gives standard errors. Peak picking after Gaber & Hashemi (2015) is shown for comparison. With
-    TAP, --add, --drop and --fix are stored, and all results of the machine are updated.
+    TAP, --add, --drop, --fix and decisions on hits are stored, and all results of the machine are updated.
 
     Examples
     --------
@@ -71,7 +74,9 @@ def modes(
       lobewatch modes point1.uff --beside point2.uff --beside point3.uff
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
+      lobewatch modes mill-3 20261102T0914 --accept-hit 3:double-hit --reject-hit 5
     """
+    from acquisition import parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import read_tap_modes
     from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -83,19 +88,21 @@ def modes(
     if beside is not None and len(beside) == 1:
         raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
+    decisions = parse_hit_decisions(accept_hit or (), reject_hit or (), undo_hit or ())
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
         shared.reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
-        with nullcontext() if choice is None else publish_on_change(logbook):
-            file_modes = read_tap_modes(logbook, tap, choice)
-    elif by_fit or file.is_dir():
-        text = "--by-fit needs a stored tap test" if by_fit else f"{file} is a folder"
+        with nullcontext() if choice is None and not decisions else publish_on_change(logbook):
+            file_modes = read_tap_modes(logbook, tap, choice, decisions)
+    elif by_fit or undo_hit or file.is_dir():
+        option = "--by-fit needs" if by_fit else "--undo-hit needs" if undo_hit else ""
+        text = f"{option} a stored tap test" if option else f"{file} is a folder"
         raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
     else:
-        said = file_options.description(averages=averages, without_force=hammer == "none")
+        said = file_options.description(averages=averages, without_force=hammer == "none", hit_decisions=decisions)
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor

@@ -30,6 +30,8 @@ def replay(
         list[str] | None,
         Option(help="Accept this warning code (repeatable)."),
     ] = None,
+    accept_hit: shared.AcceptedHits = None,
+    reject_hit: shared.RejectedHits = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
@@ -51,8 +53,9 @@ def replay(
       lobewatch replay mill-3 2024 --dry-run --unit g/N --date-pattern "%Y%m%d"
       lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
+      lobewatch replay mill-3 hits.uff --accept-hit 3:double-hit --reject-hit 5
     """
-    from acquisition import Conditions, DataError
+    from acquisition import Conditions, DataError, parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import store_edits
     from lobewatch.logbook.recordings.recorded_files import find_recordings
@@ -66,9 +69,12 @@ def replay(
 
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     known = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
-    description = file_options.description(**known, conditions=conditions)
+    decisions = parse_hit_decisions(accept_hit or (), reject_hit or ())
+    description = file_options.description(**known, conditions=conditions, hit_decisions=decisions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
+    if decisions and len(recordings) > 1:
+        raise ValueError(f"decisions on hits need one file, not {len(recordings)}. Replay the files one by one.")
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -80,6 +86,8 @@ def replay(
     with publish_on_change(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
+        for tap_id in outcome.already_stored.values():
+            logbook.decide_hits(tap_id, decisions)
         not_chosen = store_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]

@@ -8,13 +8,17 @@ import numpy as np
 
 import acquisition
 import modal
-from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
+from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark, decide_flags
 from acquisition.errors import join_sentences
+from acquisition.files.read_recording import detect_format
+from acquisition.files.tap_file import TAP_FORMAT
+from acquisition.hit_quality.decide_hits import average_decided_hits
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
+from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.step_times import time_step
@@ -41,6 +45,10 @@ class FileFrf:
     """Facts of the file with their origins."""
     recorded_window: float | None = None
     """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
+    faults: tuple[HitFlags, ...] = ()
+    """Faults of all hits of the file."""
+    decisions: tuple[HitDecision, ...] = ()
+    """Decisions of a person on these hits."""
 
 
 @time_step("reading")
@@ -81,24 +89,43 @@ def _check_phase(path: Path, description: Description) -> str:
 
 
 def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
-    verdicts = [acquisition.check_hit(hit) for hit in hits]
-    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
-    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
+    faults = tuple(map(acquisition.check_hit, hits))
+    if description.hit_decisions:
+        return _average_decided_hits(path, hits, faults, accepted, description.hit_decisions)
+    good = tuple(hit for hit, verdict in zip(hits, faults, strict=True) if not verdict & ~accepted)
+    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in faults)
     if refused:
         text = f"average includes {refused} of {len(hits)} hits that failed the checks"
         frf = acquisition.estimate_frf(good) if good[0].has_force else None
-        return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
+        return FileFrf(frf, good, remarks=(Remark("hits-accepted", "", text),), faults=faults)
     if good and not good[0].has_force:
-        return FileFrf(None, tuple(good))
+        return FileFrf(None, good, faults=faults)
     try:
-        return FileFrf(acquisition.read_frf(path, description), tuple(good))
+        return FileFrf(acquisition.read_frf(path, description), good, faults=faults)
     except DataError:
-        ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
+        ringing = [hit for hit, verdict in zip(hits, faults, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing or not hits[0].has_force:
             raise
         frf, windowed, tau = window_ringing_hits(ringing)
         cure = "Record longer, or use the hits without a window with fit_file_modes.accept not-decayed"
-        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),))
+        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),), faults=faults)
+
+
+def _average_decided_hits(
+    path: Path,
+    hits: Sequence[Hit],
+    faults: tuple[HitFlags, ...],
+    accepted: HitFlags,
+    decisions: tuple[HitDecision, ...],
+) -> FileFrf:
+    """Average the hits that remain after decisions, of a tap file by its own verdicts on all its hits."""
+    if detect_format(path) is TAP_FORMAT:
+        tap = acquisition.read_tap(path)
+        hits, faults = tap.hits, tap.flags
+    decisions = acquisition.add_decisions([found & ~accepted for found in faults], (), decisions)
+    flags = decide_flags([found & ~accepted for found in faults], decisions)
+    frf, used = average_decided_hits(hits, flags)
+    return FileFrf(frf, used, remarks=(*find_hit_remarks(faults, decisions),), faults=faults, decisions=decisions)
 
 
 def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
@@ -160,6 +187,10 @@ class FileModes:
     """Facts of the file with their origins."""
     by_hand: ModeEdits = NO_MODE_EDITS
     """Mode edits."""
+    hits: tuple[HitFlags, ...] = ()
+    """Faults of each hit of the file; empty if it contains only an FRF."""
+    hit_decisions: tuple[HitDecision, ...] = ()
+    """Decisions of a person on these hits."""
 
 
 def fit_file_modes(
@@ -257,7 +288,8 @@ def fit_file_modes(
         windowed += ringing
     remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
     picked = tuple(modal.pick_peaks(frf, band))
-    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand)
+    of_hits = file_frf.faults, file_frf.decisions
+    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, *of_hits)
 
 
 def _fit_decay_modes(
@@ -270,7 +302,8 @@ def _fit_decay_modes(
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks)
-    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
+    of_hits = decays.faults, decays.decisions
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:

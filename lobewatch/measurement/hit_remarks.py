@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from acquisition import HitDecision, HitFlags, Remark
+from acquisition import HitDecision, HitFlags, Remark, decide_flags
 
 HIT_DECISIONS_CODE = "hits-by-hand"
 """Code of the remark on decisions on hits; it is about all of them."""
@@ -12,6 +12,13 @@ OVERLOAD_FLAGS = HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 def format_decisions(decisions: Sequence[HitDecision]) -> str:
     """Return decisions on hits in words; empty without any."""
     return ", ".join(map(str, decisions))
+
+
+def format_unused_hits(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> str:
+    """Return how many hits are averaged, and each other hit with its flags; empty if all are."""
+    flags = decide_flags(faults, decisions)
+    unused = [f"hit {number} ({found.words})" for number, found in enumerate(flags, 1) if found]
+    return f"{flags.count(HitFlags.OK)} of {len(flags)} hits averaged, without {', '.join(unused)}" if unused else ""
 
 
 def find_hit_remarks(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> list[Remark]:

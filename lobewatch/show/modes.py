@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 
 from rich.table import Table
 
-from acquisition import Fact, Remark, merge_remarks
+from acquisition import Fact, HitDecision, HitFlags, Remark, decide_flags, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
+from lobewatch.measurement.hit_remarks import format_unused_hits
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
@@ -150,6 +151,15 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
     return table
 
 
+def hits_json(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> list[JsonObject]:
+    """Return each hit with its number, its verdict and codes, and whether it is averaged."""
+    listed = zip(faults, decide_flags(faults, decisions), strict=True)
+    return [
+        {"number": number, "verdict": found.words, "codes": found.codes, "used": not flags}
+        for number, (found, flags) in enumerate(listed, 1)
+    ]
+
+
 def file_modes_json(file_modes: FileModes) -> JsonObject:
     """Return the modes of one file, fitted and by peak picking."""
     frf = file_modes.frf
@@ -158,6 +168,8 @@ def file_modes_json(file_modes: FileModes) -> JsonObject:
         "n_averages": frf and frf.n_averages,
         "usable_band_hz": frf and frf.usable_band,
         "facts": file_modes.facts,
+        "hits": hits_json(file_modes.hits, file_modes.hit_decisions),
+        "hit_decisions": file_modes.hit_decisions,
         "by_hand": file_modes.by_hand,
         "modes": list(map(mode_json, file_modes.fitted)),
         "peak_picking": list(map(mode_json, file_modes.picked)),
@@ -173,6 +185,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
     texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
+        *filter(None, [format_unused_hits(file_modes.hits, file_modes.hit_decisions)]),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),
         *trust_reasons(shown),

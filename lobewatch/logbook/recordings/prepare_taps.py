@@ -18,6 +18,7 @@ from acquisition.file_io import make_folder
 from acquisition.files.tap_file import encode_tap, round_as_stored
 from lobewatch.logbook.recordings.recorded_files import MachineContext, parse_context, read_tap_bytes, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.measurement.hit_remarks import format_unused_hits
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 
@@ -52,6 +53,8 @@ class TapDraft(NamedTuple):
     """Fitted modes."""
     assumed_facts: tuple[str, ...]
     """Defaults assumed for facts that the file does not state."""
+    unused_hits: str = ""
+    """Hits that are not averaged, in words. Empty if all are."""
 
 
 class FileRequest(NamedTuple):
@@ -80,14 +83,15 @@ class FileRequest(NamedTuple):
 
 def is_valid_draft(request: FileRequest, answer: Any) -> bool:
     """Check a draft from a worker against its own tap file."""
-    tap = read_tap_bytes(answer.content)
+    tap = replace(read_tap_bytes(answer.content), decisions=answer.entry.hit_decisions)
     return (
         isinstance(answer, TapDraft)
         and answer.digest == hashlib.sha256(request.content).hexdigest() == answer.entry.source_sha256
+        and tap.decisions == request.description.hit_decisions
         and answer.entry == TapEntry.of(tap, answer.content)
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
-        and all(isinstance(fact, str) for fact in answer.assumed_facts)
+        and all(isinstance(text, str) for text in (*answer.assumed_facts, answer.unused_hits))
     )
 
 
@@ -152,7 +156,8 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     tap, recording, fit = interpret_content(context, file, description, content, at)
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
-    return TapDraft(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, defaults)
+    unused = format_unused_hits(tap.flags, tap.decisions)
+    return TapDraft(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, defaults, unused)
 
 
 def interpret_content(

@@ -11,7 +11,17 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 import acquisition
-from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest, inspect_file
+from acquisition import (
+    Circumstances,
+    DataError,
+    Description,
+    Fact,
+    HitDecision,
+    Recording,
+    SourceFile,
+    TapTest,
+    inspect_file,
+)
 from acquisition.errors import join_sentences
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
@@ -128,7 +138,7 @@ def read_tap_test(
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
     source = SourceFile(file.name, content)
     source = source.without_content if has_all_hits(at, recording.hits) else source
-    return _build_tap_test(recording, about, source), recording
+    return _build_tap_test(recording, about, source, description.hit_decisions), recording
 
 
 def _reject_windowed(recording: Recording) -> None:
@@ -184,14 +194,20 @@ def _find_origin(name: str, description: Description, recording: Recording) -> O
     return "option" if getattr(description, name) else "file" if getattr(recording, name) else "default"
 
 
-def _build_tap_test(recording: Recording, about: Circumstances, source: SourceFile) -> TapTest:
-    if recording.frf is not None:
-        return TapTest(acquisition.new_tap_id(about), about, recording.frf, source=source)
+def _build_tap_test(
+    recording: Recording, about: Circumstances, source: SourceFile, decisions: Sequence[HitDecision]
+) -> TapTest:
+    tap = TapTest(acquisition.new_tap_id(about), about, recording.frf, recording.hits, source=source)
     try:
+        if decisions:
+            tap = replace(tap, flags=tuple(map(acquisition.check_hit, recording.hits)))
+            return acquisition.decide_hits(tap, acquisition.add_decisions(tap.flags, (), decisions))
+        if recording.frf is not None:
+            return tap
         frf, flags = acquisition.average_good_hits(recording.hits)
-    except DataError as error:
+    except ValueError as error:
         raise DataError(f"{recording.path}: {error}") from error
-    return TapTest(acquisition.new_tap_id(about), about, frf, recording.hits, flags, source)
+    return replace(tap, frf=frf, flags=flags)
 
 
 def parse_date_in_name(file: Path, pattern: str) -> datetime:

@@ -55,6 +55,8 @@ class ReplayOutcome:
     """Defaults assumed for facts that files do not state, each once."""
     fits: Mapping[str, TapFit] = field(default_factory=dict)
     """Fitted modes of the new tap tests, by identity."""
+    unused_hits: Mapping[Path, str] = field(default_factory=dict)
+    """Hits that are not averaged, in words, for each new file with such hits."""
 
 
 class ReplayPlan(NamedTuple):
@@ -150,7 +152,8 @@ def store_recordings(
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
     tap_ids = [used[file] for file in files if file in used]
-    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits)
+    unused_hits = {new[tap.digest]: tap.unused_hits for tap in ready if tap.unused_hits}
+    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, unused_hits)
 
 
 def _prepare_files(

@@ -6,6 +6,8 @@ from acquisition import HitDecision, HitFlags, Remark, decide_flags
 
 HIT_DECISIONS_CODE = "hits-by-hand"
 """Code of the remark on decisions on hits; it is about all of them."""
+HIT_DECISION_CODES = (HIT_DECISIONS_CODE, "hits-overloaded")
+"""Codes of the remarks that follow from decisions on hits."""
 OVERLOAD_FLAGS = HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 
 

@@ -16,7 +16,7 @@ from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
 from lobewatch.logbook.replay_preview import ReplayPreview
-from lobewatch.measurement.hit_remarks import format_unused_hits
+from lobewatch.measurement.hit_remarks import format_decisions, format_unused_hits
 from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, hits_json, mode_json, sort_modes
@@ -186,9 +186,11 @@ def emit_replay(
 ) -> None:
     """Print the outcome of a replay; passed: other files of the folders; codes: of questions answered."""
     known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
+    decided = {tap_id: logbook.files.by_id[tap_id].hit_decisions for tap_id in outcome.tap_ids}
     if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
         known = [f"{len(known)} of {n_files} files are stored already"]
     known += [f"{file.name}: {text}" for file, text in outcome.unused_hits.items()]
+    known += [f"hits by hand: {format_decisions(decisions)}" for decisions in decided.values() if decisions]
     known += [f"ignored: {len(passed)} other files, such as {passed[0].name}"] if passed else []
     for line in known:
         notes.print(line, markup=False)

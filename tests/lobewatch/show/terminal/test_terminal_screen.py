@@ -37,6 +37,10 @@ class Session:
         self.asked.append("undo")
         self.called.set()
 
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        self.asked.append(f"{'accept' if accept else 'reject'} {number}")
+        self.called.set()
+
     def stop(self) -> None:
         self.asked.append("stop")
         self.called.set()

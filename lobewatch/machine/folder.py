@@ -16,7 +16,7 @@ from typing import Self
 
 import msgspec
 
-from acquisition import DataError, Remark, TapTest, decide_hits, read_tap, write_tap
+from acquisition import DataError, HitDecision, Remark, TapTest, decide_hits, read_tap, write_tap
 from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
@@ -333,8 +333,10 @@ class MachineFolder:
         content = write_tap(path, tap)
         entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
         known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
-        new = [decision for decision in tap.decisions if decision not in known]
-        self.journal.append(*journal_entries.make_hit_entries(tap.id, new), entry.line, reading=reading)
+        counting = {decision.hit for decision in tap.decisions}
+        changes = [HitDecision(decision.hit, "undo") for decision in known if decision.hit not in counting]
+        changes += [decision for decision in tap.decisions if decision not in known]
+        self.journal.append(*journal_entries.make_hit_entries(tap.id, changes), entry.line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
         return entry
 

@@ -205,14 +205,14 @@ class TapPhases:
 
     def _handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
+        while not self.decisions.empty():
+            self._decide(*self.decisions.get())
         if self.stopping.is_set():
             raise TapStopped(
                 f"stopped with {self._tap.good} good hits. Repeat the command to continue with these hits."
             )
         while self.undos.acquire(blocking=False):
             self._undo()
-        while not self.decisions.empty():
-            self._decide(*self.decisions.get())
 
     def _hits(self, connection: DeviceConnection, trigger: Trigger) -> Iterator[Hit | None]:
         """Yield hits as they come, and None after every block. The shown step follows the trigger."""

@@ -67,7 +67,7 @@ class TapInProgress:
     flags: list[HitFlags] = field(default_factory=list)
     """Flags of each hit, before decisions. UNDONE if the operator took a good one back."""
     decisions: tuple[HitDecision, ...] = ()
-    """Decisions of the operator on hits, as in the journal."""
+    """Decisions of the operator on hits. The journal counts the hits by their files until the test is committed."""
     reasons: list[str] = field(default_factory=list)
     """Sentence on what is wrong with each hit, empty if it is averaged."""
     numbers: list[int] = field(default_factory=list)
@@ -150,8 +150,6 @@ class TapInProgress:
         """Resume with a hit that is already on the disk."""
         verdict = evaluate_safely(lambda: evaluate_hit(spooled.hit))
         self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
-        if not self.flags[-1]:
-            self.mean.add(spooled.hit)
         self.circumstances = spooled.circumstances
         self.n_resumed = len(self.hits)
 
@@ -188,21 +186,18 @@ class TapInProgress:
         decisions, hit = add_decisions(self.flags, self.decisions, [decision]), self.hits[number]
         if accept:
             self.mean.add(hit)
-        self._store(partial(store_hit_decisions, self.folder, self.id, [decision]))
+        entered = replace(decision, hit=self.numbers[number] + 1)
+        self._store(partial(store_hit_decisions, self.folder, self.id, [entered]))
         if not accept:
             self.mean.remove(hit)
         self.decisions = decisions
 
-    def resume_decisions(self) -> None:
-        """Apply the decisions of the interrupted test, or withdraw them if hits are lost, which changes numbers."""
-        decisions = read_hit_decisions(self.folder.journal.read().other_entries).get(self.id, ())
-        if decisions and self.numbers != list(range(len(self.hits))):
-            undone = [HitDecision(decision.hit, "undo") for decision in decisions]
-            self._store(partial(store_hit_decisions, self.folder, self.id, undone))
-            text = "Decisions on hits are withdrawn, because a hit file is damaged"
-            self.not_resumed.append(join_sentences(text, "Decide again"))
-            return
-        self.decisions, self.mean = decisions, acquisition.RunningMean()
+    def resume_mean(self) -> None:
+        """Average the hits of the interrupted test, after the decisions on those that are left."""
+        entered = read_hit_decisions(self.folder.journal.read().other_entries).get(self.id, ())
+        left = [made for made in entered if made.hit - 1 in self.numbers]
+        self.decisions = tuple(replace(made, hit=self.numbers.index(made.hit - 1) + 1) for made in left)
+        self.mean = acquisition.RunningMean()
         for hit in (hit for hit, flags in zip(self.hits, self.decided_flags, strict=True) if not flags):
             self.mean.add(hit)
 
@@ -329,8 +324,7 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
             newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
-            newest.resume_decisions()
-            new.not_resumed += newest.not_resumed
+            newest.resume_mean()
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:

@@ -87,8 +87,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
-        about_it = {"operator": about.operator, "hit_decisions": tap.decisions}
-        return cls(tap.id, digest, len(content), *labels, source, about.conditions, **about_it)
+        known = about.conditions, (), about.operator
+        return cls(tap.id, digest, len(content), *labels, source, *known, hit_decisions=tap.decisions)
 
     @classmethod
     def from_line(cls, line: dict[str, Any]) -> Self:

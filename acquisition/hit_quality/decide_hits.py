@@ -139,7 +139,7 @@ def add_decisions(
     ------
     ValueError
         For a hit that does not exist, a code that the hit does not have, a fault that cannot be accepted or is left,
-        or a decision without effect.
+        or a decision to withdraw that does not exist.
 
     Examples
     --------
@@ -152,11 +152,8 @@ def add_decisions(
         if not 1 <= decision.hit <= len(faults):
             has = f"the tap test has {len(faults)} hits" if faults else "the tap test has an FRF, but no hits"
             raise ValueError(f"hit {decision.hit} does not exist, because {has}. Give the number of a hit.")
-        now = current[decision.hit - 1]
         if decision.decision == "accept":
-            _check_acceptance(decision, faults[decision.hit - 1], now)
-        elif decision.decision == "reject" and now:
-            raise ValueError(f"hit {decision.hit} is already rejected ({now.words}). Leave out this hit.")
+            _check_acceptance(decision, faults[decision.hit - 1], current[decision.hit - 1])
         elif decision.decision == "undo" and decision.hit not in [past.hit for past in earlier]:
             raise ValueError(f"hit {decision.hit} has no decision. Leave out this hit.")
     return merge_decisions([*earlier, *new])

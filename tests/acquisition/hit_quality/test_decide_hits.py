@@ -78,7 +78,6 @@ def test_of_several_decisions_on_a_hit_the_last_one_counts() -> None:
     [
         HitDecision(0, "reject"),
         HitDecision(4, "reject"),
-        HitDecision(2, "reject"),
         HitDecision(1, "undo"),
         HitDecision(1, "accept", ("double-hit",)),
         HitDecision(2, "accept", ("too-soft",)),

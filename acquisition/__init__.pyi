@@ -31,8 +31,6 @@ from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
 from .hit import Hit
 from .hit_fault import HitFlags
-from .hit_quality.best_hits import choose_best_hits
-from .hit_quality.decide_hits import add_decisions, decide_hits, merge_decisions, parse_hit_decisions
 from .hit_quality.evaluate_hit import HitVerdict, average_good_hits, check_hit, evaluate_hit
 from .hits.capture_hits import HitSearch, Trigger, capture_hits
 from .hits.free_decay import estimate_decay_time, extract_free_decay
@@ -48,7 +46,6 @@ from .tap_test import (
     HitDecision,
     SourceFile,
     TapTest,
-    decide_flags,
     new_tap_id,
     parse_machine_name,
     sanitize_id_part,
@@ -116,7 +113,6 @@ __all__ = [
     "TapsFaults",
     "TapsSource",
     "Trigger",
-    "add_decisions",
     "apply_exponential_window",
     "atomic_write",
     "average_good_hits",
@@ -128,12 +124,9 @@ __all__ = [
     "check_name",
     "check_rate",
     "check_settings",
-    "choose_best_hits",
     "compute_cross_spectra",
     "convert",
     "correct_windowed_receptance",
-    "decide_flags",
-    "decide_hits",
     "estimate_decay_time",
     "estimate_frf",
     "evaluate_hit",
@@ -156,11 +149,9 @@ __all__ = [
     "measure_rate",
     "measure_skew",
     "measure_time_after_hit",
-    "merge_decisions",
     "merge_remarks",
     "new_tap_id",
     "parse_direction",
-    "parse_hit_decisions",
     "parse_machine_name",
     "probe_port",
     "propagate_force_noise",

@@ -83,7 +83,7 @@ def encode_tap(tap: TapTest) -> bytes:
         file.attrs.update(format=TAP_FORMAT_NAME, version=_choose_version(tap.hits))
         file.attrs.update(software=_get_software_name(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
-        raw_hits.write_raw_hits(file, tap.hits, tap.flags)
+        raw_hits.write_raw_hits(file, tap.hits, tap.flags, tap.decided_flags)
         if tap.frf is not None:
             _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
@@ -162,9 +162,9 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), raw_hits.HitSettings.from_hit(hit)))
     with hdf5_file.open_hdf5(memory, "r+") as file:
         file.attrs["file"] = Path(path).name
-        raw_hits.write_hits(file["raw"], [hit], [flags])
+        raw_hits.write_hits(file["raw"], [hit], [flags], [flags])
         if hit.cross_hit is not None:
-            raw_hits.write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags])
+            raw_hits.write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags], [flags])
     atomic_write(Path(path), hdf5_file.append_checksum(memory.getvalue()))
 
 

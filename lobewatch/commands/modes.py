@@ -76,7 +76,7 @@ def modes(
       lobewatch modes mill-3 20261102T0914 --drop 412
       lobewatch modes mill-3 20261102T0914 --accept-hit 3:double-hit --reject-hit 5
     """
-    from acquisition import parse_hit_decisions
+    from acquisition.hit_quality.decide_hits import parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import read_tap_modes
     from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -98,9 +98,7 @@ def modes(
         with nullcontext() if choice is None and not decisions else publish_on_change(logbook):
             file_modes = read_tap_modes(logbook, tap, choice, decisions)
     elif by_fit or undo_hit or file.is_dir():
-        option = "--by-fit needs" if by_fit else "--undo-hit needs" if undo_hit else ""
-        text = f"{option} a stored tap test" if option else f"{file} is a folder"
-        raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
+        raise _make_tap_error(file, "--by-fit" if by_fit else "--undo-hit" if undo_hit else "")
     else:
         said = file_options.description(averages=averages, without_force=hammer == "none", hit_decisions=decisions)
         sensor = SensorLoading.of(sensor_mass)
@@ -118,6 +116,12 @@ def modes(
 
         save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
+
+
+def _make_tap_error(file: Path, option: str) -> ValueError:
+    """Return the error for a folder, or an option, without a tap test."""
+    text = f"{option} needs a stored tap test" if option else f"{file} is a folder"
+    return ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
 
 
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -55,7 +55,8 @@ def replay(
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
       lobewatch replay mill-3 hits.uff --accept-hit 3:double-hit --reject-hit 5
     """
-    from acquisition import Conditions, DataError, parse_hit_decisions
+    from acquisition import Conditions, DataError
+    from acquisition.hit_quality.decide_hits import parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import store_edits
     from lobewatch.logbook.recordings.recorded_files import find_recordings
@@ -68,13 +69,11 @@ def replay(
     from modal import parse_mode_edits
 
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
-    known = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
-    decisions = parse_hit_decisions(accept_hit or (), reject_hit or ())
-    description = file_options.description(**known, conditions=conditions, hit_decisions=decisions)
+    known: dict[str, Any] = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
+    known["hit_decisions"] = parse_hit_decisions(accept_hit or (), reject_hit or ())
+    description = file_options.description(**known, conditions=conditions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
-    if decisions and len(recordings) > 1:
-        raise ValueError(f"decisions on hits need one file, not {len(recordings)}. Replay the files one by one.")
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -86,8 +85,6 @@ def replay(
     with publish_on_change(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
-        for tap_id in outcome.already_stored.values():
-            logbook.decide_hits(tap_id, decisions)
         not_chosen = store_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]

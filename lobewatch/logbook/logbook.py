@@ -8,16 +8,8 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from acquisition import (
-    UNKNOWN_CONDITIONS,
-    Conditions,
-    Description,
-    HitDecision,
-    Remark,
-    TapTest,
-    add_decisions,
-    decide_hits,
-)
+from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, HitDecision, Remark, TapTest
+from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
 from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements, UsableTaps
@@ -295,6 +287,8 @@ class Logbook:
             outcome = recordings.store_recordings(self.folder, files, description, **options)
             self.fits |= outcome.fits
             self._invalidate()
+            for tap_id in outcome.already_stored.values():
+                self.decide_hits(tap_id, description.hit_decisions)
         return outcome
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:

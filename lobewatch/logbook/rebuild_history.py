@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from acquisition import DataError, decide_hits
+from acquisition import DataError
+from acquisition.hit_quality.decide_hits import decide_hits
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.recorded_files import parse_context, read_tap_bytes

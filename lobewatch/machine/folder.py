@@ -16,8 +16,9 @@ from typing import Self
 
 import msgspec
 
-from acquisition import DataError, HitDecision, Remark, TapTest, decide_hits, read_tap, write_tap
+from acquisition import DataError, HitDecision, Remark, TapTest, read_tap, write_tap
 from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
+from acquisition.hit_quality.decide_hits import decide_hits
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal import entries as journal_entries

@@ -8,11 +8,12 @@ import numpy as np
 
 import acquisition
 import modal
-from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark, decide_flags
+from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark
 from acquisition.errors import join_sentences
 from acquisition.files.read_recording import detect_format
 from acquisition.files.tap_file import TAP_FORMAT
-from acquisition.hit_quality.decide_hits import average_decided_hits
+from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
+from acquisition.tap_test import decide_flags
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -122,7 +123,7 @@ def _average_decided_hits(
     if detect_format(path) is TAP_FORMAT:
         tap = acquisition.read_tap(path)
         hits, faults = tap.hits, tap.flags
-    decisions = acquisition.add_decisions([found & ~accepted for found in faults], (), decisions)
+    decisions = add_decisions([found & ~accepted for found in faults], (), decisions)
     flags = decide_flags([found & ~accepted for found in faults], decisions)
     frf, used = average_decided_hits(hits, flags)
     return FileFrf(frf, used, remarks=(*find_hit_remarks(faults, decisions),), faults=faults, decisions=decisions)

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from acquisition import HitDecision, HitFlags, Remark, decide_flags
+from acquisition import HitDecision, HitFlags, Remark
+from acquisition.tap_test import decide_flags
 
 HIT_DECISIONS_CODE = "hits-by-hand"
 """Code of the remark on decisions on hits; it is about all of them."""

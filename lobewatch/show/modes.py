@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from rich.table import Table
 
-from acquisition import Fact, HitDecision, HitFlags, Remark, decide_flags, merge_remarks
+from acquisition import Fact, HitDecision, HitFlags, Remark, merge_remarks
+from acquisition.tap_test import decide_flags
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
 from lobewatch.measurement.hit_remarks import format_unused_hits

@@ -19,17 +19,16 @@ from acquisition import (
     HitFlags,
     HitVerdict,
     TapTest,
-    add_decisions,
-    choose_best_hits,
-    decide_flags,
     evaluate_hit,
     write_hit,
 )
 from acquisition.errors import format_os_error, join_sentences
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
-from acquisition.hit_quality.decide_hits import average_decided_hits
+from acquisition.hit_quality.best_hits import choose_best_hits
+from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
+from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions

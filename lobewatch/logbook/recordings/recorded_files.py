@@ -26,6 +26,7 @@ from acquisition.errors import join_sentences
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
+from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
 from lobewatch.machine import Machine, MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
@@ -201,7 +202,7 @@ def _build_tap_test(
     try:
         if decisions:
             tap = replace(tap, flags=tuple(map(acquisition.check_hit, recording.hits)))
-            return acquisition.decide_hits(tap, acquisition.add_decisions(tap.flags, (), decisions))
+            return decide_hits(tap, add_decisions(tap.flags, (), decisions))
         if recording.frf is not None:
             return tap
         frf, flags = acquisition.average_good_hits(recording.hits)

@@ -73,7 +73,12 @@ class ReplayPlan(NamedTuple):
 
     @classmethod
     def of(cls, folder: MachineFolder, files: Sequence[Path], description: Description) -> Self:
-        """Read the files. The tap test of one of several responses must have the same direction."""
+        """Read the files. The tap test of one of several responses must have the same direction.
+
+        Raises ValueError for decisions on the hits of several files.
+        """
+        if description.hit_decisions and len(files) > 1:
+            raise ValueError(f"decisions on hits need one file, not {len(files)}. Replay the files one by one.")
         plan = cls({}, {}, {}, {})
         for file in files:
             try:

@@ -8,7 +8,8 @@ from typing import Any, Literal, get_args
 
 import msgspec
 
-from acquisition import HitDecision, merge_decisions
+from acquisition import HitDecision
+from acquisition.hit_quality.decide_hits import merge_decisions
 from lobes import Cut
 from lobewatch.machine.journal.journal import JournalEntry, JournalReading, make_entry
 from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries

@@ -9,23 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition import (
-    Circumstances,
-    Hit,
-    HitDecision,
-    HitFlags,
-    Structure,
-    TapTest,
+from acquisition import Circumstances, Hit, HitDecision, HitFlags, Structure, TapTest, estimate_frf
+from acquisition.hit_fault import HIT_FAULTS
+from acquisition.hit_quality.best_hits import choose_best_hits
+from acquisition.hit_quality.decide_hits import (
+    UNUSABLE_HIT_FLAGS,
     add_decisions,
-    choose_best_hits,
-    decide_flags,
     decide_hits,
-    estimate_frf,
     merge_decisions,
     parse_hit_decisions,
 )
-from acquisition.hit_fault import HIT_FAULTS
-from acquisition.hit_quality.decide_hits import UNUSABLE_HIT_FLAGS
+from acquisition.tap_test import decide_flags
 
 RATE, TIME = 10240.0, np.arange(-100, 3996) / 10240.0
 PULSE = np.where((TIME >= 0) & (TIME <= 1e-3), np.sin(np.pi * TIME / 1e-3) ** 4, 0.0)

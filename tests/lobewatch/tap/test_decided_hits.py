@@ -19,11 +19,11 @@ from acquisition import (
     HitFlags,
     Structure,
     TapTest,
-    choose_best_hits,
     estimate_frf,
     read_tap,
     read_tap_hits,
 )
+from acquisition.hit_quality.best_hits import choose_best_hits
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped

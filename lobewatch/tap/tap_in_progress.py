@@ -205,12 +205,14 @@ class TapInProgress:
 
         Takes the first one that does not fit out of the mean, and returns its index and the reason.
         """
-        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(self.mean.hits) <= 2 * MIN_HITS_FOR_MEAN:
+        references = self._references
+        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(references) <= 2 * MIN_HITS_FOR_MEAN:
             return None
-        for hit in self.mean.hits[:MIN_HITS_FOR_MEAN]:
-            verdict = evaluate_safely(partial(self._compare, hit))
-            number = next(i for i, tap_hit in enumerate(self.hits) if tap_hit is hit)
-            if verdict.flags and number not in self._accepted:
+        for hit in references[:MIN_HITS_FOR_MEAN]:
+            others = [other for other in references if other is not hit]
+            verdict = evaluate_safely(partial(_compare, hit, others))
+            if verdict.flags:
+                number = next(i for i, tap_hit in enumerate(self.hits) if tap_hit is hit)
                 self.exclude(number, verdict.flags, verdict.text)
                 return number, verdict
         return None
@@ -231,15 +233,21 @@ class TapInProgress:
         return {decision.hit - 1 for decision in self.decisions if decision.decision == "accept"}
 
     def _evaluate(self, hit: Hit) -> HitVerdict:
-        mean = self.mean.frf if len(self.mean.hits) >= MIN_HITS_FOR_MEAN else None
+        references, mean = self._references, self.mean.frf
+        if len(references) < MIN_HITS_FOR_MEAN:
+            mean = None
+        elif mean is not None and len(references) < len(self.mean.hits):
+            mean = acquisition.estimate_frf(references)
         verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
         if not verdict.flags:
             self.mean.add(hit)
         return verdict
 
-    def _compare(self, hit: Hit) -> HitVerdict:
-        """Compare a hit of the mean with the others. All else was evaluated when it came."""
-        return HitVerdict.from_findings(evaluate_spectrum(hit, self.mean.estimate_without(hit)))
+    @property
+    def _references(self) -> list[Hit]:
+        """Hits of the mean that the operator has not accepted, to compare others with."""
+        accepted = [self.hits[i] for i in self._accepted]
+        return [hit for hit in self.mean.hits if not any(hit is one for one in accepted)]
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
         self.numbers.append(number)
@@ -262,6 +270,11 @@ class TapInProgress:
         if not self.hits and self.trigger is not None:
             spool.write_setup(folder, self.trigger)
         write_hit(folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+
+
+def _compare(hit: Hit, others: Sequence[Hit]) -> HitVerdict:
+    """Compare a hit of the mean with the others. All else was evaluated when it came."""
+    return HitVerdict.from_findings(evaluate_spectrum(hit, acquisition.estimate_frf(others)))
 
 
 def average_hits(

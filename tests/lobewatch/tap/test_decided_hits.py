@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -12,13 +14,17 @@ import pytest
 
 from acquisition import (
     Channel,
+    Circumstances,
     DataError,
     HammeredStructure,
     Hammering,
     HitDecision,
     HitFlags,
+    SimulatedSource,
     Structure,
     TapTest,
+    Trigger,
+    capture_hits,
     estimate_frf,
     read_tap,
     read_tap_hits,
@@ -29,6 +35,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.tap_in_progress import TapInProgress
 
 RATE = 25600.0
 Pair = tuple[Channel, Channel]
@@ -41,11 +48,11 @@ Watch = Callable[[TapState], None]
 @pytest.fixture
 def start(
     folder: MachineFolder, structure: Structure, channels: Pair, simulated: Simulate, session_of: OpenSession
-) -> Callable[[Watch], TapSession]:
+) -> Callable[..., TapSession]:
     """Make a session in which every third hit is overloaded, and the others good."""
 
-    def make(watch: Watch) -> TapSession:
-        hammering = Hammering(double_hits=0.0, overloads=0.3)
+    def make(watch: Watch, overloads: float = 0.3) -> TapSession:
+        hammering = Hammering(double_hits=0.0, overloads=overloads)
         signal = HammeredStructure(structure, RATE, np.random.default_rng(4), hammering)
         return session_of(folder, lambda: simulated(signal, channels, seconds=200.0), watch)
 
@@ -81,7 +88,7 @@ class Script:
     def _has_both(state: TapState) -> bool:
         return {bool(hit.flags) for hit in state.hits} == {True, False}
 
-    def run(self, start: Callable[[Watch], TapSession]) -> TapTest:
+    def run(self, start: Callable[..., TapSession]) -> TapTest:
         self.session = start(self)
         return self.session.run()
 
@@ -95,7 +102,7 @@ def reject_first(session: TapSession, state: TapState) -> None:
 
 
 def test_an_accepted_hit_counts_in_the_mean_the_result_and_the_journal(
-    folder: MachineFolder, start: Callable[[Watch], TapSession]
+    folder: MachineFolder, start: Callable[..., TapSession]
 ) -> None:
     script = Script(at_4=accept_first)
     tap = script.run(start)
@@ -114,7 +121,7 @@ def test_an_accepted_hit_counts_in_the_mean_the_result_and_the_journal(
     assert {remark.code for remark in Logbook(again).measurement(tap.id).remarks} >= {"hits-by-hand", "hits-overloaded"}
 
 
-def test_the_later_of_two_decisions_counts(folder: MachineFolder, start: Callable[[Watch], TapSession]) -> None:
+def test_the_later_of_two_decisions_counts(folder: MachineFolder, start: Callable[..., TapSession]) -> None:
     number: list[int] = []
 
     def accept_again(session: TapSession, _: TapState) -> None:
@@ -134,7 +141,7 @@ def test_the_later_of_two_decisions_counts(folder: MachineFolder, start: Callabl
 
 @pytest.mark.parametrize(("number", "accept"), [(99, True), (0, False)])
 def test_a_decision_on_no_hit_says_so_and_changes_nothing(
-    folder: MachineFolder, start: Callable[[Watch], TapSession], number: int, accept: bool
+    folder: MachineFolder, start: Callable[..., TapSession], number: int, accept: bool
 ) -> None:
     script = Script(at_2=lambda session, _: session.decide(number, accept=accept))
     tap = script.run(start)
@@ -142,7 +149,7 @@ def test_a_decision_on_no_hit_says_so_and_changes_nothing(
     assert (lines(folder), tap.decisions) == ([], ())
 
 
-def test_the_last_hit_needs_no_number(folder: MachineFolder, start: Callable[[Watch], TapSession]) -> None:
+def test_the_last_hit_needs_no_number(folder: MachineFolder, start: Callable[..., TapSession]) -> None:
     numbers: list[int] = []
 
     def watch(state: TapState) -> None:
@@ -155,7 +162,7 @@ def test_the_last_hit_needs_no_number(folder: MachineFolder, start: Callable[[Wa
     assert [line[:2] for line in lines(folder)] == [(numbers[0], "accept")]
 
 
-def test_undo_of_an_accepted_hit_rejects_it(folder: MachineFolder, start: Callable[[Watch], TapSession]) -> None:
+def test_undo_of_an_accepted_hit_rejects_it(folder: MachineFolder, start: Callable[..., TapSession]) -> None:
     done: list[int] = []
 
     def watch(state: TapState) -> None:
@@ -172,19 +179,32 @@ def test_undo_of_an_accepted_hit_rejects_it(folder: MachineFolder, start: Callab
 
 
 def test_a_restarted_test_keeps_the_decision_on_its_hit_even_if_another_hit_is_damaged(
-    folder: MachineFolder, start: Callable[[Watch], TapSession]
+    folder: MachineFolder, start: Callable[..., TapSession]
 ) -> None:
-    script = Script(at_2=accept_first, at_4=lambda session, _: session.stop())
+    asked: list[int] = []
+
+    def watch(state: TapState) -> None:
+        if not asked and state.hits[1:] and state.hits[-1].flags:
+            asked.append(len(state.hits))
+            session.decide(None, accept=True)
+        if any(hit.accepted for hit in state.hits):
+            session.stop()
+
+    session = start(watch)
     with pytest.raises(TapStopped):
-        script.run(start)
+        session.run()
     (spool,) = folder.spool.iterdir()
     ((number, _, codes),) = lines(folder)
     accepted = read_tap_hits(spool / f"{number - 1:04d}.h5")[0][0]
-    lost = spool / ("0000.h5" if number > 1 else "0001.h5")
-    lost.write_bytes(lost.read_bytes()[:-9])
-    tap = Script().run(start)
+    assert number > 1
+    lost = spool / "0000.h5"
+    content = bytearray(lost.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    lost.write_bytes(content)
+    tap = start(lambda _: None, overloads=0.0).run()
     assert tap.id == spool.name
     (decision,) = tap.decisions
+    assert decision.hit == number - 1
     assert decision.codes == tuple(codes)
     assert np.array_equal(tap.hits[decision.hit - 1].force, accepted.force)
     again = MachineFolder(folder.path)
@@ -193,7 +213,7 @@ def test_a_restarted_test_keeps_the_decision_on_its_hit_even_if_another_hit_is_d
 
 
 def test_more_hits_than_needed_are_all_kept_and_the_best_are_used(
-    folder: MachineFolder, start: Callable[[Watch], TapSession]
+    folder: MachineFolder, start: Callable[..., TapSession]
 ) -> None:
     script = Script(at_10=accept_first)
     tap = script.run(start)
@@ -209,8 +229,27 @@ def test_more_hits_than_needed_are_all_kept_and_the_best_are_used(
     assert [remark.about for remark in remarks if remark.code == "hits-surplus"] == [f"hit {surplus[0] + 1}"]
 
 
+def test_an_accepted_hit_is_not_excluded_by_those_after_it(folder: MachineFolder, structure: Structure) -> None:
+    spot = replace(structure, stiffness=1.5 * structure.stiffness)
+    careful = Hammering(double_hits=0.0, overloads=0.0)
+    channels = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
+    hits = []
+    for part, count in ((spot, 1), (structure, 4)):
+        source = SimulatedSource(
+            HammeredStructure(part, RATE, np.random.default_rng(2), careful), channels, RATE, 90_000
+        )
+        hits += [*capture_hits(source, Trigger(20.0, 6400, 512))][:count]
+    about = Circumstances("m", datetime.now(UTC))
+    for decisions, flags in (((), HitFlags.OK), ((HitDecision(1, "accept", ("too-hard",)),), HitFlags.TOO_HARD)):
+        of_hits = {"flags": [flags, *4 * [HitFlags.OK]], "reasons": 5 * [""], "numbers": [*range(5)]}
+        tap = TapInProgress("ID", about, folder, hits, **of_hits, decisions=decisions)
+        for hit in hits:
+            tap.mean.add(hit)
+        assert (tap.recheck_first_hits() is None) == bool(decisions)
+
+
 def test_nothing_is_shown_that_the_journal_does_not_have(
-    folder: MachineFolder, start: Callable[[Watch], TapSession], monkeypatch: pytest.MonkeyPatch
+    folder: MachineFolder, start: Callable[..., TapSession], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise OSError(errno.EIO, "Input/output error", "journal.jsonl")

@@ -241,8 +241,8 @@ def test_an_accepted_hit_is_not_excluded_by_those_after_it(folder: MachineFolder
         hits += [*capture_hits(source, Trigger(20.0, 6400, 512))][:count]
     about = Circumstances("m", datetime.now(UTC))
     for decisions, flags in (((), HitFlags.OK), ((HitDecision(1, "accept", ("too-hard",)),), HitFlags.TOO_HARD)):
-        of_hits = {"flags": [flags, *4 * [HitFlags.OK]], "reasons": 5 * [""], "numbers": [*range(5)]}
-        tap = TapInProgress("ID", about, folder, hits, **of_hits, decisions=decisions)
+        tap = TapInProgress("ID", about, folder, hits, [flags, *4 * [HitFlags.OK]], decisions=decisions)
+        tap.reasons, tap.numbers = 5 * [""], [*range(5)]
         for hit in hits:
             tap.mean.add(hit)
         assert (tap.recheck_first_hits() is None) == bool(decisions)

@@ -68,6 +68,7 @@ SHM = "High-Rate-SHM-Working-Group"
 PLATE_FRF = "MAT_001_FRF_Channel_8"
 PLATE_POINTS = "WangSuhan/Modal-identification-of-plate/20201016"
 DYNAMIC_STRUCTURE = "TimVrtac/Impact-testing-DS/test_DS"
+HIT_AXES = "--axes hits,channels,samples"
 CHANNELS = '--columns "time [s],acceleration [g],time [s],force [N]"'
 FILES = (
     PublicFile(f"{DYNAMICS}/FrequencyDomain/Milling/General/FRF[XY].frf"),
@@ -97,9 +98,10 @@ FILES = (
     PublicFile(f"{TESTING}/case[12].mat", "--unit m/s^2/N"),
     PublicFile(f"{TESTING}/mckiddat.mat", "--response 1 --unit m/N"),
     PublicFile(f"{TESTING}/testdata.mat", '--columns "time [s]=t,force [N]=xn,acceleration [g]=yn"'),
-    PublicFile(f"{DYNAMIC_STRUCTURE}/F?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 20000'),
+    PublicFile(f"{DYNAMIC_STRUCTURE}/F?.npy", f'{HIT_AXES} --columns "force [N],acceleration [g],-,-" --rate 20000'),
     PublicFile(
-        "TimVrtac/Impact-testing-v2/series_meas/?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 51200'
+        "TimVrtac/Impact-testing-v2/series_meas/?.npy",
+        f'{HIT_AXES} --columns "force [N],acceleration [g],-" --rate 51200',
     ),
     PublicFile(f"{BLADE}/K?_H221.txt"),
     PublicFile(f"{BLADE}/M1[13][268].txt"),

@@ -5,12 +5,14 @@ import logging
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
 from acquisition.errors import DataError, Remark, join_sentences
 from acquisition.file_io import open_regular_file
 from acquisition.files.contents.contents import Contents, Description, Fact, Format, append_force_signals
+from acquisition.files.contents.join_recordings import join_recordings
 from acquisition.files.contents.recording import Recording, resolve_recording
 from acquisition.files.readers.read_arrays import ARRAY_FORMATS, MAT_FORMAT
 from acquisition.files.readers.read_audio import AUDIO_FORMAT
@@ -81,6 +83,12 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     >>> clear.problems, clear.frf.frequency.size
     ('', 100)
     """
+    if description.hit_files:
+        if description.force is not None:
+            cure = "Several files of one tap test need force and response in each of them."
+            raise DataError(f"Omit Description.force {description.force}. {cure}")
+        alone = replace(description, hit_files=(), one_test=True)
+        return join_recordings([_try_inspect(file, alone) for file in (Path(path), *description.hit_files)])
     path = Path(path)
     file_format = detect_format(path)
     held = read_contents(file_format, path, description)
@@ -99,6 +107,14 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     conditions = about.conditions if about and about.machine else None
     facts = tuple(_list_facts(hits, frf))
     return Recording(path, file_format.title, hits, frf, facts, problems, **labels, conditions=conditions)
+
+
+def _try_inspect(path: Path, description: Description) -> Recording:
+    """Inspect one of several files; a damaged one is a recording with this problem."""
+    try:
+        return inspect_file(path, description)
+    except DataError as error:
+        return Recording(path, "damaged file", problems=str(error).removeprefix(f"{path}: "))
 
 
 def read_recording(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> list[Hit] | Frf:
@@ -199,7 +215,7 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     """
     path = Path(path)
     file_format = detect_format(path)
-    if file_format.read_frf is not None:
+    if file_format.read_frf is not None and not description.hit_files:
         return file_format.read_frf(path)
     recording = read_recording(path, description)
     if isinstance(recording, Frf):

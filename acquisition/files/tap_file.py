@@ -320,7 +320,7 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
 
 def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
     """Return whether a file is a live tap test of lobewatch and these are all its hits."""
-    if not hits or not read_regular_file(path).startswith(hdf5_file.HDF5_SIGNATURE):
+    if not hits or not _is_lobewatch_file(read_regular_file(path), path):
         return False
     tap = read_tap(path)
     return tap.source is None and len(tap.hits) == len(hits)

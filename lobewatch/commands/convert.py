@@ -6,13 +6,16 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import FileOptions, add_file_options
+from lobewatch.commands.shared_options import FileOptions, add_file_options, join_hit_files
 from lobewatch.show.terminal.output import Json, emit
 
 
 @add_file_options()
 def convert(
-    file: Annotated[Path, Argument(help="Recorded hits or FRF, in a format that lobewatch modes reads.")],
+    files: Annotated[
+        list[Path],
+        Argument(help="Recorded hits or FRF, in a format that lobewatch modes reads. With --one-test: several files."),
+    ],
     out: Annotated[Path, Argument(help="Output file: .uff, .unv, .csv, .mat, or .json (SEP005, hits only).")],
     hits: Annotated[bool, Option("--hits", help="Write time signals instead of the FRF.")] = False,
     *,
@@ -30,14 +33,19 @@ def convert(
     --------
       lobewatch convert mill-3/taps/ID.h5 tap.uff
       lobewatch convert hit.lvm hit.json --hits
+      lobewatch convert hit1.csv hit2.csv hit3.csv hits.uff --hits --one-test
       lobewatch convert h.mat h.csv --unit g/N --response 2
     """
     from acquisition import convert as write
     from lobewatch.show.modes import fact_lines
 
-    written = write(file, out, file_options.description(date=date, direction=direction), hits=hits)
+    said = file_options.description(date=date, direction=direction)
+    (file, *more), said = join_hit_files(files, said)
+    if more:
+        raise ValueError(f"{len(files)} files to convert. Give --one-test for hits of one tap test, or a single file.")
+    written = write(file, out, said, hits=hits)
     facts = [{"name": fact.name, "value": fact.value, "origin": fact.origin} for fact in written.recording.facts]
     payload = {"file": str(written.path), "format": written.title, "holds": written.content}
-    said = {"precision": written.precision, "facts": facts}
+    shown = {"precision": written.precision, "facts": facts, "remarks": written.recording.remarks}
     summary = f"{written.path}: {written.title}, {written.content}, {written.precision}"
-    emit(payload | said, as_json, summary, *fact_lines(written.recording.facts))
+    emit(payload | shown, as_json, summary, *fact_lines(written.recording.facts), *map(str, written.recording.remarks))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lobewatch.tap.state import StatePublisher
 
 
-@add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
+@add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
     machine: Machine,
     program: Annotated[str, Option(help="Program name.")] = "",

@@ -1,5 +1,6 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ from lobewatch.show.terminal.output import Json, emit
 from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
+    from lobewatch.measurement import FileModes
     from modal import ModeEdits
 
 
@@ -21,7 +23,13 @@ def modes(
         Path,
         Argument(help="Machine folder, or recorded hits or FRF: UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
     ],
-    tap: Annotated[str, Argument(help="Tap test of a machine folder: ID, or a unique part of it.")] = "",
+    names: Annotated[
+        list[str] | None,
+        Argument(
+            metavar="[TAP]...",
+            help="Tap test of a machine folder: ID, or a unique part of it. With --one-test: more files of the test.",
+        ),
+    ] = None,
     band: Annotated[tuple[float, float] | None, Option(help="Frequency band (Hz).")] = None,
     figure: Annotated[Path | None, Option(help="Figure of FRF, fit and poles (.svg, .png, .pdf).")] = None,
     window: Annotated[
@@ -72,6 +80,7 @@ def modes(
       lobewatch modes decays.csv --hammer none
       lobewatch modes h.mat --response 2 --unit g/N
       lobewatch modes point1.uff --beside point2.uff --beside point3.uff
+      lobewatch modes hit1.csv hit2.csv hit3.csv --one-test
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
       lobewatch modes mill-3 20261102T0914 --accept-hit 3:double-hit --reject-hit 5
@@ -89,6 +98,7 @@ def modes(
         raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
     decisions = parse_hit_decisions(accept_hit or (), reject_hit or (), undo_hit or ())
+    file, tap, hit_files = _resolve_names(file, names or (), one_test=file_options.one_test)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
@@ -100,7 +110,8 @@ def modes(
     elif by_fit or undo_hit or file.is_dir():
         raise _make_tap_error(file, "--by-fit" if by_fit else "--undo-hit" if undo_hit else "")
     else:
-        said = file_options.description(averages=averages, without_force=hammer == "none", hit_decisions=decisions)
+        known = {"hit_files": hit_files, "hit_decisions": decisions}
+        said = file_options.description(averages=averages, without_force=hammer == "none", **known)
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
@@ -111,10 +122,7 @@ def modes(
     if beside:
         file_modes = match_modes_across_files(file_modes, beside, measured)
     if figure is not None:
-        from lobewatch.show.figures.drawing import save_figure
-        from lobewatch.show.figures.spindle_figures import plot_modes
-
-        save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, file.name), figure)
+        _save_figure(file_modes, file.name, figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
 
 
@@ -122,6 +130,26 @@ def _make_tap_error(file: Path, option: str) -> ValueError:
     """Return the error for a folder, or an option, without a tap test."""
     text = f"{option} needs a stored tap test" if option else f"{file} is a folder"
     return ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
+
+
+def _resolve_names(file: Path, names: Sequence[str], *, one_test: bool) -> tuple[Path, str, tuple[Path, ...]]:
+    """Return the file or folder, the tap test of the folder, and the further files of one tap test."""
+    from lobewatch.logbook.recordings.recorded_files import find_recordings
+
+    if one_test:
+        first, *others = find_recordings([file, *names])[0]
+        return first, "", tuple(others)
+    if len(names) > 1:
+        text = f"{len(names) + 1} files. Give --one-test if they are hits of one tap test, or name a single file"
+        raise ValueError(f"{text}, or a machine folder and one tap test.")
+    return file, names[0] if names else "", ()
+
+
+def _save_figure(file_modes: "FileModes", name: str, figure: Path) -> None:
+    from lobewatch.show.figures.drawing import save_figure
+    from lobewatch.show.figures.spindle_figures import plot_modes
+
+    save_figure(plot_modes(file_modes.extraction, file_modes.as_recorded, name), figure)
 
 
 def _resolve_edits(edits: "ModeEdits", by_fit: bool) -> "ModeEdits | None":

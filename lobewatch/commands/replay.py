@@ -52,6 +52,8 @@ def replay(
       lobewatch replay mill-3 acceleration.lvm
       lobewatch replay mill-3 2024 --dry-run --unit g/N --date-pattern "%Y%m%d"
       lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
+      lobewatch replay mill-3 hit1.csv hit2.csv hit3.csv --one-test --date 2026-11-20 --direction x
+      lobewatch replay mill-3 hits.npy --axes hits,channels,samples --columns "force [N],acceleration [g]" --rate 51200
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
       lobewatch replay mill-3 hits.uff --accept-hit 3:double-hit --reject-hit 5
     """
@@ -74,6 +76,8 @@ def replay(
     description = file_options.description(**known, conditions=conditions)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
+    n_files = len(recordings)
+    recordings, description = shared.join_hit_files(recordings, description)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -88,7 +92,7 @@ def replay(
         not_chosen = store_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]
-        emit_replay(outcome, logbook, len(recordings), passed, accepted, as_json)
+        emit_replay(outcome, logbook, n_files, passed, accepted, as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
             raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

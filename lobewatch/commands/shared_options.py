@@ -4,7 +4,7 @@ import functools
 import inspect
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -92,6 +92,13 @@ class FileOptions:
     """Number of hits that an FRF was averaged from."""
     response: Annotated[int | None, Option(help="Number of the response in the file, counted from 1.")] = None
     """Number of the response, from 1."""
+    one_test: Annotated[
+        bool,
+        Option("--one-test", help="Hits of one tap test: all files, groups, numbered channels, rows of arrays."),
+    ] = False
+    """True if all files, groups and numbered channels are hits of one tap test."""
+    axes: Annotated[str, Option(help='Axes of the arrays: "hits,channels,samples" in any order.')] = ""
+    """Axes of the arrays, separated by commas."""
     full_scale: Annotated[str, Option(help='Full scale of each channel of a sound file: "500,50".')] = ""
     """Full scales of the channels, separated by commas."""
     sensitivity: Annotated[str, Option(help='Sensitivity of each channel: "2.25 mV/N,10.2 mV/g".')] = ""
@@ -104,7 +111,8 @@ class FileOptions:
         except ValueError as error:
             text = f'--full-scale {self.full_scale} is not a list of numbers. Give a number per channel: "500,50".'
             raise ValueError(text) from error
-        lists = {"columns": _split_words(self.columns), "sensitivity": _split_words(self.sensitivity)}
+        names = ("columns", "sensitivity", "axes")
+        lists = {name: _split_words(getattr(self, name)) for name in names}
         return acquisition.Description(**vars(self) | lists | {"full_scale": scales} | fields)
 
 
@@ -133,6 +141,15 @@ def reject_file_options(options: FileOptions, **others: Any) -> None:
     for name, value in (vars(options) | others).items():
         if value is not None and value not in ("", False):
             raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave out this option.")
+
+
+def join_hit_files(
+    paths: list[Path], description: "acquisition.Description"
+) -> tuple[list[Path], "acquisition.Description"]:
+    """Return the first file and the description with all others if they are one tap test; else both unchanged."""
+    if not description.one_test or len(paths) < 2:
+        return paths, description
+    return paths[:1], replace(description, hit_files=tuple(paths[1:]))
 
 
 def _split_words(text: str) -> tuple[str, ...]:

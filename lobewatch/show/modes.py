@@ -24,6 +24,8 @@ MATCHES_NOTE = "matches: number of other measurements with the mode within 0.5 %
 """Line below a table with the column "matches"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "assumed"}
 """Words for the origin of a fact on a file."""
+FILE_REMARK_CODES = "hit-left-out", "units-differ"
+"""Codes of remarks on single hits and files, each of which is shown in full."""
 NON_FILE_ORIGINS = "option", "default"
 """Origins of facts that are not in the file."""
 
@@ -167,6 +169,7 @@ def file_modes_json(file_modes: FileModes) -> JsonObject:
     return {
         "file": str(file_modes.path),
         "n_averages": frf and frf.n_averages,
+        "n_hits_found": file_modes.n_found,
         "usable_band_hz": frf and frf.usable_band,
         "facts": file_modes.facts,
         "hits": hits_json(file_modes.hits, file_modes.hit_decisions),
@@ -183,15 +186,18 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
     shown = sort_modes(file_modes.fitted, rejected=everything)
     trusted = [mode for mode in shown if assess_trust(mode) is Trust.TRUSTED]
     remarks = mode_remark_lines if everything else grouped_remark_lines
+    of_files = [remark for remark in file_modes.remarks if remark.code in FILE_REMARK_CODES]
+    others = [remark for remark in file_modes.remarks if remark not in of_files]
     texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
         *filter(None, [format_unused_hits(file_modes.hits, file_modes.hit_decisions)]),
+        *map(str, merge_remarks(of_files)),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),
         *trust_reasons(shown),
         *mode_notes(shown if everything else trusted),
-        *remarks(shown, file_modes.remarks),
+        *remarks(shown, others),
     ]
     if file_modes.frf is not None:
         heading = "for comparison, peak picking by eqs. (28) and (29) of Gaber & Hashemi:"
@@ -204,8 +210,9 @@ def _frf_text(file_modes: FileModes) -> str:
     frf = file_modes.frf or state.frf
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
-    averaged = f"{count_noun(frf.n_averages, 'hit')} averaged"
-    what = averaged if file_modes.frf else f"{count_noun(len(state.frfs), 'free decay')} fitted together"
+    n, n_found = frf.n_averages if file_modes.frf else len(state.frfs), file_modes.n_found
+    noun, done = ("hit", "averaged") if file_modes.frf else ("free decay", "fitted together")
+    what = f"{n} of {count_noun(n_found, noun)} {done}" if n_found > n else f"{count_noun(n, noun)} {done}"
     return f"{what}, {lines}{usable}"
 
 

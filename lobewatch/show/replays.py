@@ -14,6 +14,7 @@ from acquisition.files.contents.contents import Origin
 from dsm import format_rounded
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
+from lobewatch.logbook.recordings.prepare_taps import HitCount
 from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
 from lobewatch.logbook.replay_preview import ReplayPreview
 from lobewatch.measurement.hit_remarks import format_decisions, format_unused_hits
@@ -83,6 +84,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
         "hit_list": hits_json(tap.flags, tap.decisions),
+        "remarks": recording.remarks,
         "lines": tap.frf and tap.frf.frequency.size,
         "averages": tap.frf and tap.frf.n_averages,
         "modes": list(map(mode_json, measurement.modes)),
@@ -123,7 +125,11 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
     questions = [f"question ({remark.code}): {remark.text}" for remark in find_open_questions(measurement.remarks)]
     followed = f"{measurement.followed.frequency:.2f} Hz" if measurement.followed else "none"
     details = [*fact_lines(recording.facts), f"modes: {', '.join(map(_mode_text, modes)) or 'none'}"]
-    details += [f"followed mode: {followed}", *(questions or ["plausible for this machine, no questions"])]
+    details += [
+        *map(str, recording.remarks),
+        f"followed mode: {followed}",
+        *(questions or ["plausible for this machine, no questions"]),
+    ]
     words = Counter(flags.words for flags in preview.tap.flags)
     hits = f"{count_noun(len(preview.tap.hits), 'hit')}: " + ", ".join(
         f"{count} {word}" for word, count in words.items()
@@ -202,8 +208,16 @@ def emit_replay(
         {},
         as_json,
         *texts,
-        f"{len(outcome.new_tap_ids)} of {count_noun(n_files, 'file')} stored in {logbook.folder.path}",
+        f"{_stored_summary(outcome, n_files)} in {logbook.folder.path}",
     )
+
+
+def _stored_summary(outcome: ReplayOutcome, n_files: int) -> str:
+    """Return how many files were stored, or that they are one tap test."""
+    n_stored, n_taps = len(outcome.new_tap_ids), len(outcome.tap_ids) + len(outcome.rejected)
+    if n_taps < n_files:
+        return f"{n_files} files {'' if n_stored else 'already '}stored as one tap test"
+    return f"{n_stored} of {count_noun(n_files, 'file')} stored"
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
@@ -216,6 +230,8 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
         "refused": {str(file): reason for file, reason in outcome.rejected.items()},
         "taken": outcome.assumed_facts,
         "unused_hits": {str(file): text for file, text in outcome.unused_hits.items()},
+        "hits": {tap_id: count._asdict() for tap_id, count in outcome.hit_counts.items()},
+        "remarks": outcome.remarks,
     }
 
 
@@ -225,15 +241,24 @@ def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
     if len(set(stored)) <= MAX_TAPS_IN_FULL:
         for tap_id in stored:
             texts += measurement_texts(logbook.measurement(tap_id), logbook)
+            texts += _hit_count_texts([outcome.hit_counts[tap_id]])
     else:
         rows = logbook.history.rows
         asked = {row.tap_id: row.questions for row in rows}
         texts.append(_series_table([row for row in rows if row.tap_id in set(stored)]))
         questions = question_remarks(asked, logbook.folder.path, [tap_id for tap_id in stored if tap_id in asked])
         texts += [f"question on {question.finding}" for question in questions]
+        texts += _hit_count_texts([*outcome.hit_counts.values()])
+    texts += remark_lines(outcome.remarks)
     if outcome.assumed_facts:
         texts.append(f"assumed, not in the files: {', '.join(outcome.assumed_facts)}")
     return [*texts, *(program_texts(logbook) if stored else [])]
+
+
+def _hit_count_texts(counts: Sequence[HitCount]) -> list[str]:
+    """Return how many hits were found and used; nothing for FRFs."""
+    found, used = (sum(numbers) for numbers in zip(*counts, strict=True))
+    return [f"hits: {found} found, {used} used"] if found else []
 
 
 def _series_table(rows: Sequence[HistoryRow]) -> Table:

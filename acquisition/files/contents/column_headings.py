@@ -121,8 +121,8 @@ def infer_role(name: str, unit: str) -> Role:
 def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[Signal, ...]:
     """Return the signals with the roles and units that `Description.columns` gives them, in its order, only these.
 
-    "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
-    second column of H. Without `columns` all signals are left as they are.
+    "time [s]" names the next column, "frf [m/N]=H1" or "frf=H1 [m/N]" the signal of this name, heading, unit or number,
+    "frf=H:2" the second column of H. Without `columns` all signals are left as they are.
     """
     named, columns = list[Signal](), report.description.columns
     if not columns:
@@ -133,8 +133,9 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
         report.reject("columns", None, fault, cure)
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
-        signal = report.attempt(_select_signal, signals, name.strip(), number)
         word, unit = split_heading(heading.strip())
+        name, unit = _move_unit(signals, name.strip(), unit)
+        signal = report.attempt(_select_signal, signals, name, number)
         role = COLUMN_ROLES.get(word.strip().lower())
         if role is None:
             report.reject("columns", repr(text), f"heading {word!r} is not one of {', '.join(COLUMN_ROLES)}")
@@ -144,6 +145,13 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
                 report.reject("columns", repr(text), f"column {signal.name} is named twice")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
     return tuple(named)
+
+
+def _move_unit(signals: Sequence[Signal], name: str, unit: str) -> tuple[str, str]:
+    """Return the name of a column without the unit behind it, and this unit, unless a column is named so."""
+    bare, behind = split_heading(name)
+    is_new = is_unit(behind) and unit in ("", behind) and not _match_columns(signals, name)
+    return (bare, behind) if is_new and _match_columns(signals, bare) else (name, unit)
 
 
 def _select_signal(signals: Sequence[Signal], name: str, number: int, report: ImportReport) -> Signal:

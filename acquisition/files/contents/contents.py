@@ -15,13 +15,14 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import join_sentences
+from acquisition.errors import Remark, join_sentences
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions, HitDecision
 
 Result = TypeVar("Result")
 _LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force", "hit_decisions")
+_HIT_FIELDS = ("one_test", "hit_files")
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,12 @@ class Description:
     """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
     without_force: bool = False
     """True if no force was measured, so that only a response is needed."""
+    one_test: bool = False
+    """True if all groups, numbered channels and rows of arrays of the file are hits of one tap test."""
+    hit_files: tuple[Path, ...] = ()
+    """Files with further hits of the same tap test, which implies `one_test`."""
+    axes: tuple[str, ...] = ()
+    """Axes of the arrays in the file: hits, channels and samples in their order."""
     sensor: str = "accelerometer"
     """Kind of sensor of a recorded cut: accelerometer or microphone."""
     tacho: str = ""
@@ -82,7 +89,7 @@ class Description:
 
     def list_signal_options(self) -> list[str]:
         """List the given fields that state something about the signals of the file."""
-        names = [option.name for option in fields(self) if option.name not in _LABEL_FIELDS]
+        names = [option.name for option in fields(self) if option.name not in (*_LABEL_FIELDS, *_HIT_FIELDS)]
         return [f"Description.{name}" for name in names if getattr(self, name) not in ("", (), None)]
 
 
@@ -120,6 +127,8 @@ class ImportReport:
     """Facts that the file does not state, each with the field of the description that states it."""
     faults: list[str] = field(default_factory=list)
     """Faults that prevent the import."""
+    remarks: list[Remark] = field(default_factory=list)
+    """Remarks on hits that are left out."""
 
     def add_fact(self, name: str, value: str, origin: Origin = "file") -> None:
         """Add a known fact."""
@@ -222,6 +231,8 @@ class Signal:
     """Number of rows of its table, the first of them its first value; 0 where it is no column of a table."""
     flaws: Mapping[int, str] = field(default_factory=dict)
     """Fault of each value that is NaN, as "is empty in line 7", by its index."""
+    array: NDArray[Any] | None = None
+    """Array of two or more axes that it is a column of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +255,8 @@ class Contents:
     """Window over the response, as the file states it; empty if unknown."""
     notes: tuple[str, ...] = ()
     """Notes for people."""
+    groups: tuple[str, ...] = ()
+    """Names of its groups, each once, which may be machines."""
 
 
 def list_distinct_names(names: Iterable[str]) -> tuple[str, ...]:
@@ -320,7 +333,7 @@ def format_window(time_constant: float | None) -> str:
     return "of unknown form" if math.isnan(time_constant) else f"exponential {time_constant!r} s"
 
 
-MAX_ARRAY_COLUMNS = 64
+MAX_ARRAY_COLUMNS = 1024
 """Largest number of columns of an array that become signals."""
 MIN_FRF_LINES = 8
 """Smallest number of complex values of an FRF; fewer are poles."""
@@ -346,7 +359,7 @@ def _split_array(name: str, value: NDArray[Any]) -> Iterator[Signal]:
     elif value.ndim > 1 and value.size > 1:
         columns = np.moveaxis(value, int(np.argmax(value.shape)), -1).reshape(-1, max(value.shape))
         for i, column in enumerate(columns[:MAX_ARRAY_COLUMNS], 1):
-            yield _make_array_signal(f"{name}:{i}", column)
+            yield replace(_make_array_signal(f"{name}:{i}", column), array=value)
 
 
 def _make_array_signal(name: str, column: NDArray[Any]) -> Signal:

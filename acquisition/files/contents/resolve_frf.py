@@ -11,12 +11,19 @@ import numpy as np
 
 from acquisition.arrays import Complexes, Floats
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
-from acquisition.files.contents.contents import Contents, ImportReport, Signal, cut_to_shortest, has_same_axis
+from acquisition.files.contents.contents import (
+    Contents,
+    ImportReport,
+    Signal,
+    UnresolvedError,
+    cut_to_shortest,
+    has_same_axis,
+)
 from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
 from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
-FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag"'
+FRF_COLUMNS_EXAMPLE = ' "frequency [Hz],real [m/N],imag" or "frequency [Hz],db [m/N],phase [deg]"'
 """Example of the columns of an FRF."""
 FRF_FORM_BY_MOTION: dict[str, FrfQuantity] = dict(zip(MOTION_QUANTITIES, get_args(FrfQuantity), strict=True))
 """Form of an FRF by the quantity of its response."""
@@ -47,6 +54,7 @@ def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
     axes = [axis for axis in contents.signals if axis.role == "frequency" and axis.record == parts[0].record]
     used, axes = cut_to_shortest([*parts, *([coherence] if coherence else [])], axes, report)
     parts = used[: len(parts)]
+    _ask_for_level_and_angle(contents.signals, parts, report)
     values = report.attempt(_compute_complex_values, parts)
     unit = report.attempt(resolve_frf_unit, parts[0])
     frequency = report.attempt(_resolve_frequency, contents, parts, axes)
@@ -88,15 +96,31 @@ def _compute_complex_values(parts: Sequence[Signal], report: ImportReport) -> Co
             units = f"{first.name} in {first.unit!r} and {second.name} in {second.unit!r}"
             raise report.add_fault(f"columns {units} differ in unit. Real and imaginary part must have the same unit")
         return np.asarray(first.values + 1j * second.values)
-    angle = ANGLE_UNITS.get(second.unit.lower(), "")
-    if not angle:
-        raise report.add_missing("unit of the phase", "columns", ' "frequency,magnitude,phase [deg]"')
-    if not is_decibel(first.unit) and np.any(first.values < 0):
-        fact = f"unit of column {first.name!r}, probably dB because it has negative values"
-        raise report.add_missing(fact, "columns", ' "frequency,db,phase [deg]"')
+    angle = ANGLE_UNITS.get(second.unit.lower())
+    if angle is None:
+        raise UnresolvedError  # and asked for
     phase = np.deg2rad(second.values) if angle == "deg" else second.values
     size = 10 ** (first.values / 20) if is_decibel(first.unit) else first.values
     return np.asarray(size * np.exp(1j * phase))
+
+
+def _ask_for_level_and_angle(signals: Sequence[Signal], parts: Sequence[Signal], report: ImportReport) -> None:
+    """Ask for the unit of a phase, and of a magnitude that is probably a level, in one message."""
+    if parts[0].role != "magnitude" or len(parts) < 2:
+        return
+    size, phase = parts
+    may_be_level = not is_decibel(size.unit) and bool(np.any(size.values < 0))
+    asked = [f"unit of column {size.name!r}, probably dB because it has negative values"] if may_be_level else []
+    asked += [] if phase.unit.lower() in ANGLE_UNITS else ["unit of the phase"]
+    if not asked:
+        return
+    likely = "deg" if np.ptp(phase.values) > 2 * math.pi else "rad"
+    angle = phase.unit if phase.unit.lower() in ANGLE_UNITS else likely
+    words = {"magnitude": "db" if may_be_level or is_decibel(size.unit) else "magnitude", "phase": f"phase [{angle}]"}
+    used = [one for one in signals if one.role in ("frequency", "coherence") or one.name in (size.name, phase.name)]
+    in_order = len(used) == len(signals) and not any(word == "-" or "=" in word for word in report.description.columns)
+    columns = (words.get(one.role, one.role) + ("" if in_order else f"={one.name}") for one in used)
+    report.add_missing(" and ".join(asked), "columns", f' "{",".join(columns)}"')
 
 
 def _is_same_unit(one: str, other: str) -> bool:

@@ -10,6 +10,7 @@ from acquisition.arrays import Floats
 from acquisition.files.contents import resolve_unit
 from acquisition.files.contents.column_headings import format_signal_names
 from acquisition.files.contents.contents import Contents, ImportReport, Signal, UnresolvedError, cut_to_shortest
+from acquisition.files.contents.join_hits import MAX_RATE_DIFFERENCE, join_hits, make_left_out_remark
 from acquisition.files.contents.units import MOTION_QUANTITIES, STANDARD_GRAVITY, parse_unit
 from acquisition.hit import Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
@@ -21,8 +22,6 @@ NO_FORCE_ADVICE = 'If no force was measured, set hammer = "none" in [tap], or us
 """Advice for a file without a force."""
 FEW_DIGITS = "the times in the file have few digits, so missing samples cannot be detected"
 """Note on a time that cannot show missing samples."""
-MAX_RATE_DIFFERENCE = 1e-4
-"""Largest relative difference of equal sample rates: that of a rate with five digits."""
 MAX_TIME_DEVIATION = 0.05
 """Largest distance of a time from an even axis, in steps: 9 degrees of phase at half the sample rate.
 
@@ -48,6 +47,30 @@ def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
             report.add_fact("hits", f"{len(parts)} in one record, {parts[0].acceleration.size} samples per hit")
         hits += parts
     return hits
+
+
+def resolve_test(found: Sequence[tuple[Sequence[Signal], ImportReport]], report: ImportReport) -> list[Hit]:
+    """Return the hits of one tap test; each one that cannot be used gets a remark unless it is all."""
+    hits, broken = dict[str, Hit](), dict[str, ImportReport]()
+    for signals, hit_report in found:
+        hit = hit_report.attempt(_resolve_hit, signals) if hit_report.is_clean else None
+        for part in [None] if hit is None else split_record(hit):
+            place = f"hit {len(hits) + len(broken) + 1}"
+            if part is None:
+                broken[place] = hit_report
+            else:
+                report.facts += hit_report.facts if not hits else []
+                hits[place] = part
+    if not hits:
+        report.merge(replace(next(iter(broken.values())), facts=[]))
+        return []
+    joined, remarks = join_hits(hits)
+    report.remarks += [make_left_out_remark(place, fault.format_problems()) for place, fault in broken.items()]
+    report.remarks += remarks
+    report.add_fact(
+        "hits", f"{len(joined)} of {len(hits) + len(broken)}, {joined[0].acceleration.size} samples per hit"
+    )
+    return joined
 
 
 def _resolve_hit(signals: Sequence[Signal], report: ImportReport) -> Hit:

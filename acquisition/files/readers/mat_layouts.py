@@ -219,23 +219,24 @@ def _read_vectors(v: Mapping[str, Any]) -> Contents | None:
     for name, axis in arrays.items():
         if _FREQUENCY_NAME.fullmatch(name) and _is_rising(axis):
             parallel = _list_vectors_of_length(arrays, axis.size)
-            frfs = [(key, part) for key, part in parallel if np.iscomplexobj(part) and not _SPECTRUM_NAME.match(key)]
+            complex_ones = (signal for signal in parallel if np.iscomplexobj(signal.values))
+            frfs = [signal for signal in complex_ones if not _SPECTRUM_NAME.match(signal.name)]
             if frfs:
                 return Contents(tuple(_make_vector_signals(arrays, name, frfs)))
     return None
 
 
 def _make_vector_signals(
-    arrays: Mapping[str, NDArray[Any]], frequency: str, frfs: Sequence[tuple[str, NDArray[Any]]]
+    arrays: Mapping[str, NDArray[Any]], frequency: str, frfs: Sequence[Signal]
 ) -> Iterator[Signal]:
     yield Signal(frequency, arrays[frequency], "frequency", split_heading(frequency)[1])
-    yield from (Signal(name, values, "frf") for name, values in frfs)
+    yield from (replace(signal, role="frf") for signal in frfs)
     n = arrays[frequency].size
-    taken = {frequency, *(name for name, _ in frfs)}
-    for name, values in _list_vectors_of_length(arrays, n):
-        if _COHERENCE_NAME.match(name) and not np.iscomplexobj(values):
-            taken.add(name)
-            yield Signal(name, values, "coherence")
+    taken = {frequency, *(signal.name for signal in frfs)}
+    for signal in _list_vectors_of_length(arrays, n):
+        if _COHERENCE_NAME.match(signal.name) and not np.iscomplexobj(signal.values):
+            taken.add(signal.name)
+            yield replace(signal, role="coherence")
     rest = ((name, values) for name, values in arrays.items() if values.ndim == 1 and name not in taken)
     yield from (Signal(name, values, record=1) for name, values in rest)
 
@@ -254,8 +255,8 @@ def _read_time_vectors(v: Mapping[str, Any]) -> Contents | None:
         return None
     n = arrays[axis].size if axis else max((max(value.shape) for value in arrays.values()), default=0)
     signals = [Signal(axis, arrays[axis], "time")] if axis else []
-    parallel = ((name, values) for name, values in _list_vectors_of_length(arrays, n) if name != axis)
-    signals += [Signal(name, values, infer_role(name, ""), rate=rate) for name, values in parallel]
+    parallel = (signal for signal in _list_vectors_of_length(arrays, n) if signal.name != axis)
+    signals += [replace(signal, role=infer_role(signal.name, ""), rate=rate) for signal in parallel]
     others = {name: value for name, value in v.items() if name not in arrays or n not in arrays[name].shape}
     unassigned = list(list_array_signals(others))
     has_frf = any(signal.role == "frf" for signal in unassigned)
@@ -270,14 +271,14 @@ def _has_equal_length(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
     return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
 
 
-def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield vectors of a length, and the columns of matrices as name:1, name:2, ..."""
+def _list_vectors_of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[Signal]:
+    """Yield vectors of a length, and the columns of real arrays and of complex matrices as name:1, name:2, ..."""
     for name, values in arrays.items():
         if values.shape == (n,):
-            yield name, values
-        elif values.ndim == 2 and n in values.shape:
-            columns = values.T if values.shape[0] == n else values
-            yield from ((f"{name}:{i}", column) for i, column in enumerate(columns, 1))
+            yield Signal(name, values)
+        elif n in values.shape and (values.ndim == 2 or not np.iscomplexobj(values)):
+            columns = np.moveaxis(values, values.shape.index(n), -1).reshape(-1, n)
+            yield from (Signal(f"{name}:{i}", column, array=values) for i, column in enumerate(columns, 1))
 
 
 def _is_rising(axis: NDArray[Any]) -> bool:

@@ -5,6 +5,7 @@ import re
 import struct
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -76,7 +77,10 @@ def _read_numpy_file(file: BinaryIO, path: Path) -> Contents:
 
 def read_hdf5(path: Path) -> Contents:
     """Read the data sets of an HDF5 file by their paths; raise DataError for damage or unpacking out of proportion."""
-    return _make_array_contents(read_mat_variables(path))
+    contents = _make_array_contents(read_mat_variables(path))
+    in_file = {id(one.array): one.array.T for one in contents.signals if one.array is not None}  # not as in MATLAB
+    signals = (replace(one, array=in_file.get(id(one.array))) for one in contents.signals)
+    return replace(contents, signals=tuple(signals))
 
 
 def _make_array_contents(variables: Mapping[str, Any]) -> Contents:
@@ -126,8 +130,8 @@ def parse_sep005(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         signals += [] if time is None else [Signal("time", time, "time", "s", record=record)]
     first = channels[0] if channels else {}
     direction, tool = (str(first.get(key, "")) for key in ("direction", "tool"))
-    created, machines = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
-    return Contents(tuple(signals), created=created, direction=direction, tool=tool, machines=machines)
+    created, names = _parse_timestamp(first.get("start_timestamp")), list_distinct_names(groups)
+    return Contents(tuple(signals), created=created, direction=direction, tool=tool, groups=names)
 
 
 def _parse_timestamp(text: object) -> datetime | None:

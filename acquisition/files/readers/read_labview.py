@@ -103,12 +103,12 @@ def read_tdms(path: Path) -> Contents:
         file = TdmsFile.read(path)
         groups = file.groups()
         held = [list(_make_tdms_signals(group.channels(), i)) for i, group in enumerate(groups)]
-        machines = list_distinct_names(group.name for group, signals in zip(groups, held, strict=True) if signals)
+        names = list_distinct_names(group.name for group, signals in zip(groups, held, strict=True) if signals)
         created = [_get_tdms_start(channel) for group in groups for channel in group.channels()]
     except Exception as error:
         fault = f"damaged or truncated file ({type(error).__name__}: {error})"
         raise DataError(f"{path}: {fault}. Export the file again.") from error
-    return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), machines=machines)
+    return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), groups=names)
 
 
 def _make_tdms_signals(channels: list[Any], record: int) -> Iterator[Signal]:

@@ -184,26 +184,46 @@ def read_pulse(path: Path) -> Contents:
     blocks = _find_pulse_blocks(lines)
     pairs = (line.partition(":") for line in (lines.texts[: blocks[0][0]] if blocks else []))
     header = {key.strip().lower(): value.strip() for key, _, value in pairs if value.strip()}
-    try:
-        is_complex, n = header["data type"].lower() == "complex", int(header["x-axis size"])
-        form, sign = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2)), header["decimal symbol"]
-    except (KeyError, ValueError) as error:
-        raise DataError(f"{path}: no rows, or the header lacks {error}. Export the file again.") from error
-    signals = list[Signal]()
+    if not blocks:
+        raise DataError(f"{path}: no rows of numbers. Export the file again.")
+    signals, notes = list[Signal](), tuple[str, ...]()
+    n = _get_pulse_row_count(path, header)
+    if n is None:
+        n, notes = blocks[0][1] - blocks[0][0], ("no X-axis size in the header, so missing rows cannot be detected",)
     for record, (first, after) in enumerate(blocks):
-        columns = layout.read_columns(lines[first:after], form, str(path), sign)
+        columns = _read_pulse_block(path, lines[first:after], header)
         n_there = min(column.values.size for column in columns)
         if n_there != n:
             place = f"{path}: line {lines.numbers[after - 1]}"
             raise DataError(f"{place}: truncated file, {n_there} of {n} rows. Export the file again.")
-        axis, *parts = (column.values for column in columns)
-        function = np.asarray(parts[0] + 1j * parts[1]) if is_complex else parts[0]
-        flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
-        name, unit = header.get("title", "function"), header.get("amplitudeunit", "")
-        over = header.get("x-axis unit", "")
-        signals.append(Signal("abscissa", axis, infer_role("", over), over, record=record, flaws=columns[0].flaws))
-        signals.append(Signal(name, function, _infer_pulse_role(header, unit), unit, record=record, flaws=flaws))
-    return Contents(tuple(signals), created=_parse_pulse_date(header))
+        signals += _make_pulse_signals(columns, header, record)
+    return Contents(tuple(signals), created=_parse_pulse_date(header), notes=notes)
+
+
+def _get_pulse_row_count(path: Path, header: Mapping[str, str]) -> int | None:
+    """Return the number of rows of a block, None if the header does not state it; DataError if it is no number."""
+    stated = header.get("x-axis size")
+    if stated is not None and not stated.isdecimal():
+        raise DataError(f"{path}: X-axis size {stated!r} is not a number. Export the file again.")
+    return None if stated is None else int(stated)
+
+
+def _read_pulse_block(path: Path, rows: NumberedLines, header: Mapping[str, str]) -> list[Column]:
+    """Read the abscissa and the one or two numbers of a value; two also where the header does not state the type."""
+    width = len(rows.texts[0].rstrip().split("\t"))
+    is_complex = header.get("data type", "complex" if width > 3 else "real").lower() == "complex"
+    form = layout.RowLayout("\t", (1, 2, 3) if is_complex else (1, 2))
+    return layout.read_columns(rows, form, str(path), header.get("decimal symbol", ""))
+
+
+def _make_pulse_signals(columns: Sequence[Column], header: Mapping[str, str], record: int) -> Iterator[Signal]:
+    axis, *parts = (column.values for column in columns)
+    function = np.asarray(parts[0] + 1j * parts[1]) if len(parts) > 1 else parts[0]
+    flaws = {i: flaw for column in columns[1:] for i, flaw in column.flaws.items()}
+    name, unit = header.get("title", "function"), header.get("amplitudeunit", "")
+    over = header.get("x-axis unit", "")
+    yield Signal("abscissa", axis, infer_role("", over), over, record=record, flaws=columns[0].flaws)
+    yield Signal(name, function, _infer_pulse_role(header, unit), unit, record=record, flaws=flaws)
 
 
 def _find_pulse_blocks(lines: NumberedLines) -> list[tuple[int, int]]:

@@ -13,10 +13,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
-from acquisition import DataError, Description, Recording, TapTest
+from acquisition import DataError, Description, Recording, Remark, TapTest
 from acquisition.file_io import make_folder
 from acquisition.files.tap_file import encode_tap, round_as_stored
-from lobewatch.logbook.recordings.recorded_files import MachineContext, parse_context, read_tap_bytes, read_tap_test
+from lobewatch.logbook.recordings.recorded_files import (
+    MachineContext,
+    parse_context,
+    read_source,
+    read_tap_bytes,
+    read_tap_test,
+)
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measurement.hit_remarks import format_unused_hits
 from lobewatch.measurement.share_work import Workers, share_work
@@ -38,6 +44,15 @@ class InterpretedFile(NamedTuple):
     """Fitted modes."""
 
 
+class HitCount(NamedTuple):
+    """Number of hits of a tap test."""
+
+    found: int
+    """Number of hits found, with those that cannot be used; 0 for an FRF."""
+    used: int
+    """Number of averaged hits."""
+
+
 class TapDraft(NamedTuple):
     """Tap file made from a recorded file."""
 
@@ -55,6 +70,10 @@ class TapDraft(NamedTuple):
     """Defaults assumed for facts that the file does not state."""
     unused_hits: str = ""
     """Hits that are not averaged, in words. Empty if all are."""
+    hit_count: HitCount = HitCount(0, 0)
+    """Number of hits found and used."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on hits and files that are left out."""
 
 
 class FileRequest(NamedTuple):
@@ -76,7 +95,7 @@ class FileRequest(NamedTuple):
         """Read the file."""
         description = replace(description, force=description.force and description.force.absolute())
         try:
-            return cls(file.absolute(), file.read_bytes(), description, machine_toml)
+            return cls(file.absolute(), read_source(file, description), description, machine_toml)
         except OSError as error:
             return cls(file.absolute(), b"", description, machine_toml, explain_file_error(file, error))
 
@@ -92,6 +111,8 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
         and all(isinstance(text, str) for text in (*answer.assumed_facts, answer.unused_hits))
+        and answer.hit_count.used == len(tap.accepted) <= len(tap.hits) <= answer.hit_count.found
+        and all(isinstance(remark, Remark) for remark in answer.remarks)
     )
 
 
@@ -114,7 +135,7 @@ def work_on_files(
 
     `is_valid` checks an answer of a worker. `finish` completes a result in this process.
     """
-    if workers.use_other_processes:
+    if workers.use_other_processes and not description.hit_files:
         toml = folder.toml_text
         requests = (FileRequest.of(file, description, toml) for file in files)
 
@@ -126,7 +147,7 @@ def work_on_files(
         return
     for file in files:
         try:
-            yield finish(work(MachineContext.of(folder), file, description, file.read_bytes(), file))
+            yield finish(work(MachineContext.of(folder), file, description, read_source(file, description), file))
         except (DataError, OSError, ValueError) as error:
             yield explain_file_error(file, error)
 
@@ -156,8 +177,9 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     tap, recording, fit = interpret_content(context, file, description, content, at)
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
-    unused = format_unused_hits(tap.flags, tap.decisions)
-    return TapDraft(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, defaults, unused)
+    count, unused = HitCount(recording.n_found, len(tap.accepted)), format_unused_hits(tap.flags, tap.decisions)
+    entry, created = TapEntry.of(tap, packed), tap.circumstances.created
+    return TapDraft(digest, packed, entry, created, fit, defaults, unused, count, recording.remarks)
 
 
 def interpret_content(
@@ -170,7 +192,9 @@ def interpret_content(
 
 def prepare_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:
     """Write a recorded file as a tap file with a temporary name. DataError, OSError or ValueError if it is unusable."""
-    return _write_draft(folder, _make_draft(MachineContext.of(folder), file, description, file.read_bytes(), file))
+    return _write_draft(
+        folder, _make_draft(MachineContext.of(folder), file, description, read_source(file, description), file)
+    )
 
 
 def prepare_all_taps(

@@ -1,8 +1,10 @@
 """Find recorded files and read each as a tap test of a machine."""
 
 import glob
+import io
 import re
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -34,6 +36,8 @@ from lobewatch.measurement.clock_questions import is_in_future
 DATE_REQUEST = 'Give the recording date with Description.date 2024-05-01 or Description.date_pattern "%Y%m%d"'
 CHANGING_FILE_TEXT = "file changed while it was read. Wait until the file is completely written."
 """Error of a file that another program still writes."""
+_UNIX_SYSTEM = 3
+"""System of the entries in an archive, the same on every computer (PKWARE APPNOTE 4.4.2)."""
 _DATE_PART_PATTERNS = {
     "%Y": r"\d{4}",
     "%y": r"\d{2}",
@@ -98,6 +102,19 @@ def _find_matching(pattern: str) -> list[Path]:
     return files
 
 
+def read_source(file: Path, description: Description) -> bytes:
+    """Return the content of a recorded file; of several files of one tap test a ZIP archive, always the same bytes."""
+    if not description.hit_files:
+        return file.read_bytes()
+    memory = io.BytesIO()
+    with zipfile.ZipFile(memory, "w") as archive:
+        for number, path in enumerate((file, *description.hit_files), 1):
+            entry = zipfile.ZipInfo(f"{number}/{path.name}")
+            entry.create_system = _UNIX_SYSTEM
+            archive.writestr(entry, path.read_bytes())
+    return memory.getvalue()
+
+
 class MachineContext(NamedTuple):
     """Machine of a recording."""
 
@@ -128,8 +145,9 @@ def read_tap_test(
     """
     before = at.stat()
     recording = inspect_file(at, replace(description, without_force=context.machine.tap.hammer == "none"))
-    after = at.stat()
-    if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns) or after.st_size != len(content):
+    after, is_joined = at.stat(), bool(description.hit_files)
+    is_changed = (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns)
+    if is_changed or (read_source(at, description) != content if is_joined else after.st_size != len(content)):
         raise DataError(f"{file}: {CHANGING_FILE_TEXT}")
     created = _find_date(file, description, recording.created)
     if created is None:
@@ -137,8 +155,8 @@ def read_tap_test(
     _reject_windowed(recording.require_valid())
     about = _build_circumstances(context, recording, description, check_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
-    source = SourceFile(file.name, content)
-    source = source.without_content if has_all_hits(at, recording.hits) else source
+    source = SourceFile(f"{file.stem} and {len(description.hit_files)} more.zip" if is_joined else file.name, content)
+    source = source.without_content if not is_joined and has_all_hits(at, recording.hits) else source
     return _build_tap_test(recording, about, source, description.hit_decisions), recording
 
 

@@ -3,14 +3,16 @@
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import timedelta
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from acquisition import DataError, Description
+from acquisition import DataError, Description, Remark
 from acquisition.errors import join_sentences
 from lobewatch.logbook.recordings import prepare_taps
-from lobewatch.logbook.recordings.prepare_taps import TapDraft
-from lobewatch.logbook.recordings.recorded_files import CHANGING_FILE_TEXT
+from lobewatch.logbook.recordings.prepare_taps import HitCount, TapDraft
+from lobewatch.logbook.recordings.recorded_files import CHANGING_FILE_TEXT, read_source
 from lobewatch.machine import MachineFolder
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import TapFit
@@ -57,6 +59,10 @@ class ReplayOutcome:
     """Fitted modes of the new tap tests, by identity."""
     unused_hits: Mapping[Path, str] = field(default_factory=dict)
     """Hits that are not averaged, in words, for each new file with such hits."""
+    hit_counts: Mapping[str, HitCount] = field(default_factory=dict)
+    """Number of hits found and used in the new tap tests, by identity."""
+    remarks: Sequence[Remark] = ()
+    """Remarks on hits that are left out, and on tap tests of one hit each."""
 
 
 class ReplayPlan(NamedTuple):
@@ -78,11 +84,13 @@ class ReplayPlan(NamedTuple):
         Raises ValueError for decisions on the hits of several files.
         """
         if description.hit_decisions and len(files) > 1:
-            raise ValueError(f"decisions on hits need one file, not {len(files)}. Replay the files one by one.")
+            raise ValueError(
+                f"decisions on hits need one file, not {len(files)}. Replay the files one by one, or give Description.one_test."
+            )
         plan = cls({}, {}, {}, {})
         for file in files:
             try:
-                plan.digests[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+                plan.digests[file] = hashlib.sha256(read_source(file, description)).hexdigest()
             except OSError as error:
                 plan.unread[file] = error
         for tap in reversed(folder.taps()):  # the first one counts
@@ -157,8 +165,27 @@ def store_recordings(
     assumed_facts = list(dict.fromkeys(text for tap in ready for text in tap.assumed_facts))
     fits = {tap.entry.id: tap.fit for tap in ready}
     tap_ids = [used[file] for file in files if file in used]
+    counts = {tap.entry.id: tap.hit_count for tap in ready}
+    remarks = [*chain.from_iterable(tap.remarks for tap in ready), *find_one_hit_tests(ready)]
     unused_hits = {new[tap.digest]: tap.unused_hits for tap in ready if tap.unused_hits}
-    return ReplayOutcome(tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, unused_hits)
+    done = tap_ids, already_stored, [*fits], rejected, assumed_facts, fits
+    return ReplayOutcome(*done, unused_hits, hit_counts=counts, remarks=remarks)
+
+
+MAX_HIT_PAUSE = timedelta(hours=1)
+"""Largest time from one hit of a tap test to the next; chosen."""
+
+
+def find_one_hit_tests(stored: Sequence[TapDraft]) -> list[Remark]:
+    """Return a remark if several tap tests of one hit each follow each other, as the hits of one tap test do."""
+    series = {(tap.entry.tool, tap.entry.direction) for tap in stored}
+    times = sorted(tap.created for tap in stored)
+    is_close = all(later - earlier <= MAX_HIT_PAUSE for earlier, later in pairwise(times))
+    if len(stored) < 2 or len(series) > 1 or not is_close or any(tap.hit_count.found != 1 for tap in stored):
+        return []
+    text = f"{len(stored)} files with one hit each became {len(stored)} tap tests"
+    cure = "If they are hits of one tap test, exclude these tests and replay the files with Description.one_test"
+    return [Remark("one-hit-tests", "", text, cure)]
 
 
 def _prepare_files(

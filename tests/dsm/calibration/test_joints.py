@@ -197,4 +197,4 @@ def test_joints_lie_in_their_intervals_and_third_tools_are_predicted(number: int
     assert np.mean(np.array(found.frequency) < 0.01) > 0.98
     assert np.mean(np.array(found.peak) < 0.05) > 0.95
     assert found.failed == 0
-    assert len(joint) > 1.5 * number
+    assert len(joint) > 1.4 * number

@@ -159,3 +159,13 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
     assert "Description.sensitivity: " in complaint(plain, sensitivity=("10.2 mV/g",))
     mixed = put(tmp_path / "d.csv", "Freq (Hz),Real (V/N),Imag (mV/N)\n" + text)
     assert "'V/N'" in complaint(mixed, sensitivity=("10.2 mV/g",))
+
+
+@pytest.mark.parametrize("heading", ["w", "w [rad/s]", "w [Hz]"])
+def test_a_unit_may_follow_the_name_of_a_column(tmp_path: Path, heading: str) -> None:
+    path = put(tmp_path / "a.txt", f"{heading}\tre\tim\n" + rows(2 * np.pi * F, H.real, H.imag))
+    for column in ("frequency=w [rad/s]", "frequency [rad/s]=w [rad/s]", "frequency [rad/s]=w"):
+        assert is_h(read_frf(path, Description(columns=(column, "real=re [m/N]", "imag=im"))))
+    if heading != "w [rad/s]":  # else it is the heading of the column
+        assert "Description.columns" in complaint(path, columns=("frequency [Hz]=w [rad/s]", "real=re", "imag=im"))
+    assert "Description.columns" in complaint(path, columns=("frequency=v [rad/s]", "real [m/N]=re", "imag=im"))

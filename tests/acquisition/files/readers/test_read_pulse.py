@@ -123,8 +123,29 @@ def test_text_of_pulse(tmp_path: Path, sign: str) -> None:
     cut = put(path, pulse(HEADER, BLOCK[: BLOCK.rindex("\r\n59") + 2]))
     with pytest.raises(DataError, match=r"line \d+: .*58 of 59 rows"):
         inspect_file(cut)
-    with pytest.raises(DataError, match="'x-axis size'"):
-        inspect_file(put(path, pulse({key: HEADER[key] for key in ("Decimal Symbol", "Data Type")}, BLOCK)))
+    with pytest.raises(DataError, match="X-axis size 'many'"):
+        inspect_file(put(path, pulse(HEADER | {"X-Axis size": "many"}, BLOCK)))
+    with pytest.raises(DataError, match="no rows"):
+        inspect_file(put(path, pulse(HEADER)))
+
+
+@pytest.mark.parametrize("absent", [("X-Axis size",), ("X-Axis size", "Data Type"), ("X-Axis size", "Decimal Symbol")])
+def test_text_of_pulse_with_an_incomplete_header(tmp_path: Path, absent: tuple[str, ...]) -> None:
+    header = {key: value for key, value in HEADER.items() if key not in absent}
+    path = put(tmp_path / "a.txt", pulse(header, BLOCK))
+    found = inspect_file(path).require_valid()
+    assert found.frf is not None
+    assert is_h(found.frf)
+    assert any("X-axis size" in fact.value for fact in found.facts if fact.name == "note")
+    bare = {key: value for key, value in header.items() if key in ("Decimal Symbol", "Data Type")}
+    unnamed = put(path, pulse(bare, BLOCK))
+    assert "Description.columns" in complaint(unnamed)
+    assert is_h(read_frf(unnamed, Description(columns=("frequency [Hz]", "frf [m/s^2/N]"))))
+    short = BLOCK[: BLOCK.rindex("\r\n59") + 2]
+    with pytest.raises(DataError, match="58 of 59 rows"):
+        inspect_file(put(path, pulse(header, BLOCK, short)))
+    with pytest.raises(DataError, match=r"line \d+"):
+        inspect_file(put(path, pulse(header, BLOCK[: BLOCK.rindex("\t")])))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-16", "utf-8"])

@@ -100,6 +100,36 @@ def test_a_magnitude_below_zero_is_no_magnitude_but_a_level(tmp_path: Path) -> N
     assert is_h(read_frf(path, Description(columns=("frequency", "db", "phase [deg]"))))
 
 
+@pytest.mark.parametrize(
+    ("heading", "columns", "unit"),
+    [
+        ("f\tAmplitude\tPhase\n", "frequency,db,phase [deg]", "m/N"),
+        ("f\tdB\tPhase\n", "frequency,db,phase [deg]", "m/N"),
+        ("f\tLevel\tAngle in deg\n", "frequency [Hz],db [m/N],phase [deg]", ""),
+        ("", "frequency [Hz],db [m/N],phase [deg]", ""),
+    ],
+)
+def test_a_level_and_a_phase_need_two_commands(tmp_path: Path, heading: str, columns: str, unit: str) -> None:
+    """The first one names the columns and the unit that the second one needs."""
+    path = put(tmp_path / "a.txt", heading + rows(F, LEVEL, DEGREES))
+    asked = complaint(path)
+    assert columns in asked
+    assert ("Description.unit" in asked) == bool(unit)
+    assert is_h(read_frf(path, Description(columns=tuple(columns.split(",")), unit=unit)))
+
+
+def test_a_level_among_other_columns_is_named_by_its_heading(tmp_path: Path) -> None:
+    text = "note\tPhase\tf\tAmplitude\tCoh\n" + rows(F, DEGREES, F, LEVEL, np.ones(F.size))
+    path = put(tmp_path / "a.txt", text)
+    columns = "phase [deg]=Phase,frequency=f,db=Amplitude,coherence=Coh"
+    assert columns in complaint(path)
+    frf = read_frf(path, Description(columns=tuple(columns.split(",")), unit="m/N"))
+    assert is_h(frf)
+    assert frf.coherence is not None
+    radians = "f\tAmplitude\tPhase\n" + rows(F, LEVEL, np.radians(DEGREES))
+    assert "phase [rad]" in complaint(put(path, radians))
+
+
 def test_one_real_column_called_frf_is_asked_about(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "Frequency (Hz),FRF (m/N)\n" + rows(F, np.abs(H), separator=","))
     assert "columns Frequency [Hz], FRF [m/N] (give Description.columns" in complaint(path)

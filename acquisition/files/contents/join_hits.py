@@ -1,0 +1,75 @@
+"""Join hits from several records or files into one tap test."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition.errors import Remark
+from acquisition.hit import Hit
+from acquisition.hits.capture_hits import MIN_LAST_HIT_SHARE
+
+HIT_LEFT_OUT_CODE = "hit-left-out"
+"""Code of the remark on a hit that a tap test is averaged without."""
+_CURE = "Record and export each hit of a tap test once, with the same settings"
+MAX_RATE_DIFFERENCE = 1e-4
+"""Largest relative difference of equal sample rates: that of a rate with five digits."""
+
+
+def make_left_out_remark(place: str, fault: str, cure: str = "") -> Remark:
+    """Make the remark on a hit or a file that a tap test is averaged without."""
+    return Remark(HIT_LEFT_OUT_CODE, place, f"not used: {fault.rstrip('.')}", cure)
+
+
+def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
+    """Join hits, each with its place, and make a remark on each that is left out.
+
+    The sample rate of most hits counts, and so does whether they have a force. Hits shorter than half the median are
+    left out, the others are cut to the shortest. ADC codes are kept if all hits have the same channels.
+    """
+    rate, has_force = _choose_most_frequent_rate(hits), 2 * sum(hit.has_force for hit in hits.values()) >= len(hits)
+    faults = {place: _find_difference(hit, rate, has_force) for place, hit in hits.items()}
+    faults |= _find_repeated(hits)
+    sizes = [hit.acceleration.size for place, hit in hits.items() if not faults[place]]
+    least = MIN_LAST_HIT_SHARE * float(np.median(sizes))
+    for place, hit in hits.items():
+        if hit.acceleration.size < least and not faults[place]:
+            faults[place] = f"{hit.acceleration.size} samples are less than half of the median ({np.median(sizes):g})"
+    used = [hit for place, hit in hits.items() if not faults[place]]
+    remarks = [make_left_out_remark(place, fault, _CURE) for place, fault in faults.items() if fault]
+    n, channels = min(hit.acceleration.size for hit in used), {hit.channels for hit in used}
+    before = {hit.pre_trigger for hit in used}
+    return [_cut(hit, n, before.pop() if len(before) == 1 else 0, len(channels) == 1) for hit in used], remarks
+
+
+def _choose_most_frequent_rate(hits: Mapping[str, Hit]) -> float:
+    rates = [hit.sample_rate for hit in hits.values()]
+    return max(rates, key=lambda rate: sum(_is_same_rate(rate, other) for other in rates))
+
+
+def _is_same_rate(one: float, other: float) -> bool:
+    return abs(one - other) <= MAX_RATE_DIFFERENCE * min(one, other)
+
+
+def _find_difference(hit: Hit, rate: float, has_force: bool) -> str:
+    if not _is_same_rate(hit.sample_rate, rate):
+        return f"sample rate {hit.sample_rate:.6g} Hz differs from the {rate:.6g} Hz of the other hits"
+    if hit.has_force != has_force:
+        return "no force, unlike the other hits" if has_force else "a force, unlike the other hits"
+    return ""
+
+
+def _find_repeated(hits: Mapping[str, Hit]) -> dict[str, str]:
+    """Return the hits that are copies of an earlier one, with this finding."""
+    by_digest: dict[bytes, str] = {}
+    digests = {place: hashlib.sha256(hit.signals.tobytes()).digest() for place, hit in hits.items()}
+    originals = {place: by_digest.setdefault(digest, place) for place, digest in digests.items()}
+    return {place: f"same samples as {first}" for place, first in originals.items() if place != first}
+
+
+def _cut(hit: Hit, n: int, before: int, keeps_codes: bool) -> Hit:
+    part = replace(hit, force=hit.force[:n], acceleration=hit.acceleration[:n], pre_trigger=before, cross_hit=None)
+    if keeps_codes and hit.codes is not None:
+        return replace(part, codes=hit.codes[:, :n])
+    return replace(part, codes=None, channels=hit.channels if keeps_codes else None)

@@ -84,9 +84,8 @@ class ReplayPlan(NamedTuple):
         Raises ValueError for decisions on the hits of several files.
         """
         if description.hit_decisions and len(files) > 1:
-            raise ValueError(
-                f"decisions on hits need one file, not {len(files)}. Replay the files one by one, or give Description.one_test."
-            )
+            cure = "Replay the files one by one, or give Description.one_test."
+            raise ValueError(f"decisions on hits need one file, not {len(files)}. {cure}")
         plan = cls({}, {}, {}, {})
         for file in files:
             try:

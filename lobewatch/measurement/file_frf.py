@@ -41,6 +41,8 @@ class FileFrf:
     """Faults of all hits of the file."""
     decisions: tuple[HitDecision, ...] = ()
     """Decisions of a person on these hits."""
+    places: tuple[str, ...] = ()
+    """File and number of each hit in it, where the hits are of several files; empty otherwise."""
     n_found: int = 0
     """Number of hits found, with those that cannot be used; 0 for an FRF."""
 
@@ -68,7 +70,9 @@ def read_file_frf(
         raise ValueError(f"{finding}. Leave out the number of averages.")
     frf = _average_hits(path, recording.hits, accepted, description)
     facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
-    return replace(frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
+    return replace(
+        frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found, places=recording.places
+    )
 
 
 def _check_phase(path: Path, description: Description) -> str:
@@ -86,7 +90,7 @@ def _check_phase(path: Path, description: Description) -> str:
 def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
     faults = tuple(map(acquisition.check_hit, hits))
     if description.hit_decisions:
-        return _average_decided_hits(path, hits, faults, accepted, description.hit_decisions)
+        return _average_decided_hits(path, hits, faults, accepted, description)
     good = tuple(hit for hit, verdict in zip(hits, faults, strict=True) if not verdict & ~accepted)
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in faults)
     if refused:
@@ -107,19 +111,15 @@ def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, descripti
 
 
 def _average_decided_hits(
-    path: Path,
-    hits: Sequence[Hit],
-    faults: tuple[HitFlags, ...],
-    accepted: HitFlags,
-    decisions: tuple[HitDecision, ...],
+    path: Path, hits: Sequence[Hit], faults: tuple[HitFlags, ...], accepted: HitFlags, description: Description
 ) -> FileFrf:
-    """Average the hits that remain after decisions, of a tap file by its own verdicts on all its hits."""
-    if detect_format(path) is TAP_FORMAT:
+    """Average the hits that remain after decisions, of one tap file by its own verdicts on all its hits."""
+    if detect_format(path) is TAP_FORMAT and not description.hit_files:
         tap = acquisition.read_tap(path)
         hits, faults = tap.hits, tap.flags
-    decisions = add_decisions([found & ~accepted for found in faults], (), decisions)
-    flags = decide_flags([found & ~accepted for found in faults], decisions)
-    frf, used = average_decided_hits(hits, flags)
+    left = [found & ~accepted for found in faults]
+    decisions = add_decisions(left, (), description.hit_decisions)
+    frf, used = average_decided_hits(hits, decide_flags(left, decisions))
     return FileFrf(frf, used, remarks=(*find_hit_remarks(faults, decisions),), faults=faults, decisions=decisions)
 
 

@@ -52,6 +52,8 @@ class FileModes:
     """Decisions of a person on these hits."""
     n_found: int = 0
     """Number of hits found, with those that cannot be used; 0 for an FRF or if unknown."""
+    places: tuple[str, ...] = ()
+    """File and number of each hit in it, where the hits are of several files; empty otherwise."""
 
 
 def fit_file_modes(
@@ -149,7 +151,7 @@ def fit_file_modes(
         windowed += ringing
     remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
     picked = tuple(modal.pick_peaks(frf, band))
-    of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found
+    of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found, file_frf.places
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, *of_hits)
 
 
@@ -163,7 +165,7 @@ def _fit_decay_modes(
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks)
-    of_hits = decays.faults, decays.decisions, decays.n_found
+    of_hits = decays.faults, decays.decisions, decays.n_found, decays.places
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 
 

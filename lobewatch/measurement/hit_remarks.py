@@ -17,10 +17,14 @@ def format_decisions(decisions: Sequence[HitDecision]) -> str:
     return ", ".join(map(str, decisions))
 
 
-def format_unused_hits(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> str:
-    """Return how many hits are averaged, and each other hit with its flags; empty if all are."""
-    flags = decide_flags(faults, decisions)
-    unused = [f"hit {number} ({found.words})" for number, found in enumerate(flags, 1) if found]
+def format_unused_hits(faults: Sequence[HitFlags], decisions: Sequence[HitDecision], places: Sequence[str] = ()) -> str:
+    """Return how many hits are averaged, and each other hit with its flags; empty if all are.
+
+    places: file of each hit and its number there, if the hits are of several files.
+    """
+    flags, of = decide_flags(faults, decisions), [f"{place}: " for place in places] or [""] * len(faults)
+    listed = enumerate(zip(flags, of, strict=True), 1)
+    unused = [f"hit {number} ({place}{found.words})" for number, (found, place) in listed if found]
     return f"{flags.count(HitFlags.OK)} of {len(flags)} hits averaged, without {', '.join(unused)}" if unused else ""
 
 

@@ -191,7 +191,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
     texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
-        *filter(None, [format_unused_hits(file_modes.hits, file_modes.hit_decisions)]),
+        *filter(None, [format_unused_hits(file_modes.hits, file_modes.hit_decisions, file_modes.places)]),
         *map(str, merge_remarks(of_files)),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),

@@ -135,7 +135,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         f"{count} {word}" for word, count in words.items()
     )
     kind = hits if preview.tap.hits else "an FRF"
-    details += filter(None, [format_unused_hits(preview.tap.flags, preview.tap.decisions)])
+    details += filter(None, [format_unused_hits(preview.tap.flags, preview.tap.decisions, recording.places)])
     return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 

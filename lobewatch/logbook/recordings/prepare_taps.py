@@ -177,7 +177,8 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     tap, recording, fit = interpret_content(context, file, description, content, at)
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
-    count, unused = HitCount(recording.n_found, len(tap.accepted)), format_unused_hits(tap.flags, tap.decisions)
+    count = HitCount(recording.n_found, len(tap.accepted))
+    unused = format_unused_hits(tap.flags, tap.decisions, recording.places)
     entry, created = TapEntry.of(tap, packed), tap.circumstances.created
     return TapDraft(digest, packed, entry, created, fit, defaults, unused, count, recording.remarks)
 

@@ -223,6 +223,19 @@ def test_a_tap_file_is_counted_by_all_its_hits(shop: Shop, file: Path) -> None:
     assert [hit["number"] for hit in said["hits"] if hit["used"]] == [1, 2, 4]
 
 
+def test_hits_of_several_files_are_counted_through_and_named_by_file(shop: Shop, file: Path, tmp_path: Path) -> None:
+    rows = file.read_text("utf-8").splitlines()
+    files = [tmp_path / f"hit{number}.csv" for number in range(1, 7)]
+    for number, path in enumerate(files):
+        path.write_text("\n".join([rows[0], *rows[1 + number * N : 1 + (number + 1) * N]]), "utf-8")
+    said = run("replay", shop.path, *files, "--one-test", *DATED, "--accept-hit", f"{CLIPPED}:overload-force")
+    assert said.exit_code == 0
+    assert f"hit{SILENT}.csv" in said.stderr
+    assert f"hit{CLIPPED}.csv" not in said.stderr
+    (tap,) = shop.logbook.taps
+    assert shop.folder.read(tap).accepted[2].force.max() == pytest.approx(read_hits(files[2])[0].force.max())
+
+
 def test_the_report_and_the_replay_name_the_hits(shop: Shop, file: Path) -> None:
     said = run("replay", shop.path, file, *DATED, "--reject-hit", WIDER)
     for number in (WIDER, CLIPPED, SILENT):

@@ -20,6 +20,7 @@ from .estimation.frf_corrections import (
     measure_time_after_hit,
     remove_sensor_mass,
 )
+from .estimation.response_delay import remove_frf_delay, remove_hit_delay
 from .file_io import atomic_write
 from .files.contents.contents import Contents, Description, Fact, Format, Signal
 from .files.contents.recording import Recording
@@ -161,6 +162,8 @@ __all__ = [
     "read_recording",
     "read_tap",
     "read_tap_hits",
+    "remove_frf_delay",
+    "remove_hit_delay",
     "remove_sensor_mass",
     "sanitize_id_part",
     "scan_ports",

@@ -12,6 +12,8 @@ from acquisition.arrays import Complexes, Floats
 from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 
 FrfQuantity = Literal["receptance", "mobility", "accelerance"]
+FRF_UNITS: dict[FrfQuantity, str] = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
+"""Unit of each form of an FRF."""
 
 
 @dataclass(frozen=True, eq=False)

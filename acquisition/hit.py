@@ -63,8 +63,8 @@ class Hit:
         for name in ("force", "acceleration"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, values)
-            bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
-            if bad.size:
+            if not -MAX_SI_VALUE <= np.min(values, initial=0.0) <= np.max(values, initial=0.0) <= MAX_SI_VALUE:
+                bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
                 flaw = describe_invalid_value(values[bad[0]])
                 raise ValueError(f"{name} is {flaw} at {bad.size} samples, first at sample {bad[0]}")
         same = self.force.shape in (self.acceleration.shape, (0,))

@@ -23,6 +23,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -201,10 +202,31 @@ def decode(megabytes: float = 64.0) -> None:
     print(f"decoding: {len(stream) / seconds / 1e6:.0f} MB/s")
 
 
-def ten_records() -> list[NDArray[np.float64]]:
-    """Force and acceleration of ten hits, each of shape (2, n)."""
+def ten_records(length: int = TRIGGER.n_samples) -> list[NDArray[np.float64]]:
+    """Force and acceleration of ten hits, each of shape (2, length)."""
     first = CROSSING - TRIGGER.pre_trigger
-    return [one_period(seed)[:, first : first + TRIGGER.n_samples] for seed in range(AVERAGED)]
+    return [one_period(seed)[:, first : first + length] for seed in range(AVERAGED)]
+
+
+NEW_HIT_LENGTHS = (16_384, 65_536)
+"""Samples of new hits, of which nothing is known from an earlier evaluation."""
+
+
+def races_of_new_hits() -> Iterator[Race]:
+    """Compare H1 and verdicts of new hits, as a file gives them, with the bare transforms of their samples."""
+    for length in NEW_HIT_LENGTHS:
+        batch, size = np.stack(ten_records(length)), f"{AVERAGED} new hits, {length} samples"
+        bare = partial(np.fft.rfft, batch)
+        yield Race(f"H1 and coherence, {size}", partial(_average_new, batch), "numpy rfft only", bare)
+        yield Race(f"hit verdicts, {size}", partial(_check_new, batch), "numpy rfft only", bare)
+
+
+def _average_new(records: NDArray[np.float64]) -> object:
+    return estimate_frf([Hit(force, response, RATE) for force, response in records])
+
+
+def _check_new(records: NDArray[np.float64]) -> object:
+    return [check_hit(Hit(force, response, RATE)) for force, response in records]
 
 
 def races() -> Iterator[Race]:
@@ -212,15 +234,8 @@ def races() -> Iterator[Race]:
     records, size = ten_records(), f"{AVERAGED} hits"
     hits, batch = [Hit(f, a, RATE, TRIGGER.pre_trigger) for f, a in records], np.stack(records)
 
-    def bare() -> object:
-        return np.fft.rfft(batch)
-
-    yield Race(f"H1 and coherence, {size}", lambda: estimate_frf(hits), "numpy rfft only", bare)
-
-    def judged() -> object:
-        return [check_hit(Hit(f, a, RATE)) for f, a in records]
-
-    yield Race(f"hit verdicts, {size}", judged, "numpy rfft only", bare)
+    yield Race(f"H1 and coherence, {size}", lambda: estimate_frf(hits), "numpy rfft only", lambda: np.fft.rfft(batch))
+    yield from races_of_new_hits()
     import pyFRF
 
     whole = pyFRF.FRF(int(RATE), exc_type="f", resp_type="a", fft_len=TRIGGER.n_samples)
@@ -234,7 +249,7 @@ def races() -> Iterator[Race]:
     def checked() -> object:
         return [whole.is_data_ok(f, a) for f, a in records]
 
-    yield Race(f"hit verdicts, {size}", judged, "pyFRF, two checks", checked)
+    yield Race(f"hit verdicts, {size}", partial(_check_new, batch), "pyFRF, two checks", checked)
 
 
 def average() -> None:

@@ -5,6 +5,7 @@ bench_replay.py replay [FILES]      1000 recorded FRFs of 4097 lines as text, re
 bench_replay.py archive FOLDER [N]  makes a folder of 10 000 small tap tests, 500 at a time
 bench_replay.py open FOLDER         what a folder costs when it is opened, added to, checked, shown
 bench_replay.py tap                 size and CPU time of one tap test of ten hits of 2 x 16384 samples
+bench_replay.py hits                CPU of H1 and verdicts of ten new hits, over that of their bare rffts
 """
 
 from __future__ import annotations
@@ -26,9 +27,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_acquisition import races_of_new_hits
 from bench_lobes import textbook
 from numpy.typing import NDArray
-from race import Race
+from race import Race, run
+from threadpoolctl import threadpool_limits
 
 from acquisition import (
     Channel,
@@ -295,6 +298,15 @@ def ten_hits() -> None:
         print(f"replayed from that file: {(other / 'taps' / f'{replayed}.h5').stat().st_size / 1e3:.0f} kB")
 
 
+def new_hits() -> None:
+    """State CPU ratios to the peer, both measured in turns."""
+    with threadpool_limits(1):
+        for race in races_of_new_hits():
+            result = run(race)
+            span = f"({1 / result.most:.1f} to {1 / result.least:.1f})"
+            print(f"{race.question}: {1 / result.times:.1f} {span} times the CPU of {race.peer}", flush=True)
+
+
 def main() -> None:
     what, *rest = sys.argv[1:] or ["--help"]
     if what == "replay":
@@ -305,6 +317,8 @@ def main() -> None:
         opened(Path(rest[0]))
     elif what == "tap":
         ten_hits()
+    elif what == "hits":
+        new_hits()
     else:
         print(__doc__)
 

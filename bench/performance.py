@@ -55,8 +55,9 @@ by that of lobewatch, with its range.
 |---|---|---|---|
 """
 TAIL = """
-The other packages get the true frequencies and a suitable mesh, and none of them computes errors. A hit has 2 x 65536
-samples. sdypy-EMA has order 60, the semi-discretisation 40 intervals. Commands include the start of Python.
+The other packages get the true frequencies and a suitable mesh, and none of them computes errors. Unless stated
+otherwise, a hit has 2 x 65536 samples. sdypy-EMA has order 60, the semi-discretisation 40 intervals. Commands include
+the start of Python.
 [The studies](studies/README.md) have more figures.
 """
 

@@ -5,7 +5,9 @@ from .bands.extraction import Extraction, FittedBand, candidate_frequencies, sta
 from .bands.find_resonances import ConjugateError
 from .edit_modes import edit_modes
 from .fit_modes import decay_spectra, fit_common_modes, fit_decays, fit_modes, modes_from_decays, modes_from_extraction
+from .frequency_series import HitChangeKind
 from .frf_peaks import find_peaks_above_band, find_truncated_peaks, mode_indicator, pick_peaks
+from .hit_changes import HitChange, find_hit_changes
 from .modes.match_modes import ModeMatch, follow_mode, mac, match_modes, predominant_mode
 from .modes.measurement_effects import (
     CommonDelay,
@@ -19,6 +21,7 @@ from .modes.measurement_effects import (
 )
 from .modes.mode import Mode, synthesize_frf
 from .modes.mode_edits import ModeEdits, parse_mode_edits
+from .modes.response_delay import find_delay
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
 from .quality.unexplained_peaks import UnexplainedPeak, find_unexplained_peaks
@@ -29,6 +32,8 @@ __all__ = [
     "CredibleModes",
     "Extraction",
     "FittedBand",
+    "HitChange",
+    "HitChangeKind",
     "MassLoading",
     "Mode",
     "ModeEdits",
@@ -44,6 +49,8 @@ __all__ = [
     "decay_spectra",
     "edit_modes",
     "extract_modes",
+    "find_delay",
+    "find_hit_changes",
     "find_peaks_above_band",
     "find_truncated_peaks",
     "find_unexplained_peaks",

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from acquisition import Frf, Hit, from_accelerance
 from modal.arrays import Complexes, Floats
+from modal.bands.edge_tails import edge_covariance
 from modal.bands.extract_modes import extract_modes
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.residual_analysis import systematic_error
@@ -15,6 +16,7 @@ from modal.fitting.band_fit import BandFit
 from modal.hit_scatter import HitsOfFrf, add_linearity_remarks, decay_covariance, hit_covariances, leave_one_out_frfs
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, change_covariances, ratio_or_zero
 from modal.quality.assess_mode import add_phase_remarks, add_smoothing_remarks, assess_mode
+from modal.quality.quantity_remarks import add_quantity_remarks
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
@@ -48,8 +50,8 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     Raises
     ------
     ValueError
-        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase, and hits
-        with other lines than the FRF or without a pulse.
+        For fewer than 8 usable lines, an FRF of zeros, a conjugated one, one without phase or without any coherence,
+        and hits with other lines than the FRF or without a pulse.
 
     References
     ----------
@@ -99,7 +101,7 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
-    return add_smoothing_remarks(state.frf, add_phase_remarks(rising))
+    return add_quantity_remarks(state.frf, add_smoothing_remarks(state, add_phase_remarks(rising)))
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:
@@ -113,8 +115,9 @@ def modes_from_band(
 ) -> list[Mode]:
     """Return the modes of one band with quality figures; the given covariances are in the order of `BandFit`."""
     fit, beyond = band.fit, systematic_error(band)
-    covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
-    scatter = None if over_hits is None else over_hits + beyond.covariance
+    common = beyond.covariance + edge_covariance(state, band)
+    covariance = fit.covariance * beyond.factor + by_hammer + common
+    scatter = None if over_hits is None else over_hits + common
     freedom, f, p, m = beyond.degrees_of_freedom, band.data.frequency, len(state.frfs), band.height.size
     of, together = f" of {p} FRFs" if p > 1 else "", f", {m} modes together" if m > 1 else ""
     method = f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"

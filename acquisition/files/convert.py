@@ -16,7 +16,7 @@ from acquisition.file_io import atomic_write
 from acquisition.files.contents.contents import Description, format_window
 from acquisition.files.contents.recording import Recording
 from acquisition.files.read_recording import inspect_file, read_frf
-from acquisition.frf import Frf
+from acquisition.frf import FRF_UNITS, Frf
 from acquisition.hit import Hit
 
 
@@ -45,10 +45,6 @@ class ExportLabels:
     def plain_tool(self) -> str:
         """Name of the tool without line ends and semicolons."""
         return " ".join(self.tool.replace(";", ",").split())
-
-
-FRF_UNITS = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
-"""Unit of each form of an FRF."""
 
 
 def convert_to_measured_form(frf: Frf) -> tuple[Complexes, str]:

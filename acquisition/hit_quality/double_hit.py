@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 import scipy
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hits.pulse import Pulse
 
 DOUBLE_HIT_SHARE = 0.025
@@ -129,7 +129,7 @@ def find_second_input(decay: Floats, sample_rate: float, noise: float) -> float 
     if visible.size < MIN_DECAY_SAMPLES:
         return None
     error = _compute_prediction_error(visible)
-    scale = 1.4826 * float(np.median(np.abs(error)))
+    scale = 1.4826 * find_median(np.abs(error))
     span, rise = max(round(ERROR_AVERAGING_TIME * sample_rate), 1), max(round(SECOND_INPUT_RISE_TIME * sample_rate), 1)
     level = np.sqrt(np.convolve(error**2, np.full(span, 1 / span), "valid"))
     if scale == 0 or level.size <= rise:
@@ -156,6 +156,6 @@ def _compute_prediction_error(signal: Floats) -> Floats:
     for _ in range(REWEIGHTING_ROUNDS):
         solution = np.linalg.lstsq(past * weight[:, np.newaxis], now * weight, rcond=None)[0]
         error = now - past @ solution
-        scale = 1.4826 * float(np.median(np.abs(error)))
+        scale = 1.4826 * find_median(np.abs(error))
         weight = 1 / np.maximum(1.0, np.abs(error) / max(2 * scale, 1e-300))
     return error

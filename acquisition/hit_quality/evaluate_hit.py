@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.errors import DataError, join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
@@ -151,7 +151,7 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     Raises
     ------
     DataError
-        If no hit is good; its text has the reasons.
+        If no hit is good; its text has the reasons. If the response of all good hits is constant.
 
     Examples
     --------
@@ -169,6 +169,8 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     if not good:
         reasons = (f"Hit {i} ({verdict.flags.words}): {verdict.text}" for i, verdict in enumerate(verdicts, 1))
         raise DataError(join_sentences(f"no good hit among {len(hits)}", *reasons))
+    if not any(np.ptp(hit.acceleration) for hit in good):
+        raise DataError("the response is constant, so no response was measured. Check the sensor and its cable.")
     return estimate_frf(good) if good[0].has_force else None, tuple(verdict.flags for verdict in verdicts)
 
 
@@ -236,16 +238,27 @@ def _evaluate_overloads(hit: Hit) -> Findings:
 
 def _is_swapped(hit: Hit) -> bool:
     """Return whether the response is one short pulse of one sign while the force swings through both signs."""
-    force, response = hit.force - np.median(hit.force), hit.acceleration - np.median(hit.acceleration)
-    noise = float(np.std(extract_baseline(response, hit.pre_trigger)))
-    sided = min(response.max(), -response.min()) < max(0.1 * np.max(np.abs(response)), 6 * noise)
-    swings = min(force.max(), -force.min()) > 0.3 * np.max(np.abs(force))
-    return bool(sided and swings and _measure_energy_duration(force) > 3 * _measure_energy_duration(response))
+    noise = float(np.std(extract_baseline(hit.acceleration, hit.pre_trigger)))
+    smaller, larger = _measure_swings(hit.acceleration)
+    if smaller >= max(0.1 * larger, 6 * noise):
+        return False
+    smaller, larger = _measure_swings(hit.force)
+    if smaller <= 0.3 * larger:
+        return False
+    force, response = (_measure_energy_duration(signal) for signal in (hit.force, hit.acceleration))
+    return force > 3 * response
+
+
+def _measure_swings(signal: Floats) -> tuple[float, float]:
+    """Return the smaller and the larger of the greatest distances from the median to either side."""
+    middle = find_median(signal)
+    smaller, larger = sorted((float(signal.max()) - middle, middle - float(signal.min())))
+    return smaller, larger
 
 
 def _measure_energy_duration(signal: Floats) -> int:
-    """Count the samples that hold the central 90 % of the energy."""
-    energy = np.cumsum(signal**2)
+    """Count the samples that hold the central 90 % of the energy about the median."""
+    energy = np.cumsum((signal - find_median(signal)) ** 2)
     low, high = np.searchsorted(energy, [0.05 * energy[-1], 0.95 * energy[-1]])
     return int(high - low) + 1
 
@@ -289,7 +302,7 @@ def _evaluate_pulses(hit: Hit, pulse: Pulse) -> Findings:
 def _evaluate_response(hit: Hit) -> Findings:
     """Evaluate only the response: its strength, and whether its decay was hit again."""
     decay, noise = extract_free_decay(hit), measure_rest_noise(hit)
-    peak = float(np.max(np.abs(hit.acceleration - np.median(hit.acceleration))))
+    peak = _measure_swings(hit.acceleration)[1]
     if peak < HIT_FAULTS[HitFlags.TOO_SOFT].limits["noise_ratio"] * noise:
         return _state(HitFlags.TOO_SOFT, "response", peak=peak, noise=noise)
     second = find_second_input(decay, hit.sample_rate, noise)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples, extract_baseline
 
@@ -52,52 +52,55 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
             if count >= MIN_RAIL_SAMPLES:
                 return Overload(rail * channel.scale, count, inferred=False)
         scale = channel.scale * channel.effective_code_step(codes)
-    middle = float(np.median(signal))
+    middle = find_median(signal)
     noise = float(np.std(extract_baseline(signal, count_pre_hit_samples(hit))))
+    above = signal - middle
     for sign in (1, -1):
-        above = sign * (signal - middle)
-        step = abs(scale) or _find_finest_step(above)
-        count = max(_count_flat_top(above, 3 * noise * share + step) for share in FLAT_TOP_SCALES)
-        count = count or (0 if scale else _count_at_rail(above, step))
-        if count >= MIN_RAIL_SAMPLES and above.max() > 0:
-            return Overload(middle + sign * float(above.max()), count, inferred=True)
+        top = float(above.max())
+        step = abs(scale) or _find_finest_step(above, top)
+        halves = [half for share in FLAT_TOP_SCALES if top > 8 * (half := 3 * noise * share + step)]
+        upper = above[above > top - 6 * halves[0]] if halves else above[:0]
+        count = max((_count_flat_top(upper, top, half) for half in halves), default=0)
+        count = count or (0 if scale else _count_at_rail(above, top, step))
+        if count >= MIN_RAIL_SAMPLES and top > 0:
+            return Overload(middle + sign * top, count, inferred=True)
+        above = -above
     return None
 
 
-def _count_flat_top(above: Floats, half: float) -> int:
+def _count_flat_top(upper: Floats, top: float, half: float) -> int:
     """Count the samples of a flat top whose noise stays within +-half of it; 0 where the top is round.
 
     The band below a round maximum of any width holds 1/sqrt(3) of the samples of a band three times as deep. Of a flat
-    top it holds nearly all. Neither can be seen where the signal is not well above its noise.
+    top it holds nearly all. Neither can be seen where the signal is not well above its noise. upper: all samples at
+    most 6 half below the top.
     """
-    top = float(above.max())
-    if top <= 8 * half:
-        return 0
-    inside, deeper = (int(np.count_nonzero(above > top - bands * half)) for bands in (2, 6))
+    inside, deeper = (int(np.count_nonzero(upper > top - bands * half)) for bands in (2, 6))
     flat = inside >= FLAT_TOP_SHARE * deeper and inside >= deeper / np.sqrt(3) + FLAT_TOP_SAMPLES
     return inside if flat else 0
 
 
-def _find_finest_step(above: Floats) -> float:
+def _find_finest_step(above: Floats, top: float) -> float:
     """Return the smallest step between two values, that of the converter; at least that of four written digits."""
-    top = float(above.max())
     for part in (above[:STEP_SEARCH_SAMPLES], above):
-        step = float(np.min(np.diff(np.unique(part)), initial=top))
+        steps = np.diff(np.sort(part))
+        step = float(np.min(steps[steps > 0], initial=top))
         if step <= MIN_STEP_SHARE * top:
             break
     return max(step, MIN_STEP_SHARE * top)
 
 
-def _count_at_rail(above: Floats, step: float) -> int:
+def _count_at_rail(above: Floats, top: float, step: float) -> int:
     """Count the samples at a maximum held three times in a row; 0 where the steps are coarse.
 
     The three steps below the one that holds a round top together hold at least as many samples.
     """
-    equal = above == above.max()
-    in_a_row = np.convolve(equal, np.ones(MIN_RAIL_SAMPLES), "valid").max() >= MIN_RAIL_SAMPLES
-    count = int(np.count_nonzero(equal))
-    near = int(np.count_nonzero(above > above.max() - 3.5 * step))
-    return count if in_a_row and near <= 1.5 * count else 0
+    equal = np.flatnonzero(above == top)
+    span = MIN_RAIL_SAMPLES - 1
+    if not np.any(equal[span:] - equal[:-span] == span):
+        return 0
+    near = int(np.count_nonzero(above > top - 3.5 * step))
+    return equal.size if near <= 1.5 * equal.size else 0
 
 
 MAINS_FREQUENCIES = (50.0, 60.0)
@@ -121,29 +124,51 @@ def fit_mains_hum(hit: Hit, before: int) -> Floats | None:
     quiet, tail = slice(0, before), slice(int((1 - HUM_TAIL_SHARE) * hit.acceleration.size), None)
     if before < MIN_HUM_SAMPLES:
         return None
-    tones = (_fit_tones(hit, mains, quiet, tail) for mains in MAINS_FREQUENCIES)
-    fitting = [tone for tone in tones if all(_is_mostly_tone(tone, hit.acceleration, part) for part in (quiet, tail))]
-    return min(fitting, key=lambda tone: float(np.var((hit.acceleration - tone)[tail])), default=None)
+    hums = [_fit_hum(hit, mains, quiet, tail) for mains in MAINS_FREQUENCIES]
+    fitting = [hum for hum in hums if all(_is_mostly_hum(hum, hit, part) for part in (quiet, tail))]
+    best = min(fitting, key=lambda hum: float(np.var(_subtract_hum(hum, hit, tail))), default=None)
+    return None if best is None else best.compute(hit, slice(None))
 
 
 def is_like_hum(hit: Hit) -> bool:
     """Return whether the last two fifths of the response are mostly harmonics of the mains, proved or not."""
     size = hit.acceleration.size
     last, last_two = slice(int((1 - HUM_TAIL_SHARE) * size), None), slice(int((1 - 2 * HUM_TAIL_SHARE) * size), None)
-    tones = (_fit_tones(hit, mains, last_two) for mains in MAINS_FREQUENCIES)
-    return any(_is_mostly_tone(tone, hit.acceleration, last) for tone in tones)
+    return any(_is_mostly_hum(_fit_hum(hit, mains, last_two), hit, last) for mains in MAINS_FREQUENCIES)
 
 
-def _fit_tones(hit: Hit, mains: float, *parts: slice) -> Floats:
-    """Fit harmonics of a frequency (Hz) to these parts together, and return them over the whole record."""
-    time = (np.arange(hit.acceleration.size) / hit.sample_rate)[:, None]
-    angle = 2 * np.pi * mains * np.arange(1, MAINS_HARMONICS + 1) * time
-    waves = np.hstack([np.cos(angle), np.sin(angle)])
-    known = np.concatenate([waves[part] for part in parts])
+@dataclass(frozen=True, eq=False)
+class _Hum:
+    """Harmonics of a frequency in the response of a hit."""
+
+    mains: float
+    """Frequency (Hz)."""
+    amplitudes: Floats
+    """Amplitudes of the cosines, then of the sines (m/s^2)."""
+
+    def compute(self, hit: Hit, part: slice) -> Floats:
+        """Return the hum in a part of the record (m/s^2)."""
+        return np.asarray(_compute_harmonics(hit, self.mains, part) @ self.amplitudes)
+
+
+def _compute_harmonics(hit: Hit, mains: float, part: slice) -> Floats:
+    """Return cosines and sines of a frequency (Hz) and its harmonics in a part of a record, one per column."""
+    time = np.arange(hit.acceleration.size)[part] / hit.sample_rate
+    waves = np.cumprod(np.exp(2j * np.pi * mains * time)[:, None].repeat(MAINS_HARMONICS, axis=1), axis=1)
+    return np.hstack([waves.real, waves.imag])
+
+
+def _fit_hum(hit: Hit, mains: float, *parts: slice) -> _Hum:
+    """Fit harmonics of a frequency (Hz) and an offset to these parts together."""
+    known = np.concatenate([_compute_harmonics(hit, mains, part) for part in parts])
     columns = np.column_stack([known, np.ones(len(known))])
     values = np.concatenate([hit.acceleration[part] for part in parts])
-    return np.asarray(waves @ np.linalg.lstsq(columns, values, rcond=None)[0][:-1])
+    return _Hum(mains, np.linalg.lstsq(columns, values, rcond=None)[0][:-1])
 
 
-def _is_mostly_tone(tone: Floats, signal: Floats, part: slice) -> bool:
-    return bool(np.var((signal - tone)[part]) <= MAX_UNEXPLAINED_VARIANCE * np.var(signal[part]))
+def _subtract_hum(hum: _Hum, hit: Hit, part: slice) -> Floats:
+    return hit.acceleration[part] - hum.compute(hit, part)
+
+
+def _is_mostly_hum(hum: _Hum, hit: Hit, part: slice) -> bool:
+    return bool(np.var(_subtract_hum(hum, hit, part)) <= MAX_UNEXPLAINED_VARIANCE * np.var(hit.acceleration[part]))

@@ -5,7 +5,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from acquisition.arrays import Floats
+from acquisition.arrays import Floats, find_median
 from acquisition.hit import Hit
 
 PULSE_END_SHARE = 0.05
@@ -47,7 +47,8 @@ def find_pulse(hit: Hit) -> Pulse | None:
         return None
     top = int(np.argmax(hit.force))
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    offset, rms = float(np.mean(quiet)), float(np.std(quiet))
+    offset = float(np.mean(quiet))
+    rms = float(np.sqrt(np.mean((quiet - offset) ** 2)))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None
@@ -88,9 +89,9 @@ def count_pre_hit_samples(hit: Hit) -> int:
 
 def _find_rise(hit: Hit) -> int:
     if not hit.has_force:
-        size = np.abs(hit.acceleration - np.median(hit.acceleration))
+        size = np.abs(hit.acceleration - find_median(hit.acceleration))
         return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
-    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - find_median(hit.force)
     low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
     return int(low[-1]) + 1 if low.size else 0
 

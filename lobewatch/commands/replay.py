@@ -44,8 +44,8 @@ def replay(
     """Store recorded files as tap tests.
 
     All files are checked before the first one is stored, in order of date. If data is missing, an error names the
-    option for the data. An implausible recording is stored with a question. Answer the question with --accept, now or
-    later.
+    option for the data. Repeat an interrupted command to continue after the last stored test. An implausible recording
+    is stored with a question. Answer the question with --accept, now or later.
 
     Examples
     --------
@@ -89,8 +89,11 @@ def replay(
     with publish_on_change(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
-        not_chosen = store_edits(logbook, outcome.tap_ids, edits)
-        unasked = logbook.accept(outcome.tap_ids, codes)
+            not_chosen = store_edits(logbook, outcome.tap_ids, edits)
+            unasked = logbook.accept(outcome.tap_ids, codes)
+            if outcome.new_tap_ids:
+                bar("measure", 0, len(outcome.new_tap_ids))
+                _ = logbook.history
         accepted = [code for code in codes if code not in unasked]
         emit_replay(outcome, logbook, n_files, passed, accepted, as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)

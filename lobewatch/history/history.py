@@ -18,7 +18,7 @@ from lobes import SldHistory, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
-from lobewatch.measurement.hit_remarks import HIT_DECISIONS_CODE
+from lobewatch.measurement.hit_choice import HIT_DECISIONS_CODE
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement

@@ -17,7 +17,7 @@ from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
-from lobewatch.measurement.hit_remarks import format_decisions
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.tool.assembly import MAX_DIRECTION_AGE, Assembly, assemble, predict_assembly

@@ -67,12 +67,20 @@ class Analysis:
     def history(self) -> History:
         """Up-to-date history, oldest tap test first; history.rows is updated where the lock is free."""
         if self._history is None:
-            history = self._cache.read(self.files)
-            rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
-            history = self._history = self._without_doubtful_verdicts(replace(history, rows=rows))
+            history = self._history = self._measure_rows()
             if history.rows:
                 self.stored_verdicts(history.rows[-1].tap_id)
         return self._history
+
+    def _measure_rows(self) -> History:
+        """Return the history with a row for every tap test."""
+        history = self._cache.read(self.files)
+        rows = self.measurements.all_rows(history.rows, self._cache.other_rows, self._cache.reusable)
+        return self._without_doubtful_verdicts(replace(history, rows=rows))
+
+    def save_rows(self) -> None:
+        """Write the rows of all tap tests to history.rows, without new verdicts."""
+        self._cache.store(self._measure_rows())
 
     @property
     def cached_history(self) -> History | None:

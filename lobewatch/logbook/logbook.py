@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from functools import wraps
@@ -23,6 +24,8 @@ from lobewatch.measurement.recording_questions import accept_questions, find_clo
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap
 from modal import ModeEdits
 
+ROW_SAVING_PAUSE = 10
+"""Time from one writing of the rows during a replay to the next, in times of the first; chosen."""
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
 
@@ -73,6 +76,7 @@ class Logbook:
         """Modes fitted elsewhere, by tap test."""
         self._mark, self._cache = folder.change_mark, HistoryCache(folder)
         self._current_analysis: Analysis | None = None
+        self._next_row_saving = 0.0
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -284,12 +288,21 @@ class Logbook:
         """
         with self.folder.locked():
             enter_orphaned_taps(self.folder)  # else an interrupted replay would be stored twice
-            outcome = recordings.store_recordings(self.folder, files, description, **options)
-            self.fits |= outcome.fits
+            outcome = recordings.store_recordings(
+                self.folder, files, description, on_stored=self._remember_fit, **options
+            )
             self._invalidate()
             for tap_id in outcome.already_stored.values():
                 self.decide_hits(tap_id, description.hit_decisions)
         return outcome
+
+    def _remember_fit(self, fit: TapFit, more: bool) -> None:
+        """Remember the fit of a stored tap test. If more follow, now and then write the rows of the history."""
+        self.fits[fit.tap_id], start = fit, time.monotonic()
+        if more and start >= self._next_row_saving:
+            self._invalidate()
+            self.query(Analysis.save_rows)
+            self._next_row_saving = start + (1 + ROW_SAVING_PAUSE) * (time.monotonic() - start)
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
         """Accept questions on tap tests permanently.

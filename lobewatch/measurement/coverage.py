@@ -4,10 +4,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from acquisition import Remark
+from lobewatch.measurement.hit_remarks import HIT_CHANGE_CODES
 
 PEAK_CODE = "peak-not-explained"
 """Code of the remark on a measured peak that the accepted modes do not explain."""
-UNCOVERED_CODES = (PEAK_CODE,)
+UNCOVERED_CODES = (PEAK_CODE, *HIT_CHANGE_CODES.values())
 """Codes of remarks after which no program is stable: only another tap test or better modes end them, no answer does.
 
 To add a reason, put its remark among those of `fit_tap` or `interpret_fit`, about the frequency ("1500 Hz") or empty,

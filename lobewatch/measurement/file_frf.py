@@ -12,7 +12,7 @@ from acquisition.files.tap_file import TAP_FORMAT
 from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
 from acquisition.tap_test import decide_flags
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
-from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.step_times import time_step
 from modal import ConjugateError, pick_peaks
 
@@ -62,6 +62,7 @@ def read_file_frf(
         phase = "" if conjugate else _check_phase(path, description)
         missing = missing_window_text(recording.window, window)
         raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
+    recording.require_measurable()
     if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
@@ -120,7 +121,7 @@ def _average_decided_hits(
     left = [found & ~accepted for found in faults]
     decisions = add_decisions(left, (), description.hit_decisions)
     frf, used = average_decided_hits(hits, decide_flags(left, decisions))
-    return FileFrf(frf, used, remarks=(*find_hit_remarks(faults, decisions),), faults=faults, decisions=decisions)
+    return FileFrf(frf, used, remarks=(*find_choice_remarks(faults, decisions),), faults=faults, decisions=decisions)
 
 
 def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:

@@ -14,7 +14,9 @@ from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
-from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.recording_questions import check_quantity
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from modal import Extraction, Mode, ModeEdits
 
@@ -133,11 +135,11 @@ def fit_file_modes(
         frf = acquisition.correct_windowed_receptance(frf, tau)
     edits = by_hand if tau is None else by_hand.with_window(tau)
 
-    def fit(bare: Frf) -> FrfFit:
+    def fit(bare: Frf, of: Sequence[Hit]) -> FrfFit:
         state = modal.edit_modes(modal.extract_modes([bare], band), edits)
-        return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), mode_edits_remarks(by_hand))
+        return FrfFit(state, tuple(modal.modes_from_extraction(state, [of])), mode_edits_remarks(by_hand))
 
-    extraction, modes, fit_remarks = fit_without_sensor_mass(frf, sensor, fit)
+    frf, hits, (extraction, modes, fit_remarks) = fit_on_time(frf, hits, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
     frf = acquisition.remove_sensor_mass(frf, mass)
     if window is not None:
@@ -149,7 +151,8 @@ def fit_file_modes(
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
-    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *_fit_remarks(modes, frf, band))
+    found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
+    remarks = (*file_frf.remarks, *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
     of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found, file_frf.places
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, *of_hits)
@@ -164,7 +167,7 @@ def _fit_decay_modes(
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
-    remarks = (*decays.remarks, *fit_remarks)
+    remarks = (*decays.remarks, *fit_remarks, *find_hit_remarks(decays.hits, band))
     of_hits = decays.faults, decays.decisions, decays.n_found, decays.places
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 
@@ -210,7 +213,9 @@ def check_modes_together(modes: Sequence[Mode]) -> list[Remark]:
     list of Remark
         Remarks on wrong signs and on a common delay.
     """
-    remarks = []
+    remarks: list[Remark] = []
+    if check_quantity(modes) is not None:
+        return remarks
     if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
         text = "stiffness K is negative for all modes, because hammer or sensor is mounted or wired in reverse"
         remarks.append(Remark("sign-swapped", "", text, "Reverse the sensor, or change the sign of its sensitivity"))

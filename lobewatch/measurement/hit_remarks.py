@@ -1,58 +1,97 @@
-"""Remarks on the choice of the averaged hits: decisions of a person, overloads among them, and hits not needed."""
+"""Remarks on modes that change from hit to hit of one tap test."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from acquisition import HitDecision, HitFlags, Remark
-from acquisition.tap_test import decide_flags
+import numpy as np
 
-HIT_DECISIONS_CODE = "hits-by-hand"
-"""Code of the remark on decisions on hits; it is about all of them."""
-HIT_DECISION_CODES = (HIT_DECISIONS_CODE, "hits-overloaded")
-"""Codes of the remarks that follow from decisions on hits."""
-OVERLOAD_FLAGS = HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+import modal
+from acquisition import Hit, HitFlags, Remark
+from modal import HitChange, HitChangeKind
+
+MIN_UNCOVERED_SPREAD = 0.25
+"""Spread of a frequency over the hits from which its states limit cuts differently (damping ratios).
+
+Below it, the limit of the worst state is above 0.9 of that of the mean at 95 % of the speeds (docs/studies/modal.md).
+"""
+SMALL_CHANGE_CODE = "hits-differ-slightly"
+"""Code of a change from hit to hit that hardly moves a limit."""
+HIT_CHANGE_CODES = {
+    HitChangeKind.DRIFT: "hits-drift",
+    HitChangeKind.FORCE: "hits-follow-force",
+    HitChangeKind.TWO_STATES: "hits-two-states",
+    HitChangeKind.SCATTER: "hits-scatter",
+    HitChangeKind.PARTIAL: "mode-in-some-hits",
+}
+"""Code of a change from hit to hit that moves limits, by its kind."""
+REMEDIES = {
+    HitChangeKind.DRIFT: "Let the spindle warm up, then tap again",
+    HitChangeKind.FORCE: "Check joints and clamping, and give all hits the same force",
+    HitChangeKind.TWO_STATES: "Check the clamping, clamp the tool again, and tap again",
+    HitChangeKind.SCATTER: "Check the clamping, and hit the same point in the same direction",
+    HitChangeKind.PARTIAL: "Look for loose parts, and hit the same point in the same direction",
+}
+"""Remedy of a change from hit to hit, by its kind."""
 
 
-def format_decisions(decisions: Sequence[HitDecision]) -> str:
-    """Return decisions on hits in words; empty without any."""
-    return ", ".join(map(str, decisions))
+MIN_INCONSISTENT_HITS = 2
+"""Fewest hits that differ from the mean and are compared as well; chosen: one may be a slip of the hammer."""
 
 
-def format_unused_hits(faults: Sequence[HitFlags], decisions: Sequence[HitDecision], places: Sequence[str] = ()) -> str:
-    """Return how many hits are averaged, and each other hit with its flags; empty if all are.
+def find_hit_remarks(
+    hits: Sequence[Hit], band: tuple[float, float] | None = None, flags: Sequence[HitFlags] = ()
+) -> Iterator[Remark]:
+    """Yield a remark on each kind of change over the hits of a tap test, at its most flexible mode.
 
-    places: file of each hit and its number there, if the hits are of several files.
+    band: frequencies of interest (Hz), None for all. flags: faults of each hit, empty if all are accepted.
     """
-    flags, of = decide_flags(faults, decisions), [f"{place}: " for place in places] or [""] * len(faults)
-    listed = enumerate(zip(flags, of, strict=True), 1)
-    unused = [f"hit {number} ({place}{found.words})" for number, (found, place) in listed if found]
-    return f"{flags.count(HitFlags.OK)} of {len(flags)} hits averaged, without {', '.join(unused)}" if unused else ""
+    low, high = band or (0.0, np.inf)
+    changes = [change for change in _find_changes(hits, flags) if low <= change.frequency <= high]
+    for kind in dict.fromkeys(change.kind for change in changes):
+        of_kind = [change for change in changes if change.kind is kind]
+        is_small = max(change.relative_spread for change in of_kind) < MIN_UNCOVERED_SPREAD
+        if not (is_small and kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
+            yield _make_remark(of_kind, is_small)
 
 
-def find_hit_remarks(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> list[Remark]:
-    """Return the remarks on the averaged hits of a tap test.
+def _find_changes(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> list[HitChange]:
+    """Return the changes over the accepted hits, or over these and the hits that differ from their mean.
 
-    Parameters
-    ----------
-    faults
-        Faults of each hit, before the decisions.
-    decisions
-        Decisions on hits that count.
-
-    Returns
-    -------
-    list of Remark
-        Remarks on decisions, on accepted overloads, and on good hits that were not needed.
+    The mean is that of the first hits: of two states, all hits in the other one are rejected. Of these hits only what
+    repeats counts, and no mode that they miss.
     """
-    remarks = []
-    if decisions:
-        remarks.append(Remark(HIT_DECISIONS_CODE, format_decisions(decisions), "hits chosen by the user"))
-    accepted = [decision for decision in decisions if decision.decision == "accept"]
-    if clipped := [d.hit for d in accepted if HitFlags.from_codes(d.codes) & OVERLOAD_FLAGS]:
-        numbers = ", ".join(map(str, clipped))
-        text = "the FRF includes accepted hits with overload, so stiffness K and damping may be wrong"
-        cure = "Tap again with softer hits or a larger range to confirm K"
-        remarks.append(Remark("hits-overloaded", f"hit {numbers}", text, cure))
-    if surplus := [f"{number}" for number, flags in enumerate(faults, 1) if flags & HitFlags.SURPLUS]:
-        text = "good but not needed: other hits agree better with the median FRF and force spectrum"
-        remarks.append(Remark("hits-surplus", f"hit {', '.join(surplus)}", text))
-    return remarks
+    accepted = [hit for hit, flag in zip(hits, flags, strict=True) if not flag] if flags else hits
+    if flags.count(HitFlags.INCONSISTENT) < MIN_INCONSISTENT_HITS:
+        return modal.find_hit_changes(accepted)
+    kept = [(hit, flag) for hit, flag in zip(hits, flags, strict=True) if flag in (HitFlags.OK, HitFlags.INCONSISTENT)]
+    good = {i for i, (_, flag) in enumerate(kept) if not flag}
+    changes = modal.find_hit_changes([hit for hit, _ in kept])
+    return [change for change in changes if _repeats(change, good)] or modal.find_hit_changes(accepted)
+
+
+def _repeats(change: HitChange, good: set[int]) -> bool:
+    """Return whether a change is more than rejected hits of their own, or without a mode that all good hits have."""
+    is_only_missing = change.kind is HitChangeKind.PARTIAL and good <= {*change.hits}
+    return change.kind is not HitChangeKind.SCATTER and not is_only_missing
+
+
+def _make_remark(changes: Sequence[HitChange], is_small: bool) -> Remark:
+    """Return the remark on the changes of one kind, the most flexible mode first."""
+    change = changes[0]
+    code = SMALL_CHANGE_CODE if is_small else HIT_CHANGE_CODES[change.kind]
+    others = f", also at {', '.join(f'{other.frequency:.0f}' for other in changes[1:])} Hz" if changes[1:] else ""
+    return Remark(code, f"{change.frequency:.0f} Hz", _describe(change) + others, REMEDIES[change.kind])
+
+
+def _describe(change: HitChange) -> str:
+    name, percent = "f1" if change.is_highest else "frequency", 100 / change.frequency
+    falls = "falls" if change.spread < 0 else "rises"
+    total = f"{abs(change.spread) * percent:.2g} %"
+    if change.kind is HitChangeKind.DRIFT:
+        return f"{name} {falls} by {abs(change.per_hit) * percent:.1g} % per hit, {total} in {change.n_hits} hits"
+    if change.kind is HitChangeKind.FORCE:
+        return f"{name} {falls} by {total} from the softest hit to the hardest"
+    if change.kind is HitChangeKind.TWO_STATES:
+        return f"{name} has two states {total} apart, one in {len(change.hits)} of {change.n_hits} hits"
+    if change.kind is HitChangeKind.SCATTER:
+        return f"{name} differs by up to {total} from hit to hit"
+    return f"mode present in only {len(change.hits)} of {change.n_hits} hits"

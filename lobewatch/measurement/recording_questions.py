@@ -73,11 +73,24 @@ STIFFNESS_OFF_MODEL = RecordingQuestion(
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
 A real spindle is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
+WRONG_QUANTITY = RecordingQuestion("wrong-quantity")
+"""Asked if the modes show another quantity than stated."""
+WRONG_UNIT = RecordingQuestion("wrong-unit")
+"""Asked if the modes show a wrong unit or sensitivity."""
 EMULATED_DEVICE = RecordingQuestion(
     "emulated-device", sentence="recorded from an emulated device, but other tap tests of this machine are real"
 )
 """Asked of an emulated tap test in a machine with real ones."""
-MODE_QUESTIONS = (FREQUENCY_JUMP, NO_MODE_IN_BAND, OTHER_BAND, NO_MODE_TO_FOLLOW, STIFFNESS_JUMP, STIFFNESS_OFF_MODEL)
+MODE_QUESTIONS = (
+    FREQUENCY_JUMP,
+    NO_MODE_IN_BAND,
+    OTHER_BAND,
+    NO_MODE_TO_FOLLOW,
+    STIFFNESS_JUMP,
+    STIFFNESS_OFF_MODEL,
+    WRONG_QUANTITY,
+    WRONG_UNIT,
+)
 RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
@@ -122,6 +135,13 @@ def no_mode_remark(modes: Sequence[Mode], machine: Machine) -> Remark:
     place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
     peaks = f"modes found: {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "no modes found"
     return NO_MODE_IN_BAND.ask(place=place, peaks=peaks)
+
+
+def check_quantity(modes: Iterable[Mode]) -> Remark | None:
+    """Return the question about the quantity or the unit of a recording, from the remarks on its modes, or None."""
+    codes = (WRONG_QUANTITY.code, WRONG_UNIT.code)
+    asked = (remark for mode in modes for remark in mode.remarks if remark.code in codes)
+    return next((replace(remark, about="") for remark in asked), None)
 
 
 def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:

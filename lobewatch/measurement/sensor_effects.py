@@ -1,10 +1,18 @@
-"""Correct FRFs for sensor mass, and extract modes from decays without force."""
+"""Correct FRFs for sensor mass and delay, and extract modes from decays without force."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import modal
-from acquisition import Frf, Hit, Remark, extract_free_decay, remove_sensor_mass
+from acquisition import (
+    Frf,
+    Hit,
+    Remark,
+    extract_free_decay,
+    remove_frf_delay,
+    remove_hit_delay,
+    remove_sensor_mass,
+)
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from modal import Extraction, Mode, Trust
 
@@ -49,6 +57,26 @@ def fit_without_sensor_mass(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf]
     modes = tuple(modal.with_mass_uncertainty(mode, bare, sensor.mass_std) for mode in modes)
     remark = Remark("sensor-mass-removed", "", f"{_format_sensor_mass(sensor)} removed from the FRF")
     return FrfFit(state, modes, (*remarks, remark, *_mounting_remarks(modes, bare, sensor)))
+
+
+def fit_on_time(
+    frf: Frf, hits: tuple[Hit, ...], sensor: SensorLoading, fit: Callable[[Frf, Sequence[Hit]], FrfFit]
+) -> tuple[Frf, tuple[Hit, ...], FrfFit]:
+    """Fit an FRF without the sensor mass and without a delay of the response.
+
+    Returns FRF and hits without the delay, and the fit.
+    """
+    found = fit_without_sensor_mass(frf, sensor, lambda bare: fit(bare, hits))
+    credible = [mode for mode in found.modes if modal.assess_trust(mode) is not Trust.REJECTED]
+    delay = modal.find_delay(found.extraction.frf, credible)
+    if delay is None:
+        return frf, hits, found
+    frf, hits = remove_frf_delay(frf, delay), tuple(remove_hit_delay(hit, delay) for hit in hits)
+    found = fit_without_sensor_mass(frf, sensor, lambda bare: fit(bare, hits))
+    text = f"response is {1e3 * abs(delay):.3g} ms {'late' if delay > 0 else 'early'}: delay removed from the FRF"
+    cure = "Record force and response with the same trigger and the same filters"
+    remark = Remark("response-delay-removed", "", text, cure)
+    return frf, hits, found._replace(remarks=(*found.remarks, remark))
 
 
 def _mass_not_removed_remark(sensor: SensorLoading, why: str) -> Remark:

@@ -117,7 +117,7 @@ def connect_cluster(address: str) -> Iterator[WorkerPool]:
         except (CancelledError, OSError) as error:
             if isinstance(error, OSError) and client.status == "running":
                 raise
-            raise DataError(f"{option}: connection to the scheduler lost. Nothing was stored.") from error
+            raise DataError(f"{option}: connection to the scheduler lost. Repeat the command.") from error
 
 
 def _wait_for_workers(client: Any, address: str) -> None:
@@ -217,8 +217,8 @@ def _start_processes(count: int) -> Iterator[WorkerPool]:
         with ProcessPoolExecutor(count, get_context("spawn")) as executor:
             yield WorkerPool(executor, count, lambda future: future.result())
     except BrokenProcessPool as error:
-        text = f"one of the {count} processes was killed and nothing was stored"
-        raise DataError(f"{text}. Try again with fewer Workers.jobs.") from error
+        text = f"one of the {count} processes was killed"
+        raise DataError(f"{text}. Repeat the command with fewer Workers.jobs.") from error
 
 
 _task_lock = threading.Lock()

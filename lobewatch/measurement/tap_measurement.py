@@ -4,20 +4,21 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
 import modal
-from acquisition import CROSS_TAP, Frf, Remark, TapTest
+from acquisition import CROSS_TAP, Frf, Hit, Remark, TapTest
 from dsm import Calibration, calibrate, format_rounded, modal_stiffness
 from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import PEAK_CODE, find_uncovered
 from lobewatch.measurement.exponential_window import hidden_window_remarks
+from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.measurement.hit_remarks import find_hit_remarks
-from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_without_sensor_mass
+from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits
 
@@ -109,25 +110,28 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
     about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
-    remarks = (*find_hit_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
+    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
+            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.decided_flags))
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-                said = (*remarks, *edited, *decay_remarks(machine.tap.sensor))
+                said = (*remarks, *edited, *decay_remarks(machine.tap.sensor), *changes)
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
-            fitted = fit_without_sensor_mass(tap.frf, machine.tap.sensor, lambda frf: _fit_frf(frf, tap, by_hand))
-            windows = hidden_window_remarks(tap.accepted, fitted.modes)
-            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows), frf=fitted.extraction.frf)
+            fit = partial(_fit_frf, by_hand=by_hand)
+            *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
+            further = (*fitted.remarks, *hidden_window_remarks(tap.accepted, fitted.modes), *changes)
+            asked = (questions.check_quantity(fitted.modes),)
+            return TapFit(*named, fitted.modes, (*remarks, *further, *filter(None, asked)), frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
 
 
-def _fit_frf(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> FrfFit:
+def _fit_frf(frf: Frf, hits: Sequence[Hit], by_hand: ModeEdits) -> FrfFit:
     state, remarks = _apply_edits(modal.extract_modes([frf]), by_hand)
-    return FrfFit(state, tuple(modal.modes_from_extraction(state, [tap.accepted])), remarks)
+    return FrfFit(state, tuple(modal.modes_from_extraction(state, [hits])), remarks)
 
 
 def _apply_edits(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
@@ -164,7 +168,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
 
 def _coverage_remarks(fit: TapFit, trusted: CredibleModes, machine: Machine) -> Iterator[Remark]:
     """Yield a remark on each measured peak in [mode] band_hz that the accepted modes do not explain."""
-    if fit.frf is None:
+    if fit.frf is None or (questions.check_quantity(fit.modes) is not None and not trusted.modes):
         return
     low, high = machine.mode.band_hz or (0.0, np.inf)
     for peak in modal.find_unexplained_peaks(fit.frf, trusted.modes):

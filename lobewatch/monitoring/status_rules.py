@@ -215,6 +215,7 @@ STATUS_RULES = (
     *(FREQUENCY_WARNING, DOUBTFUL_DECAY),
     *_rules_of("frequency-jump"),
     MODE_LOST,
+    *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "tap-in-future"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),

@@ -47,6 +47,7 @@ def encode_tap_state(state: TapState) -> str:
         "hits": [_hit_json(hit) for hit in state.hits],
         "mean_change": _round_finite(state.mean_change),
         "settled": state.settled,
+        "hit_change": state.hit_change and {"code": state.hit_change.code, "text": str(state.hit_change)},
         "levels": [_round_finite(level) for level in state.levels] if state.levels else None,
         "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
         "outcome": outcome

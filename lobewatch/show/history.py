@@ -15,7 +15,7 @@ from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
-from lobewatch.measurement.hit_remarks import format_decisions
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 from lobewatch.show.terminal.sentences import wrap_lines

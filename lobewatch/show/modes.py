@@ -10,7 +10,7 @@ from acquisition import Fact, HitDecision, HitFlags, Remark, merge_remarks
 from acquisition.tap_test import decide_flags
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
-from lobewatch.measurement.hit_remarks import format_unused_hits
+from lobewatch.measurement.hit_choice import format_unused_hits
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
 from modal import Mode, Trust, assess_trust, trust_rules
 
@@ -132,7 +132,8 @@ def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
 
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
     """Return the modes without a driving point, and the rules by which modes are doubtful or rejected."""
-    elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
+    opposed = (mode for mode in modes if any(remark.code == "not-driving-point" for remark in mode.remarks))
+    elsewhere = [f"{mode.frequency:.0f} Hz" for mode in opposed]
     lines = [f"not at a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in (Trust.DOUBTFUL, Trust.REJECTED):
         alike = (mode for mode in modes if assess_trust(mode) is trust)

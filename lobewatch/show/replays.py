@@ -1,5 +1,6 @@
 """Show replays, replay previews and rebuilds, with their progress."""
 
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
@@ -17,7 +18,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.recordings.prepare_taps import HitCount
 from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
 from lobewatch.logbook.replay_preview import ReplayPreview
-from lobewatch.measurement.hit_remarks import format_decisions, format_unused_hits
+from lobewatch.measurement.hit_choice import format_decisions, format_unused_hits
 from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
 from lobewatch.show.measurement import measurement_json, measurement_texts
 from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, hits_json, mode_json, sort_modes
@@ -25,20 +26,26 @@ from lobewatch.show.programs.verdicts import program_texts, verdict_json
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, emit, new_table, notes, remark_lines
 from modal import Mode
 
-REPLAY_STEP_NAMES = {"read": "reading", "store": "storing", "measure": "evaluating"}
+REPLAY_STEP_NAMES = {"read": "reading", "store": "fitting and storing", "measure": "evaluating"}
 """Names of the steps of a replay."""
+FIRST_LINE_DELAY, LINE_INTERVAL = 0.5, 2.0
+"""Time before the first line of progress and from line to line (s); chosen."""
 
 
 class ReplayProgress(Progress):
-    """Progress bar of each step of a replay, shown on a terminal only."""
+    """Progress of each step of a replay: bars on a terminal, else lines."""
 
     def __init__(self) -> None:
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         super().__init__(*columns, console=notes, transient=True, disable=not notes.is_terminal)
         self._step_ids: dict[str, TaskID] = {}
+        self._next_line = time.monotonic() + FIRST_LINE_DELAY
 
     def __call__(self, step: str, done: int, of: int) -> None:
-        """Update the bar of a step: so many files are done, of so many."""
+        """Show the progress of a step: so many files are done, of so many."""
+        if self.disable and of and time.monotonic() >= self._next_line:
+            notes.print(f"{REPLAY_STEP_NAMES[step]}: {done} of {count_noun(of, 'file')} done", markup=False)
+            self._next_line = time.monotonic() + LINE_INTERVAL
         if step not in self._step_ids:
             self._step_ids[step] = self.add_task(REPLAY_STEP_NAMES[step], total=of)
         self.update(self._step_ids[step], completed=done, total=of)

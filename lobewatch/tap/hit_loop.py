@@ -12,6 +12,7 @@ from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, Hi
 from acquisition.errors import join_sentences
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.tap.device_connection import (
     LEVEL_WINDOW,
     DeviceConnection,
@@ -241,6 +242,17 @@ class TapPhases:
             plots = None
         self._publisher.show(plots=plots)
 
+    def _show_hit_change(self) -> None:
+        """Show how a mode changes over the good hits, nothing if that cannot be computed."""
+        if not self._guided:
+            return
+        try:
+            tap, band = self._tap, self._folder.machine.mode.band_hz
+            change = next(find_hit_remarks(tap.hits, band, tap.decided_flags), None)
+        except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without it
+            change = None
+        self._publisher.show(hit_change=change)
+
     def _verdict_age(self, sample_rate: float) -> float:
         """Return how long the verdict has been shown (s), inf if none is."""
         return float("inf") if self._verdict_at is None else (self._scan_count - self._verdict_at) / sample_rate
@@ -264,6 +276,8 @@ class TapPhases:
         if not verdict.flags and (outlier := self._tap.recheck_first_hits()) is not None:
             number, now = outlier
             self._show_taken_out(now.flags, f"Hit {number + 1} differs from the other hits and is excluded. {now.text}")
+        else:
+            self._show_hit_change()
 
     def _undo(self, means: str = "") -> None:
         if (number := self._tap.undo()) is not None:
@@ -295,6 +309,7 @@ class TapPhases:
         word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
         self._publisher.show(**self._tap.shown, word=word, verdict=flags.words, trial=False, reason=reason)
         self._show_curves(self._tap.hits[-1])
+        self._show_hit_change()
 
 
 def _run_guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:

@@ -186,7 +186,7 @@ class TapSession:
 
     def _finish(self, in_progress: TapInProgress) -> TapTest:
         """Average, commit and evaluate the test."""
-        self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None)
+        self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None, hit_change=None)
         tap = in_progress.finish()
         self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from acquisition import HitFlags
+from acquisition import HitFlags, Remark
 from lobewatch.arrays import Floats
 
 
@@ -169,6 +169,8 @@ class TapState(LiveState):
     """Relative change of the mean by the last good hit (-). None for fewer than 2."""
     settled: bool = False
     """True if the mean has converged. The required number of hits still applies."""
+    hit_change: Remark | None = None
+    """Most flexible mode that changes from hit to hit, with the remedy. None if the good hits show none."""
     levels: tuple[float | None, float] | None = None
     """RMS of force (N, None if not measured) and acceleration (m/s^2) over the last 50 ms."""
     checks: tuple[Check, ...] = ()

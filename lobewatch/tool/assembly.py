@@ -16,7 +16,7 @@ from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.coverage import label_direction
-from lobewatch.measurement.hit_remarks import HIT_DECISION_CODES
+from lobewatch.measurement.hit_choice import HIT_DECISION_CODES
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
 from lobewatch.measurement.spindle_model import build_model_state

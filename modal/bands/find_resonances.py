@@ -66,15 +66,17 @@ class Resonance:
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 
 
-def find_resonances(frf: Frf) -> list[Resonance]:
+def find_resonances(frf: Frf, least_share: float = 0.0) -> list[Resonance]:
     """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
     The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
     r - 1/r = -+ 2 zeta. Peaks are searched line by line and then in ever longer running means of the complex
     mobility, which reveals a wide mode that noise hides from single lines. Two modes with no dip between
-    them are one peak. A mode much narrower than the line spacing is not found.
+    them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
+    mobility are ignored, which saves time.
 
-    Raises ValueError for fewer than 8 lines, an FRF of zeros, and one without phase; ConjugateError.
+    Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
+    ConjugateError.
     """
     n = frf.frequency.size
     if n < MIN_FRF_LINES:
@@ -83,8 +85,11 @@ def find_resonances(frf: Frf) -> list[Resonance]:
         )
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
+    if frf.coherence is not None and not np.any(frf.coherence):
+        found = "the coherence is 0 on every line, so the response does not come from the hammer"
+        raise ValueError(f"{found}. Check the cables of hammer and sensor.")
     frf = remove_drift(frf)
-    peaks = _find_peaks_at_all_scales(frf)
+    peaks = _find_peaks_at_all_scales(frf, least_share * float(np.max(np.abs(frf.mobility))))
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
             "the FRF is real on every line, so the phase is missing. "
@@ -167,8 +172,7 @@ def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> l
     floor = np.maximum(MIN_PEAK_TO_NOISE * noise, max(least, faintest))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
     tops = tops[_has_deep_valleys(size, tops)]
-    lowest = float(size.min())
-    saddle = np.array([_higher_saddle(size, int(top), lowest) for top in tops])
+    saddle = _higher_saddles(size, tops)
     clear = saddle <= size[tops] * 10 ** (-MIN_PEAK_PROMINENCE_DB / 20)
     high = tops[clear & (size[tops] - saddle > MIN_PEAK_TO_NOISE * noise[tops])]
     return [_measure_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
@@ -187,15 +191,30 @@ def _has_deep_valleys(size: Floats, tops: Indices) -> Flags:
     return ~shallow
 
 
-def _higher_saddle(size: Floats, top: int, lowest: float) -> float:
-    """Return the higher of the two saddles between a peak and higher values, or the lowest value of all."""
-    return max(_lowest_before_higher_value(side, lowest) for side in (size[top::-1], size[top:]))
+NEAR_LINES = 32
+"""Number of lines behind a peak that are searched for a higher value before all: of most peaks it is near."""
 
 
-def _lowest_before_higher_value(side: Floats, lowest: float) -> float:
-    """Return the lowest value between side[0] and the next higher one, or the lowest of all if none is higher."""
-    higher = int(np.argmax(side > side[0]))
-    return float(side[:higher].min()) if higher else lowest
+SEARCHED_LINES = (512, 4096, None)
+"""Numbers of lines that are searched then, the last one all."""
+
+
+def _higher_saddles(size: Floats, tops: Indices) -> Floats:
+    """Return for each peak the higher of the two saddles before higher values; without one, the lowest value of all."""
+    before = _lowest_before_higher_values(size[::-1], size.size - 1 - tops)
+    return np.maximum(before, _lowest_before_higher_values(size, tops))
+
+
+def _lowest_before_higher_values(size: Floats, tops: Indices) -> Floats:
+    """Return the lowest value from each peak to the next higher value, or the lowest of all if none is higher."""
+    near = np.append(size, np.full(NEAR_LINES, -np.inf))[tops[:, np.newaxis] + np.arange(NEAR_LINES + 1)]
+    higher = (near > near[:, :1]).argmax(axis=1)
+    lowest = np.minimum.accumulate(near, axis=1)[np.arange(tops.size), np.maximum(higher - 1, 0)]
+    for i in np.flatnonzero(higher == 0).tolist():
+        side = size[tops[i] :]
+        end = next((end for n in SEARCHED_LINES if (end := int((side[:n] > side[0]).argmax()))), 0)
+        lowest[i] = side[:end].min() if end else size.min()
+    return np.asarray(lowest)
 
 
 def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> Resonance:

@@ -87,7 +87,9 @@ def fit_peaks(data: BandData, resonances: Sequence[Resonance]) -> FittedBand | N
     height = np.array([r.height for r in resonances])
     fits = [_fit_valid_modes(data, starts, height, MIN_RESIDUAL_TERMS)]
     if fits[0] is None or fits[0][1].size < height.size or _residual_share(fits[0][0], data) > MAX_DIRECT_FIT_RESIDUAL:
-        fits.append(_fit_valid_modes(data, _nearest_poles(data, resonances, starts), height, MIN_RESIDUAL_TERMS))
+        nearest = _nearest_poles(data, resonances, starts)
+        if not np.array_equal(nearest, starts):
+            fits.append(_fit_valid_modes(data, nearest, height, MIN_RESIDUAL_TERMS))
     bands = [FittedBand(data, tuple(resonances), fit[1], fit[0], MIN_RESIDUAL_TERMS) for fit in fits if fit is not None]
     return max(bands, key=lambda band: (band.height.size, -band.fit.sum_of_squares), default=None)
 

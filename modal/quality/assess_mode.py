@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition import Frf, Remark, is_smoothed
+from acquisition import Remark, is_smoothed
 from modal.bands.extraction import FIXED_MODE, Extraction, FittedBand
 from modal.bands.fit_peaks import MAX_PEAK_FIT_ERROR
 from modal.bands.frf_lines import mean_coherence
 from modal.bands.residual_analysis import residual_near_mode
+from modal.bands.window_shape import has_hann_shape
 from modal.fitting.band_fit import MIN_RESIDUAL_TERMS
 from modal.modes.measurement_effects import common_delay
 from modal.modes.mode import UNKNOWN_PHASE_STD_DEG, Mode, add_remark, change_covariances, mode_remark, ratio_or_zero
@@ -178,14 +179,35 @@ def _add_phase_remark(mode: Mode, expected: float) -> Mode:
     return add_remark(mode, "complex-mode", text, cure)
 
 
-def add_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
-    """Add a remark to the narrow modes of an FRF if its lines were smoothed."""
-    step = float(np.mean(np.diff(frf.frequency)))
-    narrow = [mode.damping_ratio * mode.frequency < MIN_SMOOTHED_HALF_WIDTH_LINES * step for mode in modes]
-    if not any(narrow) or not is_smoothed(frf):
+def add_smoothing_remarks(state: Extraction, modes: Sequence[Mode]) -> list[Mode]:
+    """Add a remark to narrow modes if the lines were smoothed, and an error of zeta under a Hann window."""
+    frf, step = state.frf, float(np.mean(np.diff(state.frf.frequency)))
+    lines = [mode.damping_ratio * mode.frequency / step for mode in modes]
+    if min(lines, default=np.inf) >= MIN_SMOOTHED_HALF_WIDTH_LINES:
         return [*modes]
+    has_window = has_hann_shape(frf, [resonance for band in state.bands for resonance in band.resonances])
+    if not has_window and not is_smoothed(frf):
+        return [*modes]
+    cause = "a record under a Hann window" if has_window else "a smoothed FRF"
     effect = "zeta is a few percent too large, stiffness K too small"
-    text = f"half-width of the peak is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines of a smoothed FRF: {effect}"
-    cure = "Export the FRF again without smoothing or window"
-    pairs = zip(modes, narrow, strict=True)
-    return [add_remark(mode, "smoothed-lines", text, cure) if is_narrow else mode for mode, is_narrow in pairs]
+    text = f"half-width of the peak is below {MIN_SMOOTHED_HALF_WIDTH_LINES:g} lines of {cause}: {effect}"
+    return [
+        _smoothed_mode(mode, half_width if has_window else np.inf, text)
+        if half_width < MIN_SMOOTHED_HALF_WIDTH_LINES
+        else mode
+        for mode, half_width in zip(modes, lines, strict=True)
+    ]
+
+
+SMOOTHING_ERROR = 2 / 3
+"""Standard error of zeta by a Hann window, over zeta, times the square of the half-width (lines).
+
+The lines H/2 + (H(f - d) + H(f + d))/4 are H + d^2 H''/4 to second order: a fit finds zeta too large by 0.65 of it.
+"""
+
+
+def _smoothed_mode(mode: Mode, half_width: float, text: str) -> Mode:
+    """Return a narrow mode with the remark and the error of zeta by a window; half_width in lines, infinite without."""
+    off = np.diag([0.0, SMOOTHING_ERROR * mode.damping_ratio / half_width**2, 0.0])
+    wider = change_covariances(mode, lambda own: own + off**2)
+    return add_remark(wider, "smoothed-lines", text, "Export the FRF again without smoothing or window")

@@ -34,9 +34,9 @@ MAX_MISFIT_RATIO = 2.0
 """Residual rms over noise rms above which the residual is more than noise."""
 MIN_MISFIT_SHARE = 0.01
 """Residual rms over the peak from which a misfit counts."""
-DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines")
+DOUBTFUL_REMARK_CODES = ("bent-by-neighbour", "several-modes", "smoothed-lines", "wrong-quantity", "wrong-unit")
 """Codes of remarks that make a mode doubtful."""
-COMMON_REMARK_CODES = ("smoothed-lines",)
+COMMON_REMARK_CODES = ("smoothed-lines", "wrong-quantity", "wrong-unit")
 """Codes of remarks on all FRFs of a structure, for which a match in another FRF proves nothing."""
 
 
@@ -207,14 +207,19 @@ def _opposed_mode_remark(mode: Mode, largest: float) -> Remark:
     return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 
 
+STIFFNESS_CAUSE_CODES = ("wrong-quantity", "wrong-unit")
+"""Codes of remarks that explain an implausible stiffness."""
+
+
 def _rejection_remark(mode: Mode) -> Remark | None:
     """Return the reason why a mode is not credible; None if it is."""
     at = f"{mode.frequency:.4g} Hz"
     stiffness = stiffness_remark(mode.stiffness) if mode.has_stiffness else None
+    cause = next((remark for remark in mode.remarks if remark.code in STIFFNESS_CAUSE_CODES), stiffness)
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
         reasons.append("peak cut off at the edge of the fitted band")
     if reasons:
         text = f"mode not used, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, REJECTED_MODE_REMEDY)
-    return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, stiffness.cure)
+    return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, (cause or stiffness).cure)

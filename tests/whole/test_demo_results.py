@@ -73,7 +73,7 @@ MEANT = {
     "B": "B: slot at 6 200 rpm",
     "BEAM": "acceleration.lvm",
 }
-ORDINATES = ("natural frequency", "bearing stiffness", "limiting depth ap", "Re")
+ORDINATES = ("natural frequency", "bearing stiffness", "limiting depth ap", "receptance")
 """Names of the pictures of the report."""
 PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt", *(f"report {y}" for y in ORDINATES))
 SMALLER = 3

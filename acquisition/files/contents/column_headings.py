@@ -122,7 +122,8 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
     """Return the signals with the roles and units that `Description.columns` gives them, in its order, only these.
 
     "time [s]" names the next column, "frf [m/N]=H1" or "frf=H1 [m/N]" the signal of this name, heading, unit or number,
-    "frf=H:2" the second column of H. Without `columns` all signals are left as they are.
+    "frf=H:2" the second column of H. A unit replaces unit and quantity of the file. Without `columns` all signals stay
+    as they are.
     """
     named, columns = list[Signal](), report.description.columns
     if not columns:
@@ -140,10 +141,11 @@ def assign_columns(signals: tuple[Signal, ...], report: ImportReport) -> tuple[S
         if role is None:
             report.reject("columns", repr(text), f"heading {word!r} is not one of {', '.join(COLUMN_ROLES)}")
         elif signal is not None and role[0] != "ignored":
+            quantity = role[1] or ("" if unit else signal.quantity)
             unit = infer_decibel_unit(word, unit or signal.unit)
             if any(signal.values is other.values for other in named):
                 report.reject("columns", repr(text), f"column {signal.name} is named twice")
-            named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
+            named.append(replace(signal, role=role[0], quantity=quantity, unit=unit, record=0))
     return tuple(named)
 
 

@@ -33,6 +33,9 @@ ANY_COLUMNS_EXAMPLE = (
 )
 """Example of the columns of either hits or an FRF."""
 
+MIN_MODE_LINES = 4
+"""Fewest lines of an FRF with a mode: with complex constant, mass and spring it has eight real unknowns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -79,6 +82,14 @@ class Recording:
         """Return this recording; raise DataError with all missing facts and faults."""
         if self.problems:
             raise DataError(f"{self.path}: {self.problems}")
+        return self
+
+    def require_measurable(self) -> Recording:
+        """Return this recording; raise DataError as `require_valid`, and for an FRF of too few lines for any mode."""
+        frf = self.require_valid().frf
+        if frf is not None and frf.frequency.size < MIN_MODE_LINES:
+            found = f"the FRF has {frf.frequency.size} lines, but one mode needs at least {MIN_MODE_LINES}"
+            raise DataError(f"{self.path}: {found}. Export more frequency lines.")
         return self
 
 

@@ -9,7 +9,7 @@ from typing import get_args
 
 import numpy as np
 
-from acquisition.arrays import Complexes, Floats
+from acquisition.arrays import Complexes, Floats, Indices
 from acquisition.files.contents.column_headings import ANGLE_UNITS, is_decibel
 from acquisition.files.contents.contents import (
     Contents,
@@ -20,6 +20,7 @@ from acquisition.files.contents.contents import (
     has_same_axis,
 )
 from acquisition.files.contents.resolve_unit import choose_signal, resolve_frf_unit
+from acquisition.files.contents.two_sided import find_lower_half
 from acquisition.files.contents.units import MOTION_QUANTITIES, parse_unit
 from acquisition.frf import Frf, FrfQuantity, from_accelerance
 
@@ -63,12 +64,34 @@ def resolve_frf(contents: Contents, report: ImportReport) -> Frf | None:
     if frequency is None or values is None or unit is None or not report.is_clean:
         return None
     first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
-    shares = None if shares is None else shares[first:]
+    kept = _keep_lower_half(frequency, values, report)[first:]
+    shares = None if shares is None else shares[kept]
     try:
-        return _make_frf(frequency[first:], values[first:] * unit[1], shares, n_averages, FRF_FORM_BY_MOTION[unit[0]])
+        with np.errstate(invalid="ignore"):  # infinite values
+            frf = _make_frf(frequency[kept], values[kept] * unit[1], shares, n_averages, FRF_FORM_BY_MOTION[unit[0]])
     except ValueError as error:
-        report.add_fault(str(error))
+        report.add_fault(str(error), "Correct the file, or export the FRF again")
         return None
+    _check_response(frf, report)
+    return frf if report.is_clean else None
+
+
+def _keep_lower_half(frequency: Floats, values: Complexes, report: ImportReport) -> Indices:
+    """Return the lines to use: the lower half of a two-sided FRF, else all."""
+    kept = find_lower_half(frequency, values)
+    if kept.size < frequency.size:
+        used = f"only {kept.size} lines up to {frequency[kept[-1]]:.6g} Hz used"
+        report.add_fact("FRF", f"two-sided, {used} (the others are the mirror image)", "default")
+    return kept
+
+
+def _check_response(frf: Frf, report: ImportReport) -> None:
+    """Report an FRF without any response to the force."""
+    if not np.any(frf.receptance):
+        report.add_fault("the FRF is zero on every line", "Check the sensor and its cable")
+    elif frf.coherence is not None and not np.any(frf.coherence):
+        found = "coherence is 0 on every line, so the response does not come from the hammer"
+        report.add_fault(found, "Check the cables of hammer and sensor, or omit the coherence with Description.columns")
 
 
 def _make_frf(

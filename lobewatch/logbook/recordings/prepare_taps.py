@@ -24,7 +24,7 @@ from lobewatch.logbook.recordings.recorded_files import (
     read_tap_test,
 )
 from lobewatch.machine import MachineFolder, TapEntry
-from lobewatch.measurement.hit_remarks import format_unused_hits
+from lobewatch.measurement.hit_choice import format_unused_hits
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 
@@ -189,6 +189,15 @@ def interpret_content(
     """Interpret the content of a file; `at` is the path where this content can be read."""
     tap, recording = read_tap_test(context, file, description, content, at)
     return InterpretedFile(tap, replace(recording, path=file), fit_tap(round_as_stored(tap), context.machine))
+
+
+def check_files(folder: MachineFolder, files: Sequence[Path], description: Description) -> Iterator[datetime | str]:
+    """Read each file as a tap test without a fit. Yield its date, or the reason why it cannot be used."""
+    return work_on_files(folder, files, description, Workers(), _read_date, lambda *_: True)
+
+
+def _read_date(context: MachineContext, file: Path, description: Description, content: bytes, at: Path) -> datetime:
+    return read_tap_test(context, file, description, content, at)[0].circumstances.created
 
 
 def prepare_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:

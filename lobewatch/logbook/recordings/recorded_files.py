@@ -152,7 +152,7 @@ def read_tap_test(
     created = _find_date(file, description, recording.created)
     if created is None:
         raise DataError(f"{file}: {join_sentences(recording.problems or 'no recording date', DATE_REQUEST)}")
-    _reject_windowed(recording.require_valid())
+    _reject_windowed(recording.require_measurable())
     about = _build_circumstances(context, recording, description, check_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
     source = SourceFile(f"{file.stem} and {len(description.hit_files)} more.zip" if is_joined else file.name, content)

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import timedelta
+from datetime import datetime, timedelta
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -36,6 +36,8 @@ def _join_file_names(files: list[str]) -> str:
 
 ProgressCallback = Callable[[str, int, int], None]
 """Callback for progress: step ("read", "store", "measure"), number of finished files, and of all."""
+StoredCallback = Callable[[TapFit, bool], None]
+"""Callback for each stored tap test: its fit, and whether more tap tests follow."""
 
 LOCAL_WORKERS = Workers()
 """Workers of a replay without other processes."""
@@ -109,10 +111,12 @@ def store_recordings(
     workers: Workers = LOCAL_WORKERS,
     keep_going: bool = False,
     progress: ProgressCallback = lambda _what, _done, _of: None,
+    on_stored: StoredCallback = lambda _fit, _more: None,
 ) -> ReplayOutcome:
     """Store recorded files as tap tests, each once and oldest first. Call it under the lock.
 
-    All files are read and evaluated before the first one is stored.
+    All files are checked before the first one is stored. Each tap test is stored as soon as it is fitted, so an
+    interrupted call keeps the stored ones, and the next call continues.
 
     Parameters
     ----------
@@ -128,6 +132,8 @@ def store_recordings(
         Whether usable files are stored if others are rejected.
     progress
         Callback for progress.
+    on_stored
+        Callback for each stored tap test.
 
     Returns
     -------
@@ -137,7 +143,7 @@ def store_recordings(
     Raises
     ------
     DataError
-        If a file cannot be used. Nothing is stored then.
+        If a check finds a file that cannot be used. Nothing is stored then.
     """
     prepare_taps.remove_prepared_files(folder)
     digests, unread, stored, new = ReplayPlan.of(folder, files, description)
@@ -146,16 +152,20 @@ def store_recordings(
     rejected = {file: prepare_taps.explain_file_error(file, error) for file, error in unread.items()}
     try:
         if len(files) > 1 or workers.scheduler:
-            ready, faults = _prepare_files(folder, new, description, workers, progress)
+            dates, faults = _check_files(folder, new, description, progress)
+            rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
+            if rejected and not (keep_going and len(rejected) < len(files)):
+                why = {file: rejected[file] for file in files if file in rejected}
+                raise DataError(format_rejections(why, len(files)))
+            oldest_first = {digest: new[digest] for digest in sorted(dates, key=dates.__getitem__)}
+            results = prepare_taps.prepare_all_taps(folder, [*oldest_first.values()], description, workers)
         else:
-            ready, faults = [prepare_taps.prepare_tap(folder, file, description) for file in new.values()], {}
+            oldest_first = new
+            results = (prepare_taps.prepare_tap(folder, file, description) for file in new.values())
+        ready, faults = _store_each(folder, oldest_first, results, progress, on_stored)
         rejected |= {file: faults[digest] for file, digest in digests.items() if digest in faults}
-        if rejected and not (keep_going and len(rejected) < len(files)):
-            raise DataError(format_rejections({file: rejected[file] for file in files if file in rejected}, len(files)))
-        ready.sort(key=lambda tap: tap.created)
-        if ready:
-            folder.commit_files({prepare_taps.prepared_path(folder, tap): tap.entry for tap in ready})
-            progress("store", len(ready), len(ready))
+        if rejected and len(rejected) == len(files):
+            raise DataError(format_rejections(rejected, len(files)))
     finally:
         prepare_taps.remove_prepared_files(folder)
     ids = stored | {tap.digest: tap.entry.id for tap in ready}
@@ -187,21 +197,43 @@ def find_one_hit_tests(stored: Sequence[TapDraft]) -> list[Remark]:
     return [Remark("one-hit-tests", "", text, cure)]
 
 
-def _prepare_files(
-    folder: MachineFolder, new: dict[str, Path], description: Description, workers: Workers, progress: ProgressCallback
+def _check_files(
+    folder: MachineFolder, new: dict[str, Path], description: Description, progress: ProgressCallback
+) -> tuple[dict[str, datetime], dict[str, str]]:
+    """Return the date of each usable file and the reason for each other one, by digest."""
+    dates, faults = dict[str, datetime](), dict[str, str]()
+    progress("read", 0, len(new))
+    checks = prepare_taps.check_files(folder, [*new.values()], description)
+    for number, (digest, result) in enumerate(zip(new, checks, strict=True), 1):
+        if isinstance(result, str):
+            faults[digest] = result
+        else:
+            dates[digest] = result
+        progress("read", number, len(new))
+    return dates, faults
+
+
+def _store_each(
+    folder: MachineFolder,
+    new: dict[str, Path],
+    results: Iterable[TapDraft | str],
+    progress: ProgressCallback,
+    on_stored: StoredCallback,
 ) -> tuple[list[TapDraft], dict[str, str]]:
-    """Prepare files by digest. Return the reason for each unusable file too."""
-    ready, faults = list[TapDraft](), dict[str, str]()
-    results = zip(new, prepare_taps.prepare_all_taps(folder, [*new.values()], description, workers), strict=True)
-    for number, (digest, result) in enumerate(results, 1):
+    """Store each tap test as soon as it is prepared. Return the reason for each file that changed meanwhile too."""
+    stored, faults = list[TapDraft](), dict[str, str]()
+    progress("store", 0, len(new))
+    for number, (digest, result) in enumerate(zip(new, results, strict=True), 1):
         if isinstance(result, str):
             faults[digest] = result
         elif result.digest != digest:
             faults[digest] = CHANGING_FILE_TEXT
         else:
-            ready.append(result)
-        progress("read", number, len(new))
-    return ready, faults
+            folder.commit_files({prepare_taps.prepared_path(folder, result): result.entry})
+            stored.append(result)
+            on_stored(result.fit, number < len(new))
+        progress("store", number, len(new))
+    return stored, faults
 
 
 def format_rejections(rejected: Mapping[Path, str], n: int, *, stored: bool = False) -> str:

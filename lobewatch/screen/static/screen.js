@@ -23,7 +23,7 @@ function showState(next) {
   put("device", state.device);
   put("good", String(state.good));
   put("wanted", String(state.wanted));
-  put("reason", state.reason);
+  put("reason", state.reason || (state.hit_change?.text ?? ""));
   showWord(state.kind, state.word.replaceAll(", ", "\n"));
   showGuide();
   showMean();

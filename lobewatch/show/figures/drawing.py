@@ -77,11 +77,11 @@ def _disable_math_text(figure: Figure) -> None:
         axis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
 
 
-def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Return a figure of this size (inches) with rows of axes, one above the other."""
+def new_axes(rows: int, size: tuple[float, float], first_ratio: float = 1.0) -> tuple[Figure, list[Axes]]:
+    """Return a figure of this size (inches) with rows of axes, the first one higher by a ratio."""
     with mpl.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
+        axes = figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=[first_ratio, *[1.0] * (rows - 1)])
     return figure, list(axes[:, 0])
 
 

@@ -1,6 +1,7 @@
 """Plot measured modes and the spindle model."""
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -14,7 +15,17 @@ from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook import ModelFigureData
 from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
-from modal import Extraction, Mode, Trust, assess_trust, candidate_frequencies, stabilisation_charts
+from lobewatch.show.figures.response_drawing import compute_phase, mark_unexplained, set_coherence_axis, set_phase_axis
+from modal import (
+    Extraction,
+    Mode,
+    Trust,
+    assess_trust,
+    candidate_frequencies,
+    find_unexplained_peaks,
+    select_credible_modes,
+    stabilisation_charts,
+)
 
 CIRCLES_PER_ROW = 4
 """Number of circles in a row."""
@@ -23,9 +34,15 @@ MAX_CIRCLES = 8
 MIN_LABEL_SPACING = 0.014
 """Smallest distance between labels of close modes (share of the axis)."""
 LEGEND_SHARE = 0.08
-"""Room for the legend below all lines (share of the axis)."""
+"""Room for a row of the legend below all lines (share of the axis)."""
+MAX_TITLE_LETTERS = 90
+"""Largest number of letters in a line of the title."""
 ORDER_AXIS_TOP = 10.5
 """Upper end of the axis of model orders."""
+SMALL_PART_HEIGHT = 1.2
+"""Height of the phase and of the coherence (inches)."""
+LOWEST_PHASE = -90.0
+"""Lowest phase shown of an accelerance (degrees), far from the 0 to 180 degrees of a driving point."""
 CIRCLE_HALF_WIDTHS = 3.0
 """Range of a circle on either side of its resonance (half-power half-widths)."""
 
@@ -38,20 +55,30 @@ TRUST_MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
 def plot_modes(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
     """Plot the accelerance with its fit and residual, the stabilization chart, and a mobility circle of each mode.
 
-    Stable poles without a mode are labelled. Free decays are shown as the spectrum of the first one, without circles.
+    Phase and coherence are below the accelerance. Triangles mark peaks that the accepted modes do not explain. Stable
+    poles without a mode are labelled. Free decays are shown as the spectrum of the first one, without phase and
+    circles.
     """
     circles = sorted((mode for mode in modes if mode.has_stiffness), key=_circle_rank)[:MAX_CIRCLES]
-    rows = -(-len(circles) // CIRCLES_PER_ROW)
+    rows, is_frf = -(-len(circles) // CIRCLES_PER_ROW), all(mode.has_stiffness for mode in modes)
+    parts = [_draw_phase] if is_frf else []
+    parts += [_draw_coherence] if is_frf and state.frf.coherence is not None else []
+    heights = [3.2, *len(parts) * [SMALL_PART_HEIGHT], 2.2, *rows * [2.4]]
     with mpl.rc_context(FIGURE_STYLE):
-        figure = Figure(figsize=(9.0, 6.0 + 2.4 * rows), layout="constrained")
-        grid = figure.add_gridspec(2 + rows, CIRCLES_PER_ROW, height_ratios=[3.2, 2.2, *rows * [2.4]])
+        figure = Figure(figsize=(9.0, 0.6 + sum(heights)), layout="constrained")
+        grid = figure.add_gridspec(len(heights), CIRCLES_PER_ROW, height_ratios=heights)
         top = figure.add_subplot(grid[0, :])
-        chart = figure.add_subplot(grid[1, :], sharex=top)
+        chart = figure.add_subplot(grid[1 + len(parts), :], sharex=top)
         _draw_accelerance(top, state, modes)
         _draw_stabilization_chart(chart, state, modes)
         for k, mode in enumerate(sorted(circles, key=lambda mode: mode.frequency)):
-            _draw_circle(figure.add_subplot(grid[2 + k // CIRCLES_PER_ROW, k % CIRCLES_PER_ROW]), state, mode)
-    top.set_title(title, pad=10 + 6 * max((len(_mode_label(mode)) for mode in modes), default=0))
+            row = len(heights) - rows + k // CIRCLES_PER_ROW
+            _draw_circle(figure.add_subplot(grid[row, k % CIRCLES_PER_ROW]), state, mode)
+        for row, draw in enumerate(parts, 1):
+            draw(figure.add_subplot(grid[row, :], sharex=top), state)
+    top.set_title(
+        fill(title, MAX_TITLE_LETTERS), pad=10 + 6 * max((len(_mode_label(mode)) for mode in modes), default=0)
+    )
     return figure
 
 
@@ -71,16 +98,37 @@ def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> N
         axes.semilogy(part, fitted, color=Paint.NEWEST, ls="--", label=labels[0])
         axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label=labels[1])
         labels = "", ""
+    is_frf = all(mode.has_stiffness for mode in modes)
+    accepted = select_credible_modes(modes)
+    peaks = find_unexplained_peaks(state.frf, [*accepted.modes, *accepted.opposed]) if is_frf else ()
+    mark_unexplained(axes, peaks, f, np.abs(state.frf.accelerance))
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
     for mode, place in zip(modes, places, strict=True):
         coordinates = ("data", "axes fraction"), "offset points"
         axes.annotate(_mode_label(mode), (place, 1.0), (0, 2), *coordinates, fontsize=8, **VERTICAL_LABEL)
     low, high = axes.get_ylim()
-    is_frf = all(mode.has_stiffness for mode in modes)
     axes.set_ylabel("|accelerance| (m/s²/N)" if is_frf else "|spectrum of a decay| (m/s)")
-    axes.set(xlim=(f[0], f[-1]), ylim=(low * (low / high) ** LEGEND_SHARE, high))
+    rows = 2 if peaks else 1
+    axes.set(xlim=(f[0], f[-1]), ylim=(low * (low / high) ** (rows * LEGEND_SHARE), high))
     axes.tick_params(labelbottom=False)
-    axes.legend(loc="lower right", ncols=3)
+    axes.legend(loc="lower right", ncols=2 if peaks else 3)
+
+
+def _draw_phase(axes: Axes, state: Extraction) -> None:
+    f = state.frf.frequency
+    axes.plot(f, compute_phase(state.frf.accelerance, LOWEST_PHASE), color=Paint.FIRST, lw=0.8)
+    for band in state.bands:
+        fitted = -(state.frf.receptance[band.lines] - state.residual(band)[0])  # phase of the accelerance
+        axes.plot(f[band.lines], compute_phase(fitted, LOWEST_PHASE), color=Paint.NEWEST, ls="--")
+    set_phase_axis(axes, LOWEST_PHASE)
+    axes.tick_params(labelbottom=False)
+
+
+def _draw_coherence(axes: Axes, state: Extraction) -> None:
+    if state.frf.coherence is not None:
+        axes.plot(state.frf.frequency, state.frf.coherence, color=Paint.FIRST, lw=0.8)
+    set_coherence_axis(axes)
+    axes.tick_params(labelbottom=False)
 
 
 def _mode_label(mode: Mode) -> str:

@@ -16,9 +16,20 @@ from lobewatch.machine import LimitsTable
 from lobewatch.measurement import Estimate
 from lobewatch.monitoring.trend import Trend, point_days
 from lobewatch.show.figures.drawing import Paint, new_axes
+from lobewatch.show.figures.response_drawing import (
+    compute_phase,
+    mark_unexplained,
+    set_coherence_axis,
+    set_phase_axis,
+)
+from modal import Mode, UnexplainedPeak, synthesize_frf
 
 FIGURE_WIDTH, TREND_HEIGHT, RESPONSE_HEIGHT = 6.4, 3.4, 1.7
 """Width of figures, heights of a trend and of each part of a frequency response (inches)."""
+AMPLITUDE_RATIO = 1.8
+"""Height of the amplitude over that of the other parts of a frequency response."""
+LOWEST_PHASE = -270.0
+"""Lowest phase shown of a receptance (degrees), far from the 0 to -180 degrees of a driving point."""
 EXCLUDED_VALUE_RANGE = 0.15
 """Largest relative distance of a drawn excluded value from the values in use."""
 FORECAST_SHARE = 0.5
@@ -96,25 +107,39 @@ def make_trend_curve(trend: Trend) -> TrendCurve | None:
     return TrendCurve(np.append(past, forecast.dates[near]), line, forecast.dates[near], low, high)
 
 
-def plot_frf(first: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
-    """Plot real and imaginary part of the receptance and the coherence, of the newest and of the first test."""
-    rows = 2 if now.coherence is None else 3
-    figure, axes = new_axes(rows, (FIGURE_WIDTH, RESPONSE_HEIGHT * rows))
-    tests = [(now, "now", Paint.NEWEST, "-"), *([] if first is None else [(first, "first", Paint.FIRST, "--")])]
-    for frf, label, colour, dashes in tests:
-        inside = frf.in_band(band)
+def plot_frf(
+    first: Frf | None,
+    now: Frf,
+    band: tuple[float, float],
+    modes: Sequence[Mode] = (),
+    unexplained: Sequence[UnexplainedPeak] = (),
+) -> Figure:
+    """Plot amplitude and phase of the receptance and the coherence, of the newest and of the first test.
+
+    modes: accepted modes of the newest test, whose sum is drawn as the fit; unexplained: peaks that they do not
+    explain.
+    """
+    newest = now.in_band(band)
+    rows = 2 if newest.coherence is None else 3
+    figure, axes = new_axes(rows, (FIGURE_WIDTH, RESPONSE_HEIGHT * (rows + AMPLITUDE_RATIO - 1)), AMPLITUDE_RATIO)
+    curves = [(newest, "measured" if first is None else "newest", Paint.NEWEST, "-")]
+    curves += [] if first is None else [(first.in_band(band), "first", Paint.FIRST, "--")]
+    curves += [(synthesize_frf(modes, newest.frequency), "fit: accepted modes", Paint.ALARM, ":")] if modes else []
+    for frf, label, colour, dashes in curves:
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
-        axes[0].plot(inside.frequency, inside.receptance.real * 1e9, **style)
-        axes[1].plot(inside.frequency, inside.receptance.imag * 1e9, **style)
-        if rows == 3 and inside.coherence is not None:
-            axes[2].plot(inside.frequency, inside.coherence, **style)
-    axes[0].set(ylabel="Re (nm/N)")
-    axes[1].set(ylabel="Im (nm/N)")
+        size = np.where(frf.receptance == 0, np.nan, np.abs(frf.receptance))
+        axes[0].semilogy(frf.frequency, size * 1e9, **style)
+        axes[1].plot(frf.frequency, compute_phase(frf.receptance, LOWEST_PHASE), **style)
+        if rows == 3 and frf.coherence is not None:
+            axes[2].plot(frf.frequency, frf.coherence, **style)
+    mark_unexplained(axes[0], unexplained, newest.frequency, np.abs(newest.receptance) * 1e9)
+    axes[0].set(ylabel="receptance (nm/N)")
+    set_phase_axis(axes[1], LOWEST_PHASE)
     if rows == 3:
-        axes[2].set(ylabel="coherence", ylim=(min(0.9, axes[2].get_ylim()[0]), 1.005))
+        set_coherence_axis(axes[2])
     axes[-1].set(xlabel="frequency (Hz)", xlim=band)
-    if first is not None:
-        axes[0].legend(loc="upper right", ncols=2)
+    if len(axes[0].lines) > 1:
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 

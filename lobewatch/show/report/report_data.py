@@ -28,7 +28,7 @@ from lobewatch.tool import Assembly, compute_lobes
 from lobewatch.tool.assembly import compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import compute_limit_band
 from lobewatch.verdicts.setting_robustness import model_softening
-from modal import Mode
+from modal import Mode, UnexplainedPeak, find_unexplained_peaks, select_credible_modes
 
 MAX_LOBE_DIAGRAMS = 24
 """Largest number of tap tests with a lobe diagram."""
@@ -111,6 +111,26 @@ class ReportData:
     def excluded_rows(self) -> Sequence[HistoryRow]:
         """Rows of excluded tap tests of the series."""
         return measure_excluded_taps(self.analysis.folder, self.analysis.files.excluded, self.rows)
+
+    @cached_property
+    def accepted_modes(self) -> Sequence[Mode]:
+        """Accepted modes of the newest tap test, of either sign for a cross FRF."""
+        measurement = self.analysis.measurement(self.last.tap_id)
+        if measurement.cross is not None:
+            return measurement.cross
+        low, high = self.machine.mode.band_hz or (0.0, math.inf)
+        modes = select_credible_modes([mode for mode in measurement.modes if low <= mode.frequency <= high]).modes
+        return modes if all(mode.has_stiffness for mode in modes) else ()
+
+    @cached_property
+    def unexplained_peaks(self) -> Sequence[UnexplainedPeak]:
+        """Measured peaks that these modes do not explain; none of a cross FRF."""
+        measurement = self.analysis.measurement(self.last.tap_id)
+        if measurement.frf is None or measurement.cross is not None:
+            return ()
+        low, high = self.machine.mode.band_hz or (0.0, math.inf)
+        peaks = find_unexplained_peaks(measurement.frf, self.accepted_modes)
+        return [peak for peak in peaks if low <= peak.frequency <= high]
 
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:

@@ -44,9 +44,11 @@ class NumberTable(NamedTuple):
     def from_response(cls, frf: Frf) -> Self:
         """Tabulate a frequency response and its coherence, in no more lines than a figure can show."""
         coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
-        columns = np.column_stack([frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence])
-        step = math.ceil(frf.frequency.size / MAX_FIGURE_LINES)
-        return cls(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], columns[::step].tolist())
+        size, phase = np.abs(frf.receptance) * 1e9, np.degrees(np.angle(frf.receptance))
+        real, imaginary = frf.receptance.real * 1e9, frf.receptance.imag * 1e9
+        columns = np.column_stack([frf.frequency, size, phase, real, imaginary, coherence])
+        heads = ["frequency (Hz)", "receptance (nm/N)", "phase (°)", "Re (nm/N)", "Im (nm/N)", "coherence"]
+        return cls(heads, columns[:: math.ceil(frf.frequency.size / MAX_FIGURE_LINES)].tolist())
 
 
 def _json_value(value: Any) -> Any:

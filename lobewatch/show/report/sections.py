@@ -13,7 +13,7 @@ from acquisition import Channel, merge_remarks
 from dsm import format_with_error
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.measurement.hit_remarks import format_decisions
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
@@ -212,9 +212,14 @@ def make_frequency_response(data: ReportData, style: str) -> list[Section]:
     if newest is None:
         return []
     band = data.response_band(newest)
-    figure = plot_frf(None if first is None else first.frf, newest, band)
+    unexplained = data.unexplained_peaks
+    figure = plot_frf(None if first is None else first.frf, newest, band, data.accepted_modes, unexplained)
     drawing = Drawing.of(figure, NumberTable.from_response(newest.in_band(band)))
-    return [Section("Frequency response", [Paragraph("Receptance at the tool tip.", is_small=True), drawing], style)]
+    text = "Receptance at the tool tip. Fit: sum of the accepted modes."
+    if unexplained:
+        where = ", ".join(f"{peak.frequency:.0f}" for peak in unexplained)
+        text += f" Triangles: peaks that the accepted modes do not explain ({where} Hz)."
+    return [Section("Frequency response", [Paragraph(text, is_small=True), drawing], style)]
 
 
 def make_notes(data: ReportData) -> list[Section]:

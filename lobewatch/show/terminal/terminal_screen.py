@@ -94,6 +94,8 @@ class TapPrinter:
         if state.reason and not is_listed:
             self._console.print(escape(state.reason))
         self._print_hits(state)
+        if state.hit_change and (before.hit_change is None or before.hit_change.code != state.hit_change.code):
+            self._console.print(f"[bold yellow]![/] {escape(str(state.hit_change))}")
 
     def _print_hits(self, state: TapState) -> None:
         for hit in state.hits[self._n_printed :]:
@@ -318,7 +320,7 @@ def _state_lines(state: TapState) -> Iterator[RenderableType]:
     trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
     banner = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     yield Panel(Align.center(banner), style=style, padding=(1, 1))
-    yield Text(with_option_names(state.reason) or " ", "bold")
+    yield Text(with_option_names(state.reason or str(state.hit_change or "")) or " ", "bold")
     if state.outcome is not None:
         yield from _outcome_lines(state.outcome)
         return

@@ -148,6 +148,15 @@ def test_overload_is_certain_by_codes_and_inferred_by_shape() -> None:
         average_good_hits([replace(loud, force=np.minimum(loud.force, 120))])
 
 
+@pytest.mark.parametrize("rest", [0.0, 9.81])
+def test_hits_without_any_response_are_not_averaged(rest: float) -> None:
+    one = hit((200, 0, 0.6e-3))
+    still = replace(one, acceleration=np.full(TIME.size, rest))
+    with pytest.raises(DataError, match="constant"):
+        average_good_hits([still, still])
+    assert average_good_hits([one, still])[0] is not None
+
+
 def test_lost_scans_are_counted_in_the_reason() -> None:
     verdict = evaluate_hit(replace(hit((200, 0, 0.6e-3)), lost_scans=7))
     assert verdict.text.startswith("7 samples ")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,8 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
     frf = noisy()
     state, modes = extract_modes([frf]), fit_modes(frf)
     figure = plot_modes(state, modes, "x")
-    top, chart, *circles = figure.axes
+    top, chart, *others = figure.axes
+    circles = [axes for axes in others if "mobility" in axes.get_title()]
     assert len(circles) == len(modes) == 2
     measured, fitted, left = (np.asarray(line.get_ydata()) for line in top.lines[:3])
     part = state.bands[0].lines
@@ -178,6 +180,31 @@ def test_a_delay_between_the_channels_is_offered_as_skew(skew: float) -> None:
     found = re.search(r"(-?[\d.]+) ± ([\d.]+) us", said.text)
     assert found is not None
     assert float(found[1]) == pytest.approx(1e6 * skew, abs=float(found[2]))
+
+
+def test_figure_draws_phase_coherence_and_the_peaks_that_the_modes_miss() -> None:
+    exact = synthesize_frf([Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, 3.5e7)], LINES)
+    state = extract_modes([replace(exact, coherence=np.full(LINES.size, 0.95), n_averages=5)])
+    modes = modes_from_extraction(state)
+    top, *_, phase, coherence = plot_modes(state, modes, "x").axes
+    assert [line for line in top.lines if line.get_marker() == "v"] == []
+    assert coherence.lines[0].get_ydata() == pytest.approx(0.95)
+    measured, fitted = (np.asarray(line.get_xydata()) for line in phase.lines[:2])
+    assert np.interp(900.0, *measured.T) == pytest.approx(90.0, abs=5.0)
+    assert np.interp(900.0, *fitted.T) == pytest.approx(np.interp(900.0, *measured.T), abs=0.5)
+    (marks,) = (line for line in plot_modes(state, modes[:1], "x").axes[0].lines if line.get_marker() == "v")
+    ((frequency, size),) = np.asarray(marks.get_xydata()).tolist()
+    assert frequency == pytest.approx(1722.0, rel=0.02)
+    assert size == pytest.approx(np.interp(frequency, LINES, np.abs(exact.accelerance)))
+    assert f"{frequency:.0f}" in str(marks.get_label())
+
+
+def test_figure_without_coherence_or_force_leaves_their_parts_out() -> None:
+    labels = [axes.get_ylabel() for axes in plot_modes(extract_modes([noisy()]), fit_modes(noisy()), "x").axes]
+    assert "coherence" not in labels
+    assert sum("phase" in label for label in labels) == 1
+    decays = [replace(mode, stiffness=np.nan, relative_peak=1.0) for mode in fit_modes(noisy())]
+    assert len(plot_modes(extract_modes([noisy()]), decays, "x").axes) == 2
 
 
 def test_figure_names_stable_poles_that_are_no_modes() -> None:

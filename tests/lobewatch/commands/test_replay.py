@@ -153,6 +153,18 @@ def test_where_no_file_can_be_used_nothing_is_kept_going_with(shop: Shop, tmp_pa
     assert shop.logbook.taps == []
 
 
+def test_progress_is_lines_without_a_terminal(shop: Shop, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = ("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--json")
+    monkeypatch.setattr("lobewatch.show.replays.FIRST_LINE_DELAY", 0.0)
+    monkeypatch.setattr("lobewatch.show.replays.LINE_INTERVAL", 0.0)
+    shown = run(*said)
+    assert [*map(int, re.findall(r"(\d) of 3", shown.stderr))] == [0, 1, 2, 3] * 2 + [0]
+    assert len(json.loads(shown.stdout)["measurements"]) == 3
+    again = run(*said)
+    assert "of 0" not in again.stderr
+    assert len(json.loads(again.stdout)["known"]) == 3
+
+
 def test_notes_next_to_recordings_are_skipped_and_rejected_by_name(shop: Shop, folder: Path) -> None:
     notes = folder / "Notizen Fräser.txt"
     notes.write_text("3 Schläge, harte Spitze\n24.05.2024\n", encoding="utf-8")

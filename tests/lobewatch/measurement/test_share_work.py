@@ -52,7 +52,7 @@ class Killer:
         self.killed = 0
 
     def __call__(self, step: str, done: int, _of: int) -> None:
-        if step == "read" and done == 1:
+        if step == "store" and done == 1:
             self.killed = self.pids[0]
             os.kill(self.killed, signal.SIGKILL)
 

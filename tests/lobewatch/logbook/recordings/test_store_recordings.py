@@ -30,6 +30,7 @@ from lobewatch import Logbook
 from lobewatch.history import HistoryRow
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.row_file import read_rows
 from lobewatch.measurement.share_work import Workers
 from modal import Mode, synthesize_frf
 from tests.lobewatch.conftest import Shop
@@ -123,11 +124,38 @@ def test_an_interrupted_replay_is_cleared_away_and_done_again(tmp_path: Path, mo
         with pytest.raises(KeyboardInterrupt):
             Logbook.open(tmp_path / "m").replay_all(files[::2], said)
     stored = Logbook.open(tmp_path / "m").replay_all(files[::2], said)
-    assert (len(stored.already_stored), len(stored.new_tap_ids)) == (2, 0)
+    assert (len(stored.already_stored), len(stored.new_tap_ids)) == (1, 1)
     assert [tap.time for tap in MachineFolder(tmp_path / "m").taps()] == sorted(
         tap.time for tap in MachineFolder(tmp_path / "m").taps()
     )
     assert len(list(taps.iterdir())) == 2
+
+
+def test_a_killed_replay_keeps_the_stored_tests_with_their_rows_and_continues(tmp_path: Path) -> None:
+    files, said = text_files(tmp_path / "files", 4), Description(date_pattern="%Y-%m-%d")
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    folder, on_disk = MachineFolder(tmp_path / "m"), list[int]()
+
+    def kill_after_two(step: str, done: int, _of: int) -> None:
+        if step == "store":
+            on_disk.append(len(folder.committed_ids))
+            assert on_disk[-1] == done
+        if done == 2 and step == "store":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Logbook.open(tmp_path / "m").replay_all(files, said, progress=kill_after_two)
+    assert on_disk == [0, 1, 2]
+    assert len(read_rows(folder.history_path).rows) > 1
+    assert list((tmp_path / "m" / "taps").glob(".*")) == []
+    logbook = Logbook.open(tmp_path / "m")
+    stored = logbook.replay_all(files, said)
+    assert [*stored.already_stored] == files[:2]
+    assert [tap.id for tap in folder.taps()][2:] == stored.new_tap_ids
+    make_machine_folder(tmp_path / "whole", "surrogate_machine.toml")
+    whole = Logbook.open(tmp_path / "whole")
+    whole.replay_all(files, said)
+    assert [*map(values, logbook.history.rows)] == [*map(values, whole.history.rows)]
 
 
 def _ended(*_: object, **__: object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import combinations
 
@@ -16,8 +17,10 @@ from lobewatch.machine import LimitsTable, ProgramTable
 from lobewatch.measurement import Estimate
 from lobewatch.show.figures.drawing import new_axes, render_svg
 from lobewatch.show.figures.lobe_figures import plot_lobes, plot_waterfall
+from lobewatch.show.figures.response_drawing import compute_phase
 from lobewatch.show.figures.trend_figures import SeriesValue, ValueTrend, plot_frf, plot_trend
 from lobewatch.verdicts import Setting, Stability, Verdict
+from modal import Mode, find_unexplained_peaks, synthesize_frf
 from tests.lobewatch.show.figures.lobe_diagrams import diagram_of
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
@@ -106,9 +109,37 @@ def test_a_map_without_any_limit_ends_at_a_millimetre() -> None:
 def test_receptance_is_drawn_in_nm_per_n() -> None:
     f = np.linspace(1.0, 100.0, 50)
     figure = plot_frf(None, Frf(f, np.full(50, 2e-9 - 5e-9j)), (1.0, 100.0))
-    real, imaginary = (axes.lines[0].get_ydata() for axes in figure.axes)
-    assert real == pytest.approx(2.0)
-    assert imaginary == pytest.approx(-5.0)
+    size, phase = (axes.lines[0].get_ydata() for axes in figure.axes)
+    assert size == pytest.approx(np.hypot(2.0, 5.0))
+    assert phase == pytest.approx(np.degrees(np.arctan2(-5.0, 2.0)))
+
+
+def test_the_fit_and_the_peaks_that_it_misses_are_drawn_and_named() -> None:
+    f, modes = np.arange(100.0, 1500.0), [Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)]
+    frf = replace(synthesize_frf(modes, f), coherence=np.full(f.size, 0.97))
+    (peak,) = missed = find_unexplained_peaks(frf, modes[:1])
+    amplitude, phase, coherence = plot_frf(None, frf, (100.0, 1500.0), modes[:1], missed).axes
+    _, fit, mark = amplitude.lines
+    assert fit.get_ydata() == pytest.approx(1e9 * np.abs(modes[0].receptance(f)))
+    assert np.asarray(mark.get_xydata())[0] == pytest.approx(
+        [peak.frequency, 1e9 * abs(np.interp(peak.frequency, f, frf.receptance))]
+    )
+    assert f"{peak.frequency:.0f}" in str(mark.get_label())
+    assert mark.get_marker() != "None"
+    assert np.interp(500.0, f, np.asarray(phase.lines[1].get_ydata())) == pytest.approx(-90.0, abs=0.5)
+    assert coherence.lines[0].get_ydata() == pytest.approx(0.97)
+    assert plot_frf(None, frf, (100.0, 1500.0), modes).axes[0].lines[-1].get_marker() == "None"
+
+
+@pytest.mark.parametrize("lowest", [-270.0, -90.0])
+def test_a_phase_stays_within_one_turn_and_is_not_joined_across_it(lowest: float) -> None:
+    angle = np.radians(np.linspace(-500.0, 500.0, 1001))
+    phase = compute_phase(np.exp(1j * angle), lowest)
+    known = phase[np.isfinite(phase)]
+    assert np.all((known >= lowest) & (known < lowest + 360.0))
+    assert np.exp(1j * np.radians(known)) == pytest.approx(np.exp(1j * angle[np.isfinite(phase)]))
+    assert 1 <= np.count_nonzero(np.isnan(phase)) <= 3
+    assert np.isnan(compute_phase(np.zeros(3, complex), lowest)).all()
 
 
 @pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])

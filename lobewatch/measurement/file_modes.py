@@ -8,7 +8,7 @@ import numpy as np
 
 import acquisition
 import modal
-from acquisition import DataError, Description, Fact, Frf, HitDecision, HitFlags, Remark
+from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading

@@ -70,14 +70,13 @@ def replay(
     from lobewatch.show.replays import ReplayProgress, emit_preview, emit_replay
     from modal import parse_mode_edits
 
-    conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     known: dict[str, Any] = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
-    known["hit_decisions"] = parse_hit_decisions(accept_hit or (), reject_hit or ())
-    description = file_options.description(**known, conditions=conditions)
+    known["conditions"] = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
+    chosen = parse_hit_decisions(accept_hit or (), reject_hit or ())
+    description = file_options.description(**known, hit_decisions=chosen)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
-    logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
-    n_files = len(recordings)
-    recordings, description = shared.join_hit_files(recordings, description)
+    logbook, (files, passed) = Logbook.open(machine), find_recordings(files)
+    recordings, description = shared.join_hit_files(files, description)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -94,8 +93,7 @@ def replay(
             if outcome.new_tap_ids:
                 bar("measure", 0, len(outcome.new_tap_ids))
                 _ = logbook.history
-        accepted = [code for code in codes if code not in unasked]
-        emit_replay(outcome, logbook, n_files, passed, accepted, as_json)
+        emit_replay(outcome, logbook, len(files), passed, [code for code in codes if code not in unasked], as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
             raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

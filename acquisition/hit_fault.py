@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 _RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
@@ -52,6 +52,10 @@ class HitFlags(enum.Flag):
     """The operator removed the hit."""
     NOT_EVALUATED = enum.auto()
     """The evaluation failed."""
+    NO_RESPONSE = enum.auto()
+    """The response is not above its noise."""
+    SURPLUS = enum.auto()
+    """The hit is good, but enough others agree better."""
 
     @property
     def words(self) -> str:
@@ -62,6 +66,37 @@ class HitFlags(enum.Flag):
     def cure(self) -> str:
         """Remedies, a sentence per fault; empty for a good hit."""
         return " ".join(HIT_FAULTS[flag].remedy for flag in self)
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Code of each fault, as options and the journal name it, e.g. "double-hit"."""
+        return tuple(str(flag.name).lower().replace("_", "-") for flag in self)
+
+    @classmethod
+    def from_codes(cls, codes: Iterable[str]) -> HitFlags:
+        """Return the flags of codes.
+
+        Parameters
+        ----------
+        codes
+            Codes, as `codes` gives them.
+
+        Returns
+        -------
+        HitFlags
+            All flags that the codes name.
+
+        Raises
+        ------
+        ValueError
+            Where a code names no flag.
+        """
+        by_code, flags = {code: flag for flag in cls for code in flag.codes}, cls.OK
+        for code in codes:
+            if code not in by_code:
+                raise ValueError(f"hit code {code!r} does not exist. Choose from {', '.join(by_code)}.")
+            flags |= by_code[code]
+        return flags
 
     @classmethod
     def from_words(cls, words: str) -> HitFlags:
@@ -199,11 +234,22 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "Hit again. If the evaluation fails again, check hammer, accelerometer and cables.",
         {"": "The evaluation of this hit failed ({reason})"},
     ),
+    HitFlags.NO_RESPONSE: HitFault(
+        "no response",
+        "Check the accelerometer and its cable.",
+        {
+            "": "The response in its loudest tenth is {ratio:.2g} times its noise (limit {noise_ratio:g})",
+            "constant": "The response is constant",
+        },
+        {"noise_ratio": 1.5},
+    ),
+    HitFlags.SURPLUS: HitFault("surplus", "Enough other hits agree better with each other."),
 }
 """Fault of each flag.
 
 The limits are chosen. A peak below 2 % of the force range shows the steps of the converter. Above 90 % the sensor may
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
-noise. A hit 30 % away from the mean would move a mean of ten hits by 3 %. Its distance must also be 4 times what the
-scatter of the hits would give. A pulse whose first 10 % of the peak are missing has lost 1 % of its impulse.
+noise. The loudest tenth of mere noise is below 1.5 times its rms before the hit. A hit 30 % away from the mean would
+move a mean of ten hits by 3 %. Its distance must also be 4 times what the scatter of the hits would give. A pulse whose
+first 10 % of the peak are missing has lost 1 % of its impulse.
 """

@@ -3,10 +3,10 @@
 import hashlib
 import re
 import secrets
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from acquisition.channel import TapDirection, parse_direction
 from acquisition.errors import DataError, check_name
@@ -158,6 +158,62 @@ class SourceFile:
         return replace(self, content=b"", digest=self.sha256)
 
 
+@dataclass(frozen=True)
+class HitDecision:
+    """Decision of a person on one hit, which overrides the evaluation of that hit.
+
+    Examples
+    --------
+    >>> accepted, rejected = HitDecision(3, "accept", ("double-hit",)), HitDecision(5, "reject")
+    >>> accepted.apply(HitFlags.DOUBLE_HIT), rejected.apply(HitFlags.OK).codes
+    (<HitFlags.OK: 0>, ('undone',))
+    >>> str(accepted), str(rejected)
+    ('accept 3:double-hit', 'reject 5')
+    """
+
+    hit: int
+    """Number of the hit in its tap test, from 1."""
+    decision: Literal["accept", "reject", "undo"]
+    """Decision; "undo" withdraws the earlier ones on this hit."""
+    codes: tuple[str, ...] = ()
+    """Codes of the accepted faults; empty for the other decisions."""
+
+    def apply(self, faults: HitFlags) -> HitFlags:
+        """Return the flags of the hit after the decision.
+
+        Parameters
+        ----------
+        faults
+            Faults that the evaluation found.
+        """
+        if self.decision == "accept":
+            return faults & ~HitFlags.from_codes(self.codes)
+        return faults | HitFlags.UNDONE if self.decision == "reject" else faults
+
+    def __str__(self) -> str:
+        return " ".join([self.decision, ":".join([f"{self.hit}", *filter(None, [",".join(self.codes)])])])
+
+
+def decide_flags(faults: Iterable[HitFlags], decisions: Iterable[HitDecision]) -> tuple[HitFlags, ...]:
+    """Return the flags of each hit after decisions, at most one per hit.
+
+    Parameters
+    ----------
+    faults
+        Faults that the evaluation found in each hit.
+    decisions
+        Decisions that count.
+
+    Examples
+    --------
+    >>> faults = HitFlags.OK, HitFlags.DOUBLE_HIT
+    >>> [flags.words for flags in decide_flags(faults, [HitDecision(2, "accept", ("double-hit",))])]
+    ['good', 'good']
+    """
+    by_hit, hits = {decision.hit: decision for decision in decisions}, enumerate(faults, 1)
+    return tuple(by_hit[hit].apply(found) if hit in by_hit else found for hit, found in hits)
+
+
 @dataclass(frozen=True, eq=False)
 class TapTest:
     """Finished tap test."""
@@ -174,6 +230,13 @@ class TapTest:
     """Faults of each hit."""
     source: SourceFile | None = None
     """File that a replayed test was read from."""
+    decisions: tuple[HitDecision, ...] = ()
+    """Decisions of a person on hits, at most one per hit. No tap file holds them."""
+
+    @property
+    def decided_flags(self) -> tuple[HitFlags, ...]:
+        """Flags of each hit after the decisions; falsy for an averaged hit."""
+        return decide_flags(self.flags, self.decisions)
 
     @property
     def required_frf(self) -> Frf:
@@ -185,7 +248,7 @@ class TapTest:
     @property
     def accepted(self) -> tuple[Hit, ...]:
         """Hits that were averaged."""
-        return tuple(hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags)
+        return tuple(hit for hit, flags in zip(self.hits, self.decided_flags, strict=True) if not flags)
 
 
 def new_tap_id(circumstances: Circumstances) -> str:

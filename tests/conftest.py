@@ -92,6 +92,7 @@ class ScriptedSession:
         self.stopped = threading.Event()
         self.refusal = ""
         self.chosen: list[tuple[str, str]] = []
+        self.decided: list[tuple[int | None, bool]] = []
 
     def show(self, word: TapStep, **changes: object) -> TapState:
         """Switch to the next state."""
@@ -144,6 +145,16 @@ class ScriptedSession:
         hits[last] = hits[last]._replace(undone=True)
         self.show(TapStep.TAP, hits=tuple(hits), good=self.state.good - 1)
         self.undone.set()
+
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        """Remember what was decided, and count the hit."""
+        self.decided.append((number, accept))
+        hits = list(self.state.hits)
+        last = (number or len(hits)) - 1
+        faults = hits[last].flags if accept else HitFlags.OK
+        hits[last] = hits[last]._replace(flags=HitFlags.OK if accept else HitFlags.UNDONE, accepted=faults)
+        good = self.state.good + (1 if accept else -1)
+        self.show(TapStep.GOOD if accept else TapStep.TAP, hits=tuple(hits), good=good)
 
     def stop(self) -> None:
         """Remember that it was asked for."""

@@ -60,12 +60,14 @@ def choose_code_type(channels: Sequence[Channel]) -> type[np.int16 | np.int32]:
     return np.int16 if max(channel.adc_bits for channel in channels) <= 16 else np.int32
 
 
-def write_raw_hits(file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
-    """Write hits and the flags of each in their own group; nothing without hits."""
+def write_raw_hits(
+    file: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags], decided: Sequence[HitFlags]
+) -> None:
+    """Write hits and the flags of each, before and after decisions, in their own group; nothing without hits."""
     if hits:
         raw = file.create_group("raw")
         write_hit_settings(raw, HitSettings.from_hit(hits[0]))
-        write_hits(raw, hits, flags)
+        write_hits(raw, hits, flags, decided)
 
 
 def write_hit_settings(raw: h5py.Group, settings: HitSettings) -> None:
@@ -75,8 +77,8 @@ def write_hit_settings(raw: h5py.Group, settings: HitSettings) -> None:
         write_channel(raw.create_group(f"channel_{i}").attrs, channel)
 
 
-def write_hits(raw: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
-    """Write hits of the same settings and the flags of each."""
+def write_hits(raw: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags], decided: Sequence[HitFlags]) -> None:
+    """Write hits of the same settings and the flags of each, before and after decisions."""
     first = hits[0]
     if first.codes is not None and first.channels is not None:
         codes = np.stack([hit.codes for hit in hits if hit.codes is not None])
@@ -87,7 +89,7 @@ def write_hits(raw: h5py.Group, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
     write_dataset(raw, name, data, units, chunks=(1, *data.shape[1:]), **HDF5_COMPRESSION)
     write_dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
     write_dataset(raw, "overload", [hit.overload for hit in hits], "1")
-    write_dataset(raw, "accepted", [not flag for flag in flags], "1")
+    write_dataset(raw, "accepted", [not flag for flag in decided], "1")
     raw["verdict"] = [flag.words for flag in flags]
 
 

@@ -83,7 +83,7 @@ def encode_tap(tap: TapTest) -> bytes:
         file.attrs.update(format=TAP_FORMAT_NAME, version=_choose_version(tap.hits))
         file.attrs.update(software=_get_software_name(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
-        raw_hits.write_raw_hits(file, tap.hits, tap.flags)
+        raw_hits.write_raw_hits(file, tap.hits, tap.flags, tap.decided_flags)
         if tap.frf is not None:
             _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
@@ -102,8 +102,11 @@ def _get_software_name() -> str:
 
 
 def round_as_stored(tap: TapTest) -> TapTest:
-    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32."""
-    if not tap.hits or tap.frf is None or tap.frf.coherence is None:
+    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32.
+
+    After decisions the FRF is not that of the file.
+    """
+    if not tap.hits or tap.decisions or tap.frf is None or tap.frf.coherence is None:
         return tap
     return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 
@@ -159,9 +162,9 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     memory = io.BytesIO(_encode_without_hit(circumstances, _choose_version([hit]), raw_hits.HitSettings.from_hit(hit)))
     with hdf5_file.open_hdf5(memory, "r+") as file:
         file.attrs["file"] = Path(path).name
-        raw_hits.write_hits(file["raw"], [hit], [flags])
+        raw_hits.write_hits(file["raw"], [hit], [flags], [flags])
         if hit.cross_hit is not None:
-            raw_hits.write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags])
+            raw_hits.write_raw_hits(file.create_group("beside"), [hit.cross_hit], [flags], [flags])
     atomic_write(Path(path), hdf5_file.append_checksum(memory.getvalue()))
 
 
@@ -300,14 +303,15 @@ def _read_source(file: h5py.File) -> SourceFile | None:
 
 
 _NON_SIGNAL_FLAGS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_EVALUATED
+_NON_SIGNAL_FLAGS |= HitFlags.SURPLUS
 """Faults that the time signals of a hit do not show."""
 
 
 def read_tap_recording(path: Path) -> list[Hit] | Frf:
     """Read the hits of a tap file without those that were rejected for other reasons than their time signals.
 
-    Such hits were undone, hit another spot, had too narrow a force band, or were not evaluated. Without hits the FRF is
-    read.
+    Such hits were undone, hit another spot, had too narrow a force band, were not evaluated, or were not needed.
+    Without hits the FRF is read.
     """
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _NON_SIGNAL_FLAGS]

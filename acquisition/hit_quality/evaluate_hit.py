@@ -26,6 +26,8 @@ Findings = dict[HitFlags, str]
 """Finding with its figures for each fault of a hit, without the remedy."""
 MIN_LINE_SCATTER = 0.05
 """Lowest relative scatter assumed for a line, which bounds its weight."""
+MIN_QUIET_SAMPLES = 8
+"""Smallest number of samples before the hit that give the noise of the response; chosen."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
     findings |= _evaluate_strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
-    findings |= _evaluate_touches(hit, band) | _evaluate_decay(hit)
+    findings |= _evaluate_response_level(hit) | _evaluate_touches(hit, band) | _evaluate_decay(hit)
     if HitFlags.DOUBLE_HIT in findings:
         band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
@@ -156,7 +158,7 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     Raises
     ------
     DataError
-        If no hit is good; its text has the reasons. If the response of all good hits is constant.
+        If no hit is good; its text has the reasons.
 
     Examples
     --------
@@ -174,8 +176,6 @@ def average_good_hits(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, 
     if not good:
         reasons = (f"Hit {i} ({verdict.flags.words}): {verdict.text}" for i, verdict in enumerate(verdicts, 1))
         raise DataError(join_sentences(f"no good hit among {len(hits)}", *reasons))
-    if not any(np.ptp(hit.acceleration) for hit in good):
-        raise DataError("the response is constant, so no response was measured. Check the sensor and its cable.")
     return estimate_frf(good) if good[0].has_force else None, tuple(verdict.flags for verdict in verdicts)
 
 
@@ -282,6 +282,22 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
     return {}
 
 
+def _evaluate_response_level(hit: Hit) -> Findings:
+    """Compare the response with its noise before the hit; a constant one is none either."""
+    quiet = hit.acceleration[: int(0.8 * count_pre_hit_samples(hit))]
+    if np.ptp(hit.acceleration) == 0:
+        return _state(HitFlags.NO_RESPONSE, "constant")
+    noise = float(np.std(quiet)) if quiet.size >= MIN_QUIET_SAMPLES else 0.0
+    ratio = _measure_levels(hit.acceleration).max() / noise if noise else np.inf
+    is_missing = ratio < HIT_FAULTS[HitFlags.NO_RESPONSE].limits["noise_ratio"]
+    return _state(HitFlags.NO_RESPONSE, ratio=ratio) if is_missing else {}
+
+
+def _measure_levels(response: Floats) -> Floats:
+    """Return the standard deviation of each tenth."""
+    return np.array([np.std(tenth) for tenth in np.array_split(response, 10)])
+
+
 def describe_highest_touch(hit: Hit) -> tuple[str, ...]:
     """Return the note on the highest further touch of a hit with a pulse; none below 2.5 % of the main pulse."""
     second = find_highest_touch(window_force(hit))
@@ -353,8 +369,8 @@ def _measure_residual(hit: Hit, end: int) -> tuple[float, bool]:
 def _compute_residual_share(response: Floats, before: int) -> float:
     """Return the rms of the last tenth over that of the loudest tenth; 0 where it is small or mere noise."""
     limits = HIT_FAULTS[HitFlags.NOT_DECAYED].limits
-    levels = [float(np.std(tenth)) for tenth in np.array_split(response, 10)]
+    levels = _measure_levels(response)
     quiet = response[:before]
-    noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
-    limit = max(limits["residual_share"] * max(levels), limits["noise_ratio"] * noise)
-    return 0.0 if levels[-1] <= limit else levels[-1] / max(levels)
+    noise = float(np.std(quiet)) if quiet.size >= MIN_QUIET_SAMPLES else 0.0
+    limit = max(limits["residual_share"] * levels.max(), limits["noise_ratio"] * noise)
+    return 0.0 if levels[-1] <= limit else float(levels[-1] / levels.max())

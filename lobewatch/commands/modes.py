@@ -57,6 +57,9 @@ def modes(
             help="Another measurement (file, response number or tap test) to confirm modes. Give two or more --beside."
         ),
     ] = None,
+    accept_hit: shared.AcceptedHits = None,
+    reject_hit: shared.RejectedHits = None,
+    undo_hit: Annotated[list[int] | None, Option(help="Withdraw the decision on this hit of TAP, repeatable.")] = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
@@ -67,7 +70,7 @@ def modes(
     """Fit the modes of a recorded file or a stored tap test.
 
     The least-squares fit gives standard errors. Peak picking after Gaber & Hashemi (2015) is shown for comparison. With
-    TAP, --add, --drop and --fix are stored, and all results of the machine are updated.
+    TAP, --add, --drop, --fix and decisions on hits are stored, and all results of the machine are updated.
 
     Examples
     --------
@@ -80,7 +83,9 @@ def modes(
       lobewatch modes hit1.csv hit2.csv hit3.csv --one-test
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
+      lobewatch modes mill-3 20261102T0914 --accept-hit 3:double-hit --reject-hit 5
     """
+    from acquisition.hit_quality.decide_hits import parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import read_tap_modes
     from lobewatch.machine.settings.setup_tables import SensorLoading
@@ -92,6 +97,7 @@ def modes(
     if beside is not None and len(beside) == 1:
         raise ValueError(f"--beside {beside[0]}: one other file may agree by chance. Give --beside twice or more.")
     edits = parse_mode_edits(add, drop, fix)
+    decisions = parse_hit_decisions(accept_hit or (), reject_hit or (), undo_hit or ())
     file, tap, hit_files = _resolve_names(file, names or (), one_test=file_options.one_test)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
@@ -99,13 +105,13 @@ def modes(
         shared.reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
-        with nullcontext() if choice is None else publish_on_change(logbook):
-            file_modes = read_tap_modes(logbook, tap, choice)
-    elif by_fit or file.is_dir():
-        text = "--by-fit needs a stored tap test" if by_fit else f"{file} is a folder"
-        raise ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
+        with nullcontext() if choice is None and not decisions else publish_on_change(logbook):
+            file_modes = read_tap_modes(logbook, tap, choice, decisions)
+    elif by_fit or undo_hit or file.is_dir():
+        raise _make_tap_error(file, "--by-fit" if by_fit else "--undo-hit" if undo_hit else "")
     else:
-        said = file_options.description(averages=averages, without_force=hammer == "none", hit_files=hit_files)
+        known = {"hit_files": hit_files, "hit_decisions": decisions}
+        said = file_options.description(averages=averages, without_force=hammer == "none", **known)
         sensor = SensorLoading.of(sensor_mass)
         how = partial(
             fit_file_modes, band=band, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor
@@ -118,6 +124,12 @@ def modes(
     if figure is not None:
         _save_figure(file_modes, file.name, figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))
+
+
+def _make_tap_error(file: Path, option: str) -> ValueError:
+    """Return the error for a folder, or an option, without a tap test."""
+    text = f"{option} needs a stored tap test" if option else f"{file} is a folder"
+    return ValueError(f"{text}. Name a tap test from lobewatch history: lobewatch modes MACHINE TAP")
 
 
 def _resolve_names(file: Path, names: Sequence[str], *, one_test: bool) -> tuple[Path, str, tuple[Path, ...]]:

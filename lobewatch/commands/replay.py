@@ -2,7 +2,7 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -30,6 +30,8 @@ def replay(
         list[str] | None,
         Option(help="Accept this warning code (repeatable)."),
     ] = None,
+    accept_hit: shared.AcceptedHits = None,
+    reject_hit: shared.RejectedHits = None,
     add: shared.AddedModes = None,
     drop: shared.DroppedModes = None,
     fix: shared.FixedModes = None,
@@ -53,8 +55,10 @@ def replay(
       lobewatch replay mill-3 hit1.csv hit2.csv hit3.csv --one-test --date 2026-11-20 --direction x
       lobewatch replay mill-3 hits.npy --axes hits,channels,samples --columns "force [N],acceleration [g]" --rate 51200
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
+      lobewatch replay mill-3 hits.uff --accept-hit 3:double-hit --reject-hit 5
     """
     from acquisition import Conditions, DataError
+    from acquisition.hit_quality.decide_hits import parse_hit_decisions
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.operator_entries import store_edits
     from lobewatch.logbook.recordings.recorded_files import find_recordings
@@ -66,13 +70,13 @@ def replay(
     from lobewatch.show.replays import ReplayProgress, emit_preview, emit_replay
     from modal import parse_mode_edits
 
-    conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
-    known = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
-    description = file_options.description(**known, conditions=conditions)
+    known: dict[str, Any] = {"date": date, "date_pattern": date_pattern, "tool": tool, "direction": direction}
+    known["conditions"] = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
+    chosen = parse_hit_decisions(accept_hit or (), reject_hit or ())
+    description = file_options.description(**known, hit_decisions=chosen)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
-    logbook, (recordings, passed) = Logbook.open(machine), find_recordings(files)
-    n_files = len(recordings)
-    recordings, description = shared.join_hit_files(recordings, description)
+    logbook, (files, passed) = Logbook.open(machine), find_recordings(files)
+    recordings, description = shared.join_hit_files(files, description)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:
         if edits:
@@ -89,8 +93,7 @@ def replay(
             if outcome.new_tap_ids:
                 bar("measure", 0, len(outcome.new_tap_ids))
                 _ = logbook.history
-        accepted = [code for code in codes if code not in unasked]
-        emit_replay(outcome, logbook, n_files, passed, accepted, as_json)
+        emit_replay(outcome, logbook, len(files), passed, [code for code in codes if code not in unasked], as_json)
         wrong = outcome.rejected and format_rejections(outcome.rejected, len(recordings), stored=True)
         if wrong or not_chosen or unasked:
             raise DataError(wrong or not_chosen or format_not_asked(unasked, outcome.tap_ids, logbook.questions))

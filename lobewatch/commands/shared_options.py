@@ -53,6 +53,10 @@ DroppedModes = Annotated[list[str] | None, Option(help="Leave out the mode at th
 FixedModes = Annotated[
     list[str] | None, Option(help="Hold a mode at Hz:zeta, such as 1500:0.03, and fit only its stiffness K.")
 ]
+AcceptedHits = Annotated[
+    list[str] | None, Option(help="Accept a rejected hit despite this fault, N:CODE (3:double-hit), repeatable.")
+]
+RejectedHits = Annotated[list[int] | None, Option(help="Reject an accepted hit by its number, repeatable.")]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,7 @@ def tap(
 
     At a terminal, or with --screen, you tap x, then y, then choose the next step. Each hit is stored at once: after a
     crash or an unplugged cable, the same command continues the test. Keys: u or Page Up undoes the last good hit, q
-    stops, m mutes.
+    stops, m mutes. a accepts and r rejects the last hit, 3a and 3r hit 3.
 
     Examples
     --------

@@ -18,6 +18,7 @@ from lobes import SldHistory, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
+from lobewatch.measurement.hit_choice import HIT_DECISIONS_CODE
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement
@@ -100,6 +101,11 @@ class HistoryRow:
     def by_hand(self) -> str:
         """Mode edits in words; empty without any."""
         return next((remark.about for remark in self.remarks if remark.code in MODE_EDIT_CODES), "")
+
+    @cached_property
+    def hit_decisions(self) -> str:
+        """Decisions on hits in words; empty without any."""
+        return next((remark.about for remark in self.remarks if remark.code == HIT_DECISIONS_CODE), "")
 
     @property
     def followed(self) -> ModeValues:

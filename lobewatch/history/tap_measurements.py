@@ -17,6 +17,7 @@ from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.tool.assembly import MAX_DIRECTION_AGE, Assembly, assemble, predict_assembly
@@ -192,10 +193,11 @@ class FollowedModeIndex:
 
 
 def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
-    """Tell whether a row is of this tap test with the same baseline, answers and mode edits."""
+    """Tell whether a row is of this tap test with the same baseline, answers, mode edits and decisions on hits."""
     tap = place.entry
-    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand
-    return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted), str(tap.by_hand))
+    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand, row.hit_decisions
+    by_person = frozenset(tap.accepted), str(tap.by_hand), format_decisions(tap.hit_decisions)
+    return ground_of_row == (tap.id, place.baseline, place.series, *by_person)
 
 
 _RowBasis = tuple[str, str, ModeValues | None, tuple[Remark, ...], tuple[FollowedMode, ...]]

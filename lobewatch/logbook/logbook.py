@@ -9,14 +9,15 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, Remark, TapTest
+from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, HitDecision, Remark, TapTest
+from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
 from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements, UsableTaps
 from lobewatch.logbook import recordings
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
-from lobewatch.machine.folder_updates import store_mode_edits
+from lobewatch.machine.folder_updates import store_hit_decisions, store_mode_edits
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.verify_files import enter_orphaned_taps
 from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions, find_device_questions
@@ -291,6 +292,8 @@ class Logbook:
                 self.folder, files, description, on_stored=self._remember_fit, **options
             )
             self._invalidate()
+            for tap_id in outcome.already_stored.values():
+                self.decide_hits(tap_id, description.hit_decisions)
         return outcome
 
     def _remember_fit(self, fit: TapFit, more: bool) -> None:
@@ -345,6 +348,35 @@ class Logbook:
         self.fits |= fits
         self._invalidate()
         return reasons
+
+    def decide_hits(self, tap_id: str, decisions: Sequence[HitDecision]) -> None:
+        """Store decisions on hits of a tap test permanently. The same decision again changes nothing.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+        decisions
+            Decisions, at most one per hit.
+
+        Raises
+        ------
+        ValueError
+            If a decision does not fit the hits, or no hit remains. Nothing is stored then.
+        DataError
+            If the file is damaged.
+        """
+        if not decisions:
+            return
+        with self.folder.locked():
+            self._invalidate()
+            tap = self.folder.read(self.files.by_id[tap_id])
+            decide_hits(tap, add_decisions(tap.flags, tap.decisions, decisions))
+            new = [decision for decision in decisions if decision not in tap.decisions]
+            if new:
+                store_hit_decisions(self.folder, tap_id, new)
+                self.fits.pop(tap_id, None)
+                self._invalidate()
 
     def _invalidate(self) -> None:
         """Forget everything after a change on the disk."""

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from acquisition import check_name
+from acquisition import Description, HitDecision, check_name
 from acquisition.errors import join_sentences
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.store_recordings import group_by_message
@@ -49,21 +49,26 @@ def _get_login_name() -> str:
         return ""
 
 
-def read_tap_modes(logbook: Logbook, name: str, edits: ModeEdits | None = None) -> FileModes:
-    """Fit the modes of a tap test, after storing edits of them if there are any.
+def read_tap_modes(
+    logbook: Logbook, name: str, edits: ModeEdits | None = None, decisions: Sequence[HitDecision] = ()
+) -> FileModes:
+    """Fit the modes of a tap test, after storing decisions on its hits and edits of its modes if there are any.
 
-    `name` is the identity of the tap test, its file, or a unique part of either. ValueError, and nothing is stored, if
-    the edits do not fit. DataError if the file is damaged.
+    `name` is the identity of the tap test, its file, or a unique part of either. ValueError if a decision or the edits
+    do not fit; these are not stored then. DataError if the file is damaged.
     """
     entries = [*logbook.files.by_id.values()]
     tap = find_excludable_entry(name, entries, (), str(logbook.folder.path))
+    logbook.decide_hits(tap.id, decisions)
     if edits is not None:
         reasons = logbook.edit_modes([tap.id], edits)
         if reasons:
             raise ValueError(join_sentences(reasons[tap.id], "Nothing was stored"))
     tap = logbook.files.by_id[tap.id]
     logbook.folder.read(tap)
-    return fit_file_modes(logbook.folder.path / tap.file, by_hand=tap.by_hand, sensor=logbook.machine.tap.sensor)
+    path, sensor = logbook.folder.path / tap.file, logbook.machine.tap.sensor
+    known = Description(hit_decisions=tap.hit_decisions)
+    return fit_file_modes(path, description=known, by_hand=tap.by_hand, sensor=sensor)
 
 
 def store_edits(logbook: Logbook, tap_ids: Sequence[str], edits: ModeEdits) -> str:

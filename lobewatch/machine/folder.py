@@ -9,14 +9,16 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Self
 
 import msgspec
 
-from acquisition import DataError, Remark, TapTest, read_tap, write_tap
+from acquisition import DataError, HitDecision, Remark, TapTest, read_tap, write_tap
 from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
+from acquisition.hit_quality.decide_hits import decide_hits
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal import entries as journal_entries
@@ -306,8 +308,8 @@ class MachineFolder:
             raise DamagedTapError(tap_damage_remark(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
-            return read_tap(path)
-        except DataError as error:
+            return decide_hits(read_tap(path), entry.hit_decisions)
+        except ValueError as error:
             text = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, text), entry, self.path) from error
 
@@ -331,7 +333,11 @@ class MachineFolder:
         make_folder(path.parent)
         content = write_tap(path, tap)
         entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
-        self.journal.append(entry.line, reading=reading)
+        known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
+        counting = {decision.hit for decision in tap.decisions}
+        changes = [HitDecision(decision.hit, "undo") for decision in known if decision.hit not in counting]
+        changes += [decision for decision in tap.decisions if decision not in known]
+        self.journal.append(*journal_entries.make_hit_entries(tap.id, changes), entry.line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
         return entry
 
@@ -347,7 +353,10 @@ class MachineFolder:
         for temporary, entry in files.items():
             temporary.replace(self.path / entry.file)
         sync_folder(self.path / "taps")
-        self.journal.append(*(entry.line for entry in files.values()), reading=reading)
+        lines = (
+            [*journal_entries.make_hit_entries(entry.id, entry.hit_decisions), entry.line] for entry in files.values()
+        )
+        self.journal.append(*chain.from_iterable(lines), reading=reading)
 
     def accept(self, tap_id: str, code: str) -> None:
         """Write to the journal that a person accepted a question about a tap test.

@@ -9,7 +9,7 @@ from typing import Literal
 
 import msgspec
 
-from acquisition import check_name
+from acquisition import HitDecision, check_name
 from acquisition.file_io import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
@@ -125,6 +125,12 @@ def store_mode_edits(folder: MachineFolder, tap_ids: Sequence[str], edits: ModeE
     if entries:
         with folder.locked():
             folder.journal.append(*entries)
+
+
+def store_hit_decisions(folder: MachineFolder, tap_id: str, decisions: Sequence[HitDecision]) -> None:
+    """Write decisions on hits of a tap test to the journal; the tap test may be in progress."""
+    with folder.locked():
+        folder.journal.append(*lines.make_hit_entries(tap_id, decisions))
 
 
 def lobewatch_version() -> str:

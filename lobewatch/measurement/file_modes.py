@@ -1,4 +1,4 @@
-"""Read the FRF of a recorded file with its hits, fit its modes and match them with other files."""
+"""Fit the modes of a recorded file and match them with other files."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,136 +8,18 @@ import numpy as np
 
 import acquisition
 import modal
-from acquisition import DataError, Description, Fact, Frf, Hit, HitFlags, Remark
-from acquisition.errors import join_sentences
+from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark
 from dsm import format_with_error
 from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
-from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
+from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.recording_questions import check_quantity
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.measurement.touch_remarks import touch_remarks
-from lobewatch.step_times import time_step
-from modal import ConjugateError, Extraction, Mode, ModeEdits, pick_peaks
-
-ACCEPTABLE_FLAGS = HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD
-ACCEPTABLE_FLAGS |= HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
-"""Faults of hits that can be accepted; hits with others have no single pulse, or lost scans."""
-
-
-@dataclass(frozen=True, eq=False)
-class FileFrf:
-    """FRF of a recorded file with its hits."""
-
-    frf: Frf | None
-    """FRF of the file, or the average of its hits; None without force."""
-    hits: tuple[Hit, ...] = ()
-    """Averaged hits; empty if the file contains only an FRF."""
-    time_constant: float | None = None
-    """Time constant of our own window over all hits (s); None without one."""
-    remarks: tuple[Remark, ...] = ()
-    """Remarks on what was done to the hits."""
-    facts: tuple[Fact, ...] = ()
-    """Facts of the file with their origins."""
-    recorded_window: float | None = None
-    """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
-    n_found: int = 0
-    """Number of hits found, with those that cannot be used; 0 for an FRF."""
-
-
-@time_step("reading")
-def read_file_frf(
-    path: Path, accept: Collection[str], description: Description, window: Window | None, *, conjugate: bool
-) -> FileFrf:
-    """Read the FRF of a file with its hits; see `fit_file_modes`.
-
-    window, conjugate: as given, so that missing window data is requested together with all other missing data.
-    """
-    accepted, averages = _parse_accepted_flags(accept), description.averages
-    description = replace(description, averages=None)
-    recording = acquisition.inspect_file(path, description)
-    if recording.problems:
-        phase = "" if conjugate else _check_phase(path, description)
-        missing = missing_window_text(recording.window, window)
-        raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
-    recording.require_measurable()
-    if recording.frf is not None:
-        facts = tuple(fact for fact in recording.facts if fact.name != "averages")
-        return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
-    if averages is not None:
-        finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
-        raise ValueError(f"{finding}. Leave out the number of averages.")
-    frf = _average_hits(path, recording.hits, accepted, description)
-    facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
-    return replace(frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found)
-
-
-def _check_phase(path: Path, description: Description) -> str:
-    """Return the fault of the phase of an FRF whose unit or response number is missing, else an empty text."""
-    unit, response = description.unit or "m/N", description.response or 1
-    frf = acquisition.inspect_file(path, replace(description, unit=unit, response=response)).frf
-    try:
-        if frf is not None:
-            pick_peaks(frf)
-    except ValueError as error:
-        return f"Also {error}" if isinstance(error, ConjugateError) else ""
-    return ""
-
-
-def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
-    verdicts = [acquisition.check_hit(hit) for hit in hits]
-    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
-    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
-    if refused:
-        text = f"average includes {refused} of {len(hits)} hits that failed the checks"
-        frf = acquisition.estimate_frf(good) if good[0].has_force else None
-        return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
-    if good and not good[0].has_force:
-        return FileFrf(None, tuple(good))
-    try:
-        return FileFrf(acquisition.read_frf(path, description), tuple(good))
-    except DataError:
-        ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
-        if not ringing or not hits[0].has_force:
-            raise
-        frf, windowed, tau = window_ringing_hits(ringing)
-        cure = "Record longer, or use the hits without a window with fit_file_modes.accept not-decayed"
-        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),))
-
-
-def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:
-    flags = {flag.words.replace(" ", "-"): flag for flag in ACCEPTABLE_FLAGS}
-    accepted = HitFlags.OK
-    for code in codes:
-        if code not in flags:
-            raise ValueError(
-                f"fit_file_modes.accept {code}: this code cannot be accepted. Choose from {', '.join(flags)}."
-            )
-        accepted |= flags[code]
-    return accepted
-
-
-def _set_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
-    """Set the number of averages behind the coherence: as given, else as in the file, else inferred."""
-    if averages is not None:
-        option = f"Description.averages {averages}"
-        if averages < 1:
-            raise ValueError(f"{option}: not above 0. Give the number of averaged hits.")
-        if frf.coherence is None:
-            raise ValueError(f"{option}: {path.name} has no coherence. Leave out the number of averages.")
-        return FileFrf(replace(frf, n_averages=averages))
-    if frf.coherence is None or frf.n_averages > 1:
-        return FileFrf(frf)
-    inferred, cure = acquisition.infer_averages(frf), "Give the number of averages with Description.averages"
-    if inferred is None:
-        text = "coherence not used, because the number of averages is unknown"
-        return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))
-    text = f"about {inferred} averages, estimated from coherence and line-to-line scatter"
-    return FileFrf(replace(frf, n_averages=inferred), remarks=(Remark("averages-inferred", "", text, cure),))
-
+from modal import Extraction, Mode, ModeEdits
 
 UNKNOWN_SENSOR = SensorLoading()
 """Accelerometer without any data."""
@@ -167,8 +49,14 @@ class FileModes:
     """Facts of the file with their origins."""
     by_hand: ModeEdits = NO_MODE_EDITS
     """Mode edits."""
+    hits: tuple[HitFlags, ...] = ()
+    """Faults of each hit of the file; empty if it contains only an FRF."""
+    hit_decisions: tuple[HitDecision, ...] = ()
+    """Decisions of a person on these hits."""
     n_found: int = 0
     """Number of hits found, with those that cannot be used; 0 for an FRF or if unknown."""
+    places: tuple[str, ...] = ()
+    """File and number of each hit in it, where the hits are of several files; empty otherwise."""
 
 
 def fit_file_modes(
@@ -267,9 +155,8 @@ def fit_file_modes(
     found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
     remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
-    return FileModes(
-        path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, n_found=file_frf.n_found
-    )
+    of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found, file_frf.places
+    return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, *of_hits)
 
 
 def _fit_decay_modes(
@@ -282,7 +169,8 @@ def _fit_decay_modes(
     modes = tuple(modal.modes_from_decays(state))
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks, *find_hit_remarks(decays.hits, band))
-    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, n_found=decays.n_found)
+    of_hits = decays.faults, decays.decisions, decays.n_found, decays.places
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 
 
 def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:

@@ -17,6 +17,7 @@ from lobewatch.machine import NO_MODE_EDITS, Machine, TapEntry
 from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
+from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.measurement.hit_remarks import find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.touch_remarks import touch_remarks
@@ -113,14 +114,14 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
     about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
-    remarks = () if band is None else (band,)
+    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
-            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.flags))
+            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.decided_flags))
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
-                said = (*edited, *decay_remarks(machine.tap.sensor), *changes)
+                said = (*remarks, *edited, *decay_remarks(machine.tap.sensor), *changes)
                 return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
             fit = partial(_fit_frf, by_hand=by_hand)
             *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)

@@ -100,8 +100,8 @@ def encode_curves(curves: Mapping[str, NDArray[np.float64]], band: tuple[float, 
 
 
 def _hit_json(hit: ListedHit) -> dict[str, Any]:
-    good, verdict = not hit.flags, hit.flags.words
-    return {"number": hit.number, "good": good, "verdict": verdict, "peak": hit.peak, "undone": hit.undone}
+    flags = {"good": not hit.flags, "verdict": hit.verdict, "undone": hit.undone, "accepted": bool(hit.accepted)}
+    return {"number": hit.number, "peak": hit.peak, **flags}
 
 
 def _comparison_json(comparison: CutComparison) -> dict[str, Any]:

@@ -46,6 +46,15 @@ class ChoiceRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Name of the next tool, if that is chosen."""
 
 
+class HitRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Body of the request that accepts or rejects a hit."""
+
+    hit: int
+    """Number of the hit, from 1."""
+    accept: bool
+    """True to accept the hit, False to reject it."""
+
+
 def add_pages(application: web.Application, pages: dict[str, str]) -> None:
     """Serve pages (path: file in static/) and all static files at /static/, from memory."""
     folder = resources.files("lobewatch.screen").joinpath("static")
@@ -92,7 +101,7 @@ def add_feed(
 
 
 def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], WatchedTest]) -> None:
-    """Serve the screen of a tap test: feed, undo, stop and next step. `find` raises HTTPNotFound if there is none."""
+    """Serve the screen of a tap test: feed and all requests. `find` raises HTTPNotFound if there is none."""
 
     async def undo_or_stop(request: web.Request) -> web.Response:
         await asyncio.to_thread(getattr(find(request), request.path.rpartition("/")[2]))
@@ -104,8 +113,14 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         find(request).choose(choice.key, choice.tool)
         return web.json_response({})
 
+    async def decide(request: web.Request) -> web.Response:
+        wish = await read_body(request, HitRequest, 'the request body must be like {"hit": 3, "accept": true}')
+        find(request).decide(wish.hit, accept=wish.accept)
+        return web.json_response({})
+
     add_feed(application, prefix, find, live_feed.StateEncoder(live_feed.encode_tap_state, live_feed.encode_plots))
-    for name, action in {"undo": undo_or_stop, "stop": undo_or_stop, "choose": choose}.items():
+    actions = {"undo": undo_or_stop, "stop": undo_or_stop, "choose": choose, "decide": decide}
+    for name, action in actions.items():
         application.router.add_post(f"{prefix}{name}", action)
 
 

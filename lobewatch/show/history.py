@@ -15,6 +15,7 @@ from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 from lobewatch.show.terminal.sentences import wrap_lines
@@ -206,6 +207,7 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
 def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
     verdicts = row.verdicts or {}
     names = [program.name for program in logbook.machine.program if program.name in verdicts]
+    entry = logbook.files.by_id.get(row.tap_id)
     return {
         "id": row.tap_id,
         "time": _utc_text(row.time),
@@ -221,6 +223,7 @@ def _tap_json(row: HistoryRow, logbook: Logbook) -> JsonObject:
         "series": row.series,
         "conditions": row.conditions.specified,
         "software": row.software or logbook.history.software,
+        "hit_decisions": entry.hit_decisions if entry else (),
         "questions": [question.code for question in row.questions],
         "verdicts": {name: verdicts[name].stability.value for name in names},
     }
@@ -239,6 +242,7 @@ def _note_text(line: Mapping[str, Any]) -> str:
     if line["kind"] == "excluded":
         return ", ".join([line["reason"], *under])
     words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
+    under += [f"hits by hand: {format_decisions(line['hit_decisions'])}"] if line["hit_decisions"] else []
     return ", ".join([*under, *(f"question {code}" for code in line["questions"]), *words])
 
 

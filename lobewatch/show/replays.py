@@ -18,9 +18,10 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.recordings.prepare_taps import HitCount
 from lobewatch.logbook.recordings.store_recordings import MAX_NAMED_FILES, ReplayOutcome, group_by_message
 from lobewatch.logbook.replay_preview import ReplayPreview
+from lobewatch.measurement.hit_choice import format_decisions, format_unused_hits
 from lobewatch.measurement.recording_questions import find_open_questions, question_remarks
 from lobewatch.show.measurement import measurement_json, measurement_texts
-from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, mode_json, sort_modes
+from lobewatch.show.modes import NON_FILE_ORIGINS, fact_lines, hits_json, mode_json, sort_modes
 from lobewatch.show.programs.verdicts import program_texts, verdict_json
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, emit, new_table, notes, remark_lines
 from modal import Mode
@@ -89,6 +90,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
         "tool": measurement.tool,
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
+        "hit_list": hits_json(tap.flags, tap.decisions),
         "remarks": recording.remarks,
         "lines": tap.frf and tap.frf.frequency.size,
         "averages": tap.frf and tap.frf.n_averages,
@@ -140,6 +142,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         f"{count} {word}" for word, count in words.items()
     )
     kind = hits if preview.tap.hits else "an FRF"
+    details += filter(None, [format_unused_hits(preview.tap.flags, preview.tap.decisions, recording.places)])
     return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 
@@ -196,8 +199,11 @@ def emit_replay(
 ) -> None:
     """Print the outcome of a replay; passed: other files of the folders; codes: of questions answered."""
     known = [f"{file.name}: stored already as {tap_id}" for file, tap_id in outcome.already_stored.items()]
+    decided = {tap_id: logbook.files.by_id[tap_id].hit_decisions for tap_id in outcome.tap_ids}
     if n_files > MIN_FILES_TO_COUNT and len(known) > MAX_KNOWN_LISTED:
         known = [f"{len(known)} of {n_files} files are stored already"]
+    known += [f"{file.name}: {text}" for file, text in outcome.unused_hits.items()]
+    known += [f"hits by hand: {format_decisions(decisions)}" for decisions in decided.values() if decisions]
     known += [f"ignored: {len(passed)} other files, such as {passed[0].name}"] if passed else []
     for line in known:
         notes.print(line, markup=False)
@@ -230,6 +236,7 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
         "known": {str(file): tap_id for file, tap_id in outcome.already_stored.items()},
         "refused": {str(file): reason for file, reason in outcome.rejected.items()},
         "taken": outcome.assumed_facts,
+        "unused_hits": {str(file): text for file, text in outcome.unused_hits.items()},
         "hits": {tap_id: count._asdict() for tap_id, count in outcome.hit_counts.items()},
         "remarks": outcome.remarks,
     }

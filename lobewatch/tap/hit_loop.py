@@ -1,5 +1,6 @@
 """Run the phases of a live test: self-check, trial hits and counted hits."""
 
+import queue
 import shutil
 import threading
 import time
@@ -66,6 +67,8 @@ class TapPhases:
         self._guided, self._sleep = guided, sleep
         self.undos, self.stopping = threading.Semaphore(0), threading.Event()
         """Requests of any thread to take back the last good hit, each once, and to end the test."""
+        self.decisions = queue.SimpleQueue[tuple[int | None, bool]]()
+        """Requests of any thread to accept (True) or reject a hit, by its number; None is the last hit."""
         self._trial: TrialHits | None = None
         self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
@@ -203,6 +206,8 @@ class TapPhases:
 
     def _handle_requests(self) -> None:
         """Do what other threads have requested. TapStopped if that ends the test."""
+        while not self.decisions.empty():
+            self._decide(*self.decisions.get())
         if self.stopping.is_set():
             raise TapStopped(
                 f"stopped with {self._tap.good} good hits. Repeat the command to continue with these hits."
@@ -243,7 +248,7 @@ class TapPhases:
             return
         try:
             tap, band = self._tap, self._folder.machine.mode.band_hz
-            change = next(find_hit_remarks(tap.hits, band, tap.flags), None)
+            change = next(find_hit_remarks(tap.hits, band, tap.decided_flags), None)
         except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without it
             change = None
         self._publisher.show(hit_change=change)
@@ -277,6 +282,25 @@ class TapPhases:
     def _undo(self, means: str = "") -> None:
         if (number := self._tap.undo()) is not None:
             self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was undone{means}.")
+
+    def _decide(self, number: int | None, accept: bool) -> None:
+        """Accept or reject a hit, and show the decision once it is in the journal, or why it is impossible."""
+        number = len(self._tap.hits) if number is None else number
+        try:
+            if not 1 <= number <= len(self._tap.hits):
+                raise ValueError(f"hit {number} does not exist. Choose a hit of the list.")
+            self._tap.decide(number - 1, accept=accept)
+        except ValueError as error:
+            self._publisher.show(reason=str(error))
+            return
+        if not accept:
+            self._show_taken_out(HitFlags.UNDONE, f"Hit {number} was rejected by hand.")
+            return
+        self._verdict, self._verdict_at = TapStep.GOOD, self._scan_count
+        faults = self._tap.flags[number - 1].words
+        reason = f"Hit {number} was accepted by hand ({faults})."
+        self._publisher.show(**self._tap.shown, word=self._verdict, verdict=faults, trial=False, reason=reason)
+        self._show_curves(self._tap.hits[number - 1])
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
         """Show that a good hit no longer counts. The word GOOD must disappear."""

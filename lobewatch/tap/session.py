@@ -96,6 +96,18 @@ class TapSession:
         """Take back the last good hit. Again: the one before."""
         self._phases.undos.release()
 
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        """Accept or reject a hit.
+
+        Parameters
+        ----------
+        number
+            Number of the hit, from 1. None for the last hit.
+        accept
+            True to accept a rejected hit, False to reject an accepted one.
+        """
+        self._phases.decisions.put((number, accept))
+
     def stop(self) -> None:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
         self._phases.stopping.set()
@@ -176,6 +188,7 @@ class TapSession:
         """Average, commit and evaluate the test."""
         self._publisher.show(word=TapStep.DONE, reason="The result is being computed.", levels=None, hit_change=None)
         tap = in_progress.finish()
+        self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
         logbook.commit(tap, now)

@@ -61,6 +61,13 @@ class ListedHit(NamedTuple):
     """Sentence with numbers on what is wrong with it, empty if it is averaged."""
     earlier: bool = False
     """True if it was taken before the test was interrupted."""
+    accepted: HitFlags = HitFlags.OK
+    """Faults despite which the operator accepted it."""
+
+    @property
+    def verdict(self) -> str:
+        """Verdict in words, with the decision of the operator."""
+        return f"{self.accepted.words}, accepted" if self.accepted else self.flags.words
 
 
 @dataclass(frozen=True, eq=False)

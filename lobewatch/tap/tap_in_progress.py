@@ -11,13 +11,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import acquisition
-from acquisition import CROSS_TAP, Circumstances, Hit, HitFlags, HitVerdict, TapTest, evaluate_hit, write_hit
+from acquisition import (
+    CROSS_TAP,
+    Circumstances,
+    Hit,
+    HitDecision,
+    HitFlags,
+    HitVerdict,
+    TapTest,
+    evaluate_hit,
+    write_hit,
+)
 from acquisition.errors import format_os_error, join_sentences
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
+from acquisition.hit_quality.best_hits import choose_best_hits
+from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
+from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
+from lobewatch.machine.folder_updates import store_hit_decisions
+from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
@@ -49,7 +64,9 @@ class TapInProgress:
     hits: list[Hit] = field(default_factory=list)
     """All hits so far."""
     flags: list[HitFlags] = field(default_factory=list)
-    """Flags of each hit. UNDONE if the operator took a good one back."""
+    """Flags of each hit, before decisions. UNDONE if the operator took a good one back."""
+    decisions: tuple[HitDecision, ...] = ()
+    """Decisions of the operator on hits. The journal counts the hits by their files until the test is committed."""
     reasons: list[str] = field(default_factory=list)
     """Sentence on what is wrong with each hit, empty if it is averaged."""
     numbers: list[int] = field(default_factory=list)
@@ -70,9 +87,14 @@ class TapInProgress:
     """Disk space reserved for it."""
 
     @property
+    def decided_flags(self) -> tuple[HitFlags, ...]:
+        """Flags of each hit after the decisions."""
+        return decide_flags(self.flags, self.decisions)
+
+    @property
     def good(self) -> int:
         """Number of hits that may be averaged."""
-        return self.flags.count(HitFlags.OK)
+        return self.decided_flags.count(HitFlags.OK)
 
     @property
     def missing(self) -> int:
@@ -87,10 +109,19 @@ class TapInProgress:
     @property
     def shown(self) -> dict[str, Any]:
         """Fields of TapState: the list of hits, and what follows from it."""
-        listed = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        by_hand = {decision.hit: decision.decision for decision in self.decisions}
+        listed = enumerate(zip(self.hits, self.flags, self.decided_flags, self.reasons, strict=True), 1)
         hits = tuple(
-            ListedHit(i, flags, format_peak(hit), bool(flags & HitFlags.UNDONE), reason, i <= self.n_resumed)
-            for i, (hit, flags, reason) in listed
+            ListedHit(
+                number=i,
+                flags=flags,
+                peak=format_peak(hit),
+                undone=bool(flags & HitFlags.UNDONE),
+                reason=reason if flags else "",
+                earlier=i <= self.n_resumed,
+                accepted=faults if by_hand.get(i) == "accept" else HitFlags.OK,
+            )
+            for i, (hit, faults, flags, reason) in listed
         )
         mean = {"mean_change": self.mean.relative_change, "settled": self.mean.has_converged}
         return {"hits": hits, "good": self.good, **mean}
@@ -111,15 +142,13 @@ class TapInProgress:
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Store a hit. It is on the disk when this returns."""
         number = max(self.numbers, default=-1) + 1
-        self._store(number, hit, flags)
+        self._store(partial(self._write, number, hit, flags))
         self._append(number, hit, flags, reason)
 
     def add_spooled(self, spooled: SpooledHit) -> None:
         """Resume with a hit that is already on the disk."""
         verdict = evaluate_safely(lambda: evaluate_hit(spooled.hit))
         self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
-        if not self.flags[-1]:
-            self.mean.add(spooled.hit)
         self.circumstances = spooled.circumstances
         self.n_resumed = len(self.hits)
 
@@ -129,26 +158,59 @@ class TapInProgress:
 
     def exclude(self, number: int, flags: HitFlags, reason: str) -> None:
         """Reject a good hit (by its index) afterwards. It stays stored."""
-        self._store(self.numbers[number], self.hits[number], flags)
+        self._store(partial(self._write, self.numbers[number], self.hits[number], flags))
         self.flags[number], self.reasons[number] = flags, reason
         self.mean.remove(self.hits[number])
 
     def undo(self) -> int | None:
         """Take back the last good hit and return its index. None if there is none."""
-        number = max((i for i, flags in enumerate(self.flags) if not flags), default=None)
-        if number is not None:
+        number = max((i for i, flags in enumerate(self.decided_flags) if not flags), default=None)
+        if number is not None and self.flags[number]:
+            self.decide(number, accept=False)
+        elif number is not None:
             self.exclude(number, HitFlags.UNDONE, "")
         return number
+
+    def decide(self, number: int, *, accept: bool) -> None:
+        """Accept or reject a hit (by its index). The decision is in the journal when this returns.
+
+        ValueError, and nothing is stored, if the hit cannot be accepted or is as wished already.
+        """
+        decision = HitDecision(number + 1, "reject")
+        if accept:
+            codes = self.flags[number].codes
+            decision = HitDecision(number + 1, "accept", codes) if codes else HitDecision(number + 1, "undo")
+        if accept != bool(self.decided_flags[number]):
+            raise ValueError(f"hit {number + 1} is already {'accepted' if accept else 'rejected'}.")
+        decisions, hit = add_decisions(self.flags, self.decisions, [decision]), self.hits[number]
+        if accept:
+            self.mean.add(hit)
+        entered = replace(decision, hit=self.numbers[number] + 1)
+        self._store(partial(store_hit_decisions, self.folder, self.id, [entered]))
+        if not accept:
+            self.mean.remove(hit)
+        self.decisions = decisions
+
+    def resume_mean(self) -> None:
+        """Average the hits of the interrupted test, after the decisions on those that are left."""
+        entered = read_hit_decisions(self.folder.journal.read().other_entries).get(self.id, ())
+        left = [made for made in entered if made.hit - 1 in self.numbers]
+        self.decisions = tuple(replace(made, hit=self.numbers.index(made.hit - 1) + 1) for made in left)
+        self.mean = acquisition.RunningMean()
+        for hit in (hit for hit, flags in zip(self.hits, self.decided_flags, strict=True) if not flags):
+            self.mean.add(hit)
 
     def recheck_first_hits(self) -> tuple[int, HitVerdict] | None:
         """Compare the first hits, which had no mean yet, with the mean of all others.
 
         Takes the first one that does not fit out of the mean, and returns its index and the reason.
         """
-        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(self.mean.hits) <= 2 * MIN_HITS_FOR_MEAN:
+        references = self._references
+        if self.mean.frf is None or not MIN_HITS_FOR_MEAN < len(references) <= 2 * MIN_HITS_FOR_MEAN:
             return None
-        for hit in self.mean.hits[:MIN_HITS_FOR_MEAN]:
-            verdict = evaluate_safely(partial(self._compare, hit))
+        for hit in references[:MIN_HITS_FOR_MEAN]:
+            others = [other for other in references if other is not hit]
+            verdict = evaluate_safely(partial(_compare, hit, others))
             if verdict.flags:
                 number = next(i for i, tap_hit in enumerate(self.hits) if tap_hit is hit)
                 self.exclude(number, verdict.flags, verdict.text)
@@ -156,19 +218,36 @@ class TapInProgress:
         return None
 
     def finish(self) -> TapTest:
-        """Return the averaged tap test. ValueError if no hit is good."""
-        return average_hits(self.id, self.circumstances, self.hits, self.flags)
+        """Return the averaged tap test, of the best hits if there are more than needed. ValueError if none is good."""
+        accepted = self._accepted
+        rest = [i for i, flags in enumerate(self.decided_flags) if not flags and i not in accepted]
+        wanted = max(self.folder.machine.tap.hits - len(accepted), 0)
+        best = choose_best_hits([self.hits[i] for i in rest], wanted)
+        for i in set(rest) - {rest[k] for k in best}:
+            self.flags[i] |= HitFlags.SURPLUS
+        return average_hits(self.id, self.circumstances, self.hits, self.flags, self.decisions)
+
+    @property
+    def _accepted(self) -> set[int]:
+        """Indices of the hits that the operator has accepted."""
+        return {decision.hit - 1 for decision in self.decisions if decision.decision == "accept"}
 
     def _evaluate(self, hit: Hit) -> HitVerdict:
-        mean = self.mean.frf if len(self.mean.hits) >= MIN_HITS_FOR_MEAN else None
+        references, mean = self._references, self.mean.frf
+        if len(references) < MIN_HITS_FOR_MEAN:
+            mean = None
+        elif mean is not None and len(references) < len(self.mean.hits):
+            mean = acquisition.estimate_frf(references)
         verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
         if not verdict.flags:
             self.mean.add(hit)
         return verdict
 
-    def _compare(self, hit: Hit) -> HitVerdict:
-        """Compare a hit of the mean with the others. All else was evaluated when it came."""
-        return HitVerdict.from_findings(evaluate_spectrum(hit, self.mean.estimate_without(hit)))
+    @property
+    def _references(self) -> list[Hit]:
+        """Hits of the mean that the operator has not accepted, to compare others with."""
+        accepted = [self.hits[i] for i in self._accepted]
+        return [hit for hit in self.mean.hits if not any(hit is one for one in accepted)]
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
         self.numbers.append(number)
@@ -176,14 +255,14 @@ class TapInProgress:
         self.flags.append(flags)
         self.reasons.append(reason)
 
-    def _store(self, number: int, hit: Hit, flags: HitFlags) -> None:
-        """Write a hit to the disk. If that is full, use the reserved space."""
+    def _store(self, write: Callable[[], None]) -> None:
+        """Write something to the disk. If that is full, use the reserved space."""
         try:
-            self._write(number, hit, flags)
+            write()
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT) or self.reserve is None or not self.reserve.release():
                 raise
-            self._write(number, hit, flags)
+            write()
 
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
         folder = self.folder.spool / self.id
@@ -193,11 +272,22 @@ class TapInProgress:
         write_hit(folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
-def average_hits(tap_id: str, about: Circumstances, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> TapTest:
+def _compare(hit: Hit, others: Sequence[Hit]) -> HitVerdict:
+    """Compare a hit of the mean with the others. All else was evaluated when it came."""
+    return HitVerdict.from_findings(evaluate_spectrum(hit, acquisition.estimate_frf(others)))
+
+
+def average_hits(
+    tap_id: str,
+    about: Circumstances,
+    hits: Sequence[Hit],
+    flags: Sequence[HitFlags],
+    decisions: tuple[HitDecision, ...] = (),
+) -> TapTest:
     """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
-    good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
-    frf = acquisition.estimate_frf(good) if good[0].has_force else None
-    return TapTest(tap_id, about, frf, tuple(replace(hit, cross_hit=None) for hit in hits), tuple(flags))
+    frf, _ = average_decided_hits(hits, decide_flags(flags, decisions))
+    hits = tuple(replace(hit, cross_hit=None) for hit in hits)
+    return TapTest(tap_id, about, frf, hits, tuple(flags), decisions=decisions)
 
 
 def format_peak(hit: Hit) -> str:
@@ -246,6 +336,7 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
             newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
                 newest.add_spooled(hit)
+            newest.resume_mean()
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
@@ -274,20 +365,27 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
     affect the other test.
     """
-    listed = zip(tap.hits, tap.flags, strict=True)
-    cross_hits = [(hit.cross_hit, flags) for hit, flags in listed if hit.cross_hit is not None]
-    if not cross_hits:
+    numbers = [i for i, hit in enumerate(tap.hits) if hit.cross_hit is not None]
+    if not numbers:
         return None
-    hits, driving_point_flags = [hit for hit, _ in cross_hits], [flags for _, flags in cross_hits]
-    verdicts = [flags or evaluate_safely(partial(_evaluate_cross_hit, hit)).flags for hit, flags in cross_hits]
-    good, wanted = verdicts.count(HitFlags.OK), driving_point_flags.count(HitFlags.OK)
-    faults = {flags.words for flags, first in zip(verdicts, driving_point_flags, strict=True) if flags and not first}
+    hits = [cross for hit in tap.hits if (cross := hit.cross_hit) is not None]
+    first = [tap.decided_flags[i] for i in numbers]
+    found = [
+        tap.flags[i] | (HitFlags.OK if tap.decided_flags[i] else _evaluate_cross_hit(hit))
+        for i, hit in zip(numbers, hits, strict=True)
+    ]
+    decisions = tuple(
+        replace(made, hit=numbers.index(made.hit - 1) + 1) for made in tap.decisions if made.hit - 1 in numbers
+    )
+    verdicts = decide_flags(found, decisions)
+    good, wanted = verdicts.count(HitFlags.OK), first.count(HitFlags.OK)
+    faults = {flags.words for flags, before in zip(verdicts, first, strict=True) if flags and not before}
     used = f"{good} of the {wanted} hits in x ({', '.join(sorted(faults))} in y)" if faults else f"the {good} hits in x"
     about = replace(tap.circumstances, direction=CROSS_TAP)
     try:
         if good < MIN_CROSS_TAP_HITS:
             raise ValueError(f"only {used} are usable. Check the sensor along y.")
-        test = average_hits(acquisition.new_tap_id(about), about, hits, verdicts)
+        test = average_hits(acquisition.new_tap_id(about), about, hits, found, decisions)
         commit(test)
     except (ArithmeticError, OSError, ValueError) as error:
         why = format_os_error(error) if isinstance(error, OSError) else str(error)
@@ -295,6 +393,8 @@ def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> C
     return CrossTapResult(test.id, f"{CROSS_TAP} is also saved, from {used}.")
 
 
-def _evaluate_cross_hit(hit: Hit) -> HitVerdict:
-    """Evaluate a hit as the second sensor recorded it."""
-    return HitVerdict(HitFlags.NOT_EVALUATED) if np.ptp(hit.acceleration) == 0 else evaluate_hit(hit)
+def _evaluate_cross_hit(hit: Hit) -> HitFlags:
+    """Return the faults of a hit as the second sensor recorded it, which may hardly respond."""
+    if np.ptp(hit.acceleration) == 0:
+        return HitFlags.NOT_EVALUATED
+    return evaluate_safely(lambda: evaluate_hit(hit)).flags & ~HitFlags.NO_RESPONSE

@@ -61,6 +61,11 @@ class TapVisit:
         if not self.is_waiting:
             self._session.undo()
 
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        """Accept or reject a hit by its number, None for the last hit."""
+        if not self.is_waiting:
+            self._session.decide(number, accept=accept)
+
     def stop(self) -> None:
         """End the running test, or the visit between two tests."""
         self._answers.put((DONE_CHOICE.key, ""))

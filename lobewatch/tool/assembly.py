@@ -17,6 +17,7 @@ from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.measurement.coverage import label_direction
+from lobewatch.measurement.hit_choice import HIT_DECISION_CODES
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
 from lobewatch.measurement.spindle_model import build_model_state
@@ -131,6 +132,8 @@ class Assembly:
     """Open questions about these tap tests."""
     uncovered: tuple[Remark, ...] = ()
     """Remarks that say the modes do not cover the measurement; no answer silences them."""
+    hit_remarks: tuple[Remark, ...] = ()
+    """Remarks on decisions on hits of these tap tests."""
 
     @property
     def is_complete(self) -> bool:
@@ -207,6 +210,12 @@ def assemble(
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
         questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
         uncovered=tuple(label_direction(own, tap.direction) for tap in taps for own in tap.uncovered),
+        hit_remarks=tuple(
+            label_direction(own, tap.direction)
+            for tap in (*taps, *([cross] if cross is not None else []))
+            for own in tap.remarks
+            if own.code in HIT_DECISION_CODES
+        ),
     )
 
 

@@ -250,7 +250,7 @@ def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
     yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
-    yield from (*case.assembly.questions, *case.assembly.uncovered)
+    yield from (*case.assembly.questions, *case.assembly.uncovered, *case.assembly.hit_remarks)
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark(

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from acquisition.errors import Remark, join_sentences
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions
+from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions, HitDecision
 
 Result = TypeVar("Result")
-_LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
+_LABEL_FIELDS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force", "hit_decisions")
 _HIT_FIELDS = ("one_test", "hit_files")
 
 
@@ -84,6 +84,8 @@ class Description:
     """Direction at the tool tip, x or y."""
     conditions: Conditions = UNKNOWN_CONDITIONS
     """Conditions of the test."""
+    hit_decisions: tuple[HitDecision, ...] = ()
+    """Decisions of a person on its hits."""
 
     def list_signal_options(self) -> list[str]:
         """List the given fields that state something about the signals of the file."""

@@ -39,8 +39,9 @@ def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
     used = [hit for place, hit in hits.items() if not faults[place]]
     remarks = [make_left_out_remark(place, fault, _CURE) for place, fault in faults.items() if fault]
     n, channels = min(hit.acceleration.size for hit in used), {hit.channels for hit in used}
-    before = {hit.pre_trigger for hit in used}
-    return [_cut(hit, n, before.pop() if len(before) == 1 else 0, len(channels) == 1) for hit in used], remarks
+    before = used[0].pre_trigger if len({hit.pre_trigger for hit in used}) == 1 else 0
+    alike = [replace(hit, sample_rate=rate, pre_trigger=before) for hit in used]
+    return [_cut(hit, n, len(channels) == 1) for hit in alike], remarks
 
 
 def _choose_most_frequent_rate(hits: Mapping[str, Hit]) -> float:
@@ -68,8 +69,8 @@ def _find_repeated(hits: Mapping[str, Hit]) -> dict[str, str]:
     return {place: f"same samples as {first}" for place, first in originals.items() if place != first}
 
 
-def _cut(hit: Hit, n: int, before: int, keeps_codes: bool) -> Hit:
-    part = replace(hit, force=hit.force[:n], acceleration=hit.acceleration[:n], pre_trigger=before, cross_hit=None)
+def _cut(hit: Hit, n: int, keeps_codes: bool) -> Hit:
+    part = replace(hit, force=hit.force[:n], acceleration=hit.acceleration[:n], cross_hit=None)
     if keeps_codes and hit.codes is not None:
         return replace(part, codes=hit.codes[:, :n])
     return replace(part, codes=None, channels=hit.channels if keeps_codes else None)

@@ -38,7 +38,9 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
     problems = join_sentences(*_list_contradictions(usable))
     together = replace(usable[0], created=created, facts=(*facts, n_files, n_hits), problems=problems)
     remarks += [*differing, *_compare_units(usable)]
-    return replace(together, hits=() if problems else tuple(joined), remarks=tuple(remarks))
+    left_out = {remark.about for remark in differing}
+    places = tuple(place for place in hits if place not in left_out)
+    return replace(together, hits=() if problems else tuple(joined), remarks=tuple(remarks), places=places)
 
 
 def _compare_units(usable: Sequence[Recording]) -> Iterator[Remark]:

@@ -70,6 +70,9 @@ class Recording:
     window: float | None = None
     """Time constant of the exponential window over the response (s); NaN if unknown, None without a window."""
 
+    places: tuple[str, ...] = ()
+    """File and number of each hit in it, where the hits are of several files; empty otherwise."""
+
     @property
     def n_found(self) -> int:
         """Number of hits found, with those that are left out; 0 for an FRF."""

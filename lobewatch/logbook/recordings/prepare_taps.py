@@ -24,6 +24,7 @@ from lobewatch.logbook.recordings.recorded_files import (
     read_tap_test,
 )
 from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.measurement.hit_choice import format_unused_hits
 from lobewatch.measurement.share_work import Workers, share_work
 from lobewatch.measurement.tap_measurement import TapFit, fit_tap, is_fit_of
 
@@ -67,6 +68,8 @@ class TapDraft(NamedTuple):
     """Fitted modes."""
     assumed_facts: tuple[str, ...]
     """Defaults assumed for facts that the file does not state."""
+    unused_hits: str = ""
+    """Hits that are not averaged, in words. Empty if all are."""
     hit_count: HitCount = HitCount(0, 0)
     """Number of hits found and used."""
     remarks: tuple[Remark, ...] = ()
@@ -99,14 +102,15 @@ class FileRequest(NamedTuple):
 
 def is_valid_draft(request: FileRequest, answer: Any) -> bool:
     """Check a draft from a worker against its own tap file."""
-    tap = read_tap_bytes(answer.content)
+    tap = replace(read_tap_bytes(answer.content), decisions=answer.entry.hit_decisions)
     return (
         isinstance(answer, TapDraft)
         and answer.digest == hashlib.sha256(request.content).hexdigest() == answer.entry.source_sha256
+        and tap.decisions == request.description.hit_decisions
         and answer.entry == TapEntry.of(tap, answer.content)
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
-        and all(isinstance(fact, str) for fact in answer.assumed_facts)
+        and all(isinstance(text, str) for text in (*answer.assumed_facts, answer.unused_hits))
         and answer.hit_count.used == len(tap.accepted) <= len(tap.hits) <= answer.hit_count.found
         and all(isinstance(remark, Remark) for remark in answer.remarks)
     )
@@ -174,8 +178,9 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
     count = HitCount(recording.n_found, len(tap.accepted))
+    unused = format_unused_hits(tap.flags, tap.decisions, recording.places)
     entry, created = TapEntry.of(tap, packed), tap.circumstances.created
-    return TapDraft(digest, packed, entry, created, fit, defaults, hit_count=count, remarks=recording.remarks)
+    return TapDraft(digest, packed, entry, created, fit, defaults, unused, count, recording.remarks)
 
 
 def interpret_content(

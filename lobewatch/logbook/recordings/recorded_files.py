@@ -13,11 +13,22 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 import acquisition
-from acquisition import Circumstances, DataError, Description, Fact, Recording, SourceFile, TapTest, inspect_file
+from acquisition import (
+    Circumstances,
+    DataError,
+    Description,
+    Fact,
+    HitDecision,
+    Recording,
+    SourceFile,
+    TapTest,
+    inspect_file,
+)
 from acquisition.errors import join_sentences
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
 from acquisition.files.tap_file import has_all_hits
+from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
 from lobewatch.machine import Machine, MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.clock_questions import is_in_future
@@ -146,7 +157,7 @@ def read_tap_test(
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
     source = SourceFile(f"{file.stem} and {len(description.hit_files)} more.zip" if is_joined else file.name, content)
     source = source.without_content if not is_joined and has_all_hits(at, recording.hits) else source
-    return _build_tap_test(recording, about, source), recording
+    return _build_tap_test(recording, about, source, description.hit_decisions), recording
 
 
 def _reject_windowed(recording: Recording) -> None:
@@ -202,14 +213,20 @@ def _find_origin(name: str, description: Description, recording: Recording) -> O
     return "option" if getattr(description, name) else "file" if getattr(recording, name) else "default"
 
 
-def _build_tap_test(recording: Recording, about: Circumstances, source: SourceFile) -> TapTest:
-    if recording.frf is not None:
-        return TapTest(acquisition.new_tap_id(about), about, recording.frf, source=source)
+def _build_tap_test(
+    recording: Recording, about: Circumstances, source: SourceFile, decisions: Sequence[HitDecision]
+) -> TapTest:
+    tap = TapTest(acquisition.new_tap_id(about), about, recording.frf, recording.hits, source=source)
     try:
+        if decisions:
+            tap = replace(tap, flags=tuple(map(acquisition.check_hit, recording.hits)))
+            return decide_hits(tap, add_decisions(tap.flags, (), decisions))
+        if recording.frf is not None:
+            return tap
         frf, flags = acquisition.average_good_hits(recording.hits)
-    except DataError as error:
+    except ValueError as error:
         raise DataError(f"{recording.path}: {error}") from error
-    return TapTest(acquisition.new_tap_id(about), about, frf, recording.hits, flags, source)
+    return replace(tap, frf=frf, flags=flags)
 
 
 def parse_date_in_name(file: Path, pattern: str) -> datetime:

@@ -59,6 +59,8 @@ class ReplayOutcome:
     """Defaults assumed for facts that files do not state, each once."""
     fits: Mapping[str, TapFit] = field(default_factory=dict)
     """Fitted modes of the new tap tests, by identity."""
+    unused_hits: Mapping[Path, str] = field(default_factory=dict)
+    """Hits that are not averaged, in words, for each new file with such hits."""
     hit_counts: Mapping[str, HitCount] = field(default_factory=dict)
     """Number of hits found and used in the new tap tests, by identity."""
     remarks: Sequence[Remark] = ()
@@ -79,7 +81,13 @@ class ReplayPlan(NamedTuple):
 
     @classmethod
     def of(cls, folder: MachineFolder, files: Sequence[Path], description: Description) -> Self:
-        """Read the files. The tap test of one of several responses must have the same direction."""
+        """Read the files. The tap test of one of several responses must have the same direction.
+
+        Raises ValueError for decisions on the hits of several files.
+        """
+        if description.hit_decisions and len(files) > 1:
+            cure = "Replay the files one by one, or give Description.one_test."
+            raise ValueError(f"decisions on hits need one file, not {len(files)}. {cure}")
         plan = cls({}, {}, {}, {})
         for file in files:
             try:
@@ -168,9 +176,9 @@ def store_recordings(
     tap_ids = [used[file] for file in files if file in used]
     counts = {tap.entry.id: tap.hit_count for tap in ready}
     remarks = [*chain.from_iterable(tap.remarks for tap in ready), *find_one_hit_tests(ready)]
-    return ReplayOutcome(
-        tap_ids, already_stored, [*fits], rejected, assumed_facts, fits, hit_counts=counts, remarks=remarks
-    )
+    unused_hits = {new[tap.digest]: tap.unused_hits for tap in ready if tap.unused_hits}
+    done = tap_ids, already_stored, [*fits], rejected, assumed_facts, fits
+    return ReplayOutcome(*done, unused_hits, hit_counts=counts, remarks=remarks)
 
 
 MAX_HIT_PAUSE = timedelta(hours=1)

@@ -1,6 +1,6 @@
 """Journal lines for test cuts, events and exclusions, and the tests and cuts that all lines give."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from operator import attrgetter
@@ -8,8 +8,10 @@ from typing import Any, Literal, get_args
 
 import msgspec
 
+from acquisition import HitDecision
+from acquisition.hit_quality.decide_hits import merge_decisions
 from lobes import Cut
-from lobewatch.machine.journal.journal import JournalReading
+from lobewatch.machine.journal.journal import JournalEntry, JournalReading, make_entry
 from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.settings.drive_power import CutPower
 from modal import ModeEdits
@@ -178,6 +180,23 @@ def read_exclusion_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, st
     return reasons
 
 
+HIT_LINE_KIND = "hit"
+"""Kind of the journal line of a decision on a hit."""
+
+
+def make_hit_entries(tap_id: str, decisions: Iterable[HitDecision]) -> list[JournalEntry]:
+    """Make the journal entries of decisions on the hits of a tap test."""
+    return [make_entry(HIT_LINE_KIND, tap=tap_id, **asdict(decision)) for decision in decisions]
+
+
+def read_hit_decisions(entries: Sequence[Mapping[str, Any]]) -> dict[str, tuple[HitDecision, ...]]:
+    """Read the decisions on hits that count, by tap test; it may still be in progress."""
+    decisions: dict[str, list[HitDecision]] = {}
+    for line in (line for line in entries if line["kind"] == HIT_LINE_KIND):
+        decisions.setdefault(line["tap"], []).append(msgspec.convert(line, HitDecision))
+    return {tap_id: merge_decisions(made) for tap_id, made in decisions.items()}
+
+
 def read_committed_cuts(reading: JournalReading) -> tuple[CutEntry, ...]:
     """Read the test cuts of the journal, oldest first."""
     excluded = read_exclusion_reasons(reading.other_entries)
@@ -194,10 +213,11 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
     excluded = read_exclusion_reasons(lines)
     by_hand = {line["tap"]: msgspec.convert(line, ModeEdits) for line in lines if line["kind"] == "modes"}
+    hits = read_hit_decisions(lines)
     old = (TapEntry.from_line(line) for line in lines if line["kind"] == "tap")
     entries = {entry.id: entry for entry in (*decode_tap_entries(reading.lines), *old)}
-    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys()):
-        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS)
+    for name in entries.keys() & (accepted.keys() | excluded.keys() | by_hand.keys() | hits.keys()):
+        later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, NO_MODE_EDITS), hits.get(name, ())
         changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
         entries[name] = msgspec.structs.replace(entries[name], **changes)
     return entries

@@ -10,12 +10,12 @@ from typing import Any, Self
 
 import msgspec
 
-from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, Remark, TapTest
+from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, HitDecision, Remark, TapTest
 from modal import ModeEdits
 
 NO_MODE_EDITS = ModeEdits()
 """No mode edits."""
-FIELDS_OF_OTHER_LINES = ("accepted", "excluded", "by_hand")
+FIELDS_OF_OTHER_LINES = ("accepted", "excluded", "by_hand", "hit_decisions")
 """Fields of a tap test that come from other journal lines."""
 TAP_LINE_PREFIX = b'{"kind": "tap", '
 """Beginning of the line of a tap test."""
@@ -69,6 +69,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Reason of its exclusion, from other lines; empty if included."""
     by_hand: ModeEdits = NO_MODE_EDITS
     """Mode edits, from other lines."""
+    hit_decisions: tuple[HitDecision, ...] = ()
+    """Decisions on its hits that count, from other lines."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
@@ -85,7 +87,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
-        return cls(tap.id, digest, len(content), *labels, source, about.conditions, operator=about.operator)
+        known = about.conditions, (), about.operator
+        return cls(tap.id, digest, len(content), *labels, source, *known, hit_decisions=tap.decisions)
 
     @classmethod
     def from_line(cls, line: dict[str, Any]) -> Self:

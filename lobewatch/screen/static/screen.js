@@ -32,6 +32,7 @@ function showState(next) {
   if (JSON.stringify(state.checks) !== JSON.stringify(before?.checks)) showChecks();
   if (JSON.stringify(state.outcome) !== JSON.stringify(before?.outcome)) showOutcome();
   if (JSON.stringify(state.choices) !== JSON.stringify(before?.choices)) showChoices();
+  showAccept();
   over = false;
   const finished = ["done", "failed"].includes(state.kind);
   at("undo").disabled = finished || state.good === 0;
@@ -91,10 +92,37 @@ function showHits() {
     ...state.hits.toReversed().map((hit) => {
       const row = element("li", "", hit.undone ? "undone" : hit.good ? "" : "bad");
       row.append(element("span", `${hit.number}`), element("span", hit.undone ? "" : hit.good ? "✓" : "✗"));
-      row.append(element("span", hit.verdict), element("span", hit.peak));
+      row.append(element("span", hit.verdict), element("span", hit.peak), decideButton(hit));
       return row;
     }),
   );
+}
+
+// Every hit of the list can be accepted or rejected by a person.
+function decideButton(hit) {
+  const button = element("button", hit.good ? "Reject" : "Accept", "decide");
+  button.type = "button";
+  button.setAttribute("aria-label", `${button.textContent} hit ${hit.number}`);
+  button.addEventListener("click", () => { button.blur(); decide(hit); });
+  return button;
+}
+
+// The last hit has a large button of its own where it was refused.
+function showAccept() {
+  const last = state.hits.at(-1);
+  const finished = ["done", "failed"].includes(state.kind);
+  const refused = Boolean(last) && !last.good && !state.choices.length && !finished;
+  at("accept").hidden = !(refused && mayAlter);
+  put("accept-text", refused ? `Accept hit ${last.number}` : "");
+}
+
+function acceptLast() {
+  if (!at("accept").hidden) decide(state.hits.at(-1));
+}
+
+async function decide(hit) {
+  if (!hit || !mayAlter || ["done", "failed"].includes(state.kind)) return;
+  await ask("decide", "POST", { hit: hit.number, accept: !hit.good }).catch((error) => toast(error.message));
 }
 
 function showChecks() {
@@ -143,6 +171,7 @@ function showButtons() {
   at("choices").hidden = !(choosing && mayAlter);
   at("undo").hidden = at("stop").hidden = choosing || !mayAlter;
   document.body.classList.toggle("choosing", choosing);
+  document.body.classList.toggle("may-alter", mayAlter && !choosing);
 }
 
 async function choose(key, tool = "") {
@@ -174,7 +203,8 @@ function showLost(why, ended) {
   showWord("no-connection", over ? "ENDED" : "NO CONNECTION");
   put("reason", over ? "lobewatch has ended. Repeat the command to continue the test with the saved hits." : why);
   document.title = at("text").textContent;
-  at("choices").hidden = at("tool-form").hidden = true;
+  at("choices").hidden = at("tool-form").hidden = at("accept").hidden = true;
+  document.body.classList.remove("may-alter");
   at("undo").disabled = at("stop").disabled = true;
 }
 
@@ -211,6 +241,7 @@ function showStop() {
 async function learnWhatIsAllowed() {
   ({ may_alter: mayAlter } = await ask("access"));
   showButtons();
+  if (state) showAccept();
 }
 
 function onKey(event) {
@@ -220,6 +251,7 @@ function onKey(event) {
   if (chooseByKey(event.key)) event.preventDefault();
   else if (UNDO_KEYS.includes(event.key)) undo();
   else if (event.key.toLowerCase() === "m") mute();
+  else if (event.key.toLowerCase() === "a") acceptLast();
   else if (event.key === "Escape") stop();
   else return;
   event.preventDefault();
@@ -232,6 +264,7 @@ function onClick(id, action) {
 
 at("back").hidden = location.pathname === "/";
 onClick("undo", undo);
+onClick("accept", acceptLast);
 onClick("mute", mute);
 onClick("stop", stop);
 at("tool-form").addEventListener("submit", (event) => {

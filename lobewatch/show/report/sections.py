@@ -13,6 +13,7 @@ from acquisition import Channel, merge_remarks
 from dsm import format_with_error
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
+from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
@@ -358,6 +359,7 @@ def make_sign_off(data: ReportData) -> list[Section]:
     points = 0 if data.series.trend is None else len(data.series.trend.points)
     tap, circumstances = data.newest, data.newest.circumstances
     hits = f"{len(tap.accepted)} of {len(tap.hits)} averaged" if tap.hits else "unknown"
+    hits += f" (by hand: {format_decisions(tap.decisions)})" if tap.decisions else ""
     rows = [
         ("machine", data.machine.machine.name),
         ("folder", data.analysis.folder.path.resolve().name),

@@ -32,6 +32,8 @@ OPTION_NAMES: Mapping[str, str] = {
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
     "CutEntry.has_chatter": "--chatter",
+    "decide_hits.accept": "--accept-hit",
+    "decide_hits.undo": "lobewatch modes MACHINE TAP --undo-hit",
     "Description.averages": "--averages",
     "Description.axes": "--axes",
     "Description.columns": "--columns",

@@ -6,7 +6,8 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any, Protocol, Self
 
 from rich.align import Align
@@ -36,6 +37,10 @@ class RunningTest(Protocol):
 
     def undo(self) -> None:
         """Undo the last good hit."""
+        ...
+
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        """Accept or reject a hit by its number, None for the last hit."""
         ...
 
     def stop(self) -> None:
@@ -104,6 +109,8 @@ def hit_markup(hit: ListedHit) -> str:
     """Return symbol, words and remedy of a hit, with colors."""
     if hit.undone:
         return "[bold]↶ UNDONE[/]"
+    if hit.accepted:
+        return f"[bold green]✓ ACCEPTED[/]  {hit.accepted.words}"
     if not hit.flags:
         return "[bold green]✓ GOOD[/]"
     return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(with_option_names(hit.reason))}"
@@ -186,6 +193,10 @@ STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "alarm": ("✗", "black on #ee8238"),
     "unknown": ("?", "black on #dddddd"),
 }
+DECISION_KEYS: Mapping[str, bool] = {"a": True, "r": False}
+"""Keys that accept (True) and reject the last hit, or the hit whose number was typed."""
+MAX_NUMBER_DIGITS = 4
+"""Largest number of digits of a typed hit number; chosen."""
 CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
 """Key of each choice."""
 
@@ -199,12 +210,13 @@ class TerminalScreen:
         self._console = console = console or SafeConsole(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
+        self._typed_number = ""
         self._keys = KeyReader()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
         self._live = Live(
             console=self._console,
-            get_renderable=lambda: render_state(session.state, self._muted),
+            get_renderable=lambda: render_state(session.state, self._muted, self._typed_number),
             refresh_per_second=10,
         )
 
@@ -235,20 +247,33 @@ class TerminalScreen:
         """Handle a key; while the sensor is moved, Enter and undo select the first choice."""
         state = self._session.state
         if state.choices and key != "m":
-            if state.word is TapStep.MOVE and key in "\nu":
-                key = CHOICE_KEYS[state.choices[0].key]
-            chosen = [choice.key for choice in state.choices if CHOICE_KEYS[choice.key] == key]
-            if chosen:
-                self._choose(chosen[0])
-        elif key == "u":
-            now = time.monotonic()
-            if now - self._undo_at > KEY_REPEAT_TIME:
-                self._session.undo()
-            self._undo_at = now
-        elif key == "q":
-            self._session.stop()
-        elif key == "m":
-            self._muted = not self._muted
+            self._handle_choice_key(state, key)
+        elif key.isdecimal() and key.isascii():
+            self._typed_number = f"{self._typed_number}{key}"[-MAX_NUMBER_DIGITS:]
+        else:
+            actions: dict[str, Callable[[], None]] = {"u": self._undo, "q": self._session.stop, "m": self._toggle_sound}
+            actions |= {name: partial(self._decide, accept) for name, accept in DECISION_KEYS.items()}
+            actions.get(key, lambda: None)()
+            self._typed_number = ""
+
+    def _handle_choice_key(self, state: TapState, key: str) -> None:
+        if state.word is TapStep.MOVE and key in "\nu":
+            key = CHOICE_KEYS[state.choices[0].key]
+        chosen = [choice.key for choice in state.choices if CHOICE_KEYS[choice.key] == key]
+        if chosen:
+            self._choose(chosen[0])
+
+    def _undo(self) -> None:
+        now = time.monotonic()
+        if now - self._undo_at > KEY_REPEAT_TIME:
+            self._session.undo()
+        self._undo_at = now
+
+    def _decide(self, accept: bool) -> None:
+        self._session.decide(int(self._typed_number) if self._typed_number else None, accept=accept)
+
+    def _toggle_sound(self) -> None:
+        self._muted = not self._muted
 
     def _choose(self, key: str) -> None:
         """Pass a choice on, with the name of the next tool."""
@@ -278,10 +303,13 @@ class TerminalScreen:
             self._ended.wait(0.2)  # s, to tell bells apart
 
 
-def render_state(state: TapState, muted: bool) -> RenderableType:
-    """Return one state of a test as it is shown."""
+def render_state(state: TapState, muted: bool, typed_number: str = "") -> RenderableType:
+    """Return one state of a test as it is shown; typed_number: number of a hit that was typed so far."""
     keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
-    return Group(*_state_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
+    keys.append(f"m {'sound' if muted else 'mute'}")
+    if not state.choices:
+        keys.append(f"a accept, r reject {f'hit {typed_number}' if typed_number else 'last hit, or NUMBER a'}")
+    return Group(*_state_lines(state), Text("   ".join(keys), "bold"))
 
 
 def _state_lines(state: TapState) -> Iterator[RenderableType]:

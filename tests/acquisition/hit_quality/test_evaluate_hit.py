@@ -275,3 +275,23 @@ def test_new_words_are_read_back() -> None:
     flags = HitFlags.TOO_HARD | HitFlags.NARROW_BAND | HitFlags.INCONSISTENT
     assert flags.words == "too hard, narrow band, inconsistent"
     assert HitFlags.from_words(flags.words) == flags
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 30.0])
+def test_a_hit_without_response_is_rejected(noise: float) -> None:
+    one = hit((200, 0, 0.6e-3))
+    silent = replace(one, acceleration=2.5 + noise * np.random.default_rng(5).normal(size=TIME.size))
+    assert HitFlags.NO_RESPONSE in evaluate_hit(silent).flags
+
+
+@pytest.mark.parametrize("share", [0.005, 0.02, 1.0])
+def test_a_weak_response_above_its_noise_is_one(share: float) -> None:
+    one = hit((200, 0, 0.6e-3))
+    noise = 0.5 * np.random.default_rng(5).normal(size=TIME.size)
+    assert HitFlags.NO_RESPONSE not in evaluate_hit(replace(one, acceleration=share * one.acceleration + noise)).flags
+
+
+def test_noise_without_a_pre_trigger_cannot_be_told_from_a_response() -> None:
+    one = hit((200, 0, 0.6e-3))
+    noise = np.random.default_rng(5).normal(size=TIME.size - 512)
+    assert HitFlags.NO_RESPONSE not in check_hit(replace(one, force=one.force[512:], acceleration=noise, pre_trigger=0))

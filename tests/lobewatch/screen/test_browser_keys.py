@@ -133,3 +133,57 @@ def test_a_verdict_in_two_pictures_sounds_once_and_one_after_another_twice(
     session.hit()
     browser.see("good", "2")
     assert browser.ask("tones") == [1320, 1320]
+
+
+@pytest.mark.parametrize("size", [(1280, 657), (390, 844)])
+def test_the_last_refused_hit_is_accepted_by_key_or_by_the_large_button(
+    browser: Browser, session: Session, server: ScreenServer, size: tuple[int, int]
+) -> None:
+    session.hit()
+    browser.open(server.url, size)
+    browser.see("good", "1")
+    assert not browser.part("accept").is_displayed()
+    session.hit(HitFlags.DOUBLE_HIT, "Let the hammer bounce back.")
+    browser.see("accept-text", "2")
+    assert browser.part("accept").size["height"] >= 44
+    browser.part("accept").click()
+    browser.see("good", "2")
+    session.hit(HitFlags.TOO_SOFT, "Hit harder.")
+    browser.see("accept-text", "3")
+    browser.press("a")
+    browser.see("good", "3")
+    assert session.decided == [(2, True), (3, True)]
+    browser.wait(lambda: not browser.part("accept").is_displayed())
+    browser.press("a")
+    browser.press("u")
+    browser.see("good", "2")
+    assert len(session.decided) == 2
+
+
+@pytest.mark.parametrize("size", [(1280, 657), (390, 844)])
+def test_each_hit_of_the_list_can_be_rejected_and_accepted_by_its_button(
+    browser: Browser, session: Session, server: ScreenServer, size: tuple[int, int]
+) -> None:
+    session.hit(HitFlags.DOUBLE_HIT, "Let the hammer bounce back.")
+    session.hit()
+    browser.open(server.url, size)
+    browser.see("good", "1")
+    for number, word in ((2, "Reject"), (1, "Accept")):
+        button = browser.driver.find_element(By.CSS_SELECTOR, f'#hits [aria-label="{word} hit {number}"]')
+        browser.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
+        button.click()
+        browser.wait(lambda done=number: [hit for hit, _ in session.decided][-1:] == [done])
+    assert session.decided == [(2, False), (1, True)]
+
+
+def test_a_read_only_page_decides_nothing(browser: Browser, session: Session, server: ScreenServer) -> None:
+    session.hit()
+    session.hit(HitFlags.DOUBLE_HIT, "Let the hammer bounce back.")
+    browser.open(server.watch_url)
+    browser.see("text", "DOUBLE HIT")
+    browser.press("a")
+    session.show(TapStep.TAP, reason="still one")
+    browser.see("reason", "still one")
+    assert not browser.part("accept").is_displayed()
+    assert not any(button.is_displayed() for button in browser.driver.find_elements(By.CSS_SELECTOR, "#hits button"))
+    assert session.decided == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -16,16 +17,20 @@ from acquisition import (
     Circumstances,
     HammeredStructure,
     Hammering,
+    HitDecision,
+    HitFlags,
     SimulatedSource,
     Structure,
     TapsEmulator,
     TapsSource,
     TapTest,
+    estimate_frf,
 )
 from acquisition.emulation import SignalFunction
 from lobewatch.logbook import Logbook
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
+from lobewatch.tap.tap_in_progress import TapInProgress, commit_cross_tap
 from tests.lobewatch.conftest import Shop
 
 RATE = 25600.0
@@ -202,3 +207,20 @@ def test_swapped_axes_are_no_driving_point(short: Shop) -> None:
     swapped = (HAMMER, ALONG_X, ALONG_Y)
     session = tap(short, lambda: Bench(felt(X), swapped))
     assert "no-lobes-driving-point" in {remark.code for remark in session.measurement.remarks}
+
+
+def test_decisions_of_the_operator_hold_for_the_cross_tap_too(short: Shop) -> None:
+    tap(short, lambda: Bench(felt(X)))
+    driving, across = (short.folder.read(entry) for entry in short.logbook.taps)
+    hits = [replace(hit, cross_hit=cross) for hit, cross in zip(driving.hits, across.hits, strict=True)]
+    flags = [HitFlags.TOO_HARD, HitFlags.TOO_HARD, *driving.flags[2:]]
+    decisions = HitDecision(2, "accept", ("too-hard",)), HitDecision(5, "reject")
+    test = TapInProgress("ID", driving.circumstances, short.folder, hits, flags, decisions=decisions)
+    stored: list[TapTest] = []
+    assert commit_cross_tap(test, stored.append)
+    (cross,) = stored
+    assert cross.decisions == decisions
+    assert [not found for found in cross.decided_flags] == [False, True, True, True, False]
+    assert cross.required_frf.n_averages == 3
+    expected = estimate_frf([across.hits[i] for i in (1, 2, 3)])
+    np.testing.assert_allclose(cross.required_frf.receptance, expected.receptance, rtol=1e-12)

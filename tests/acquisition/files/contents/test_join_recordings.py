@@ -151,3 +151,13 @@ def test_the_rate_of_most_hits_counts() -> None:
     odd["a"] = Hit(np.empty(0), HITS[0, 1], RATE)
     joined, remarks = join_hits(odd)
     assert (len(joined), [remark.about for remark in remarks]) == (2, ["a"])
+
+
+def test_hits_of_nearly_one_rate_get_the_same_rate_and_pre_trigger() -> None:
+    time = np.arange(-100, 4000) / 10240.0
+    force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 2, 0.0)
+    rates = 10240.0, 10240.0, 10240.0001
+    hits = {f"hit {i}": Hit(force + i, force * i, rate, 100) for i, rate in enumerate(rates, 1)}
+    joined, remarks = join_hits(hits)
+    assert [(hit.sample_rate, hit.pre_trigger) for hit in joined] == [(10240.0, 100)] * 3
+    assert remarks == []

@@ -37,6 +37,10 @@ class Session:
         self.asked.append("undo")
         self.called.set()
 
+    def decide(self, number: int | None, *, accept: bool) -> None:
+        self.asked.append(f"{'accept' if accept else 'reject'} {number}")
+        self.called.set()
+
     def stop(self) -> None:
         self.asked.append("stop")
         self.called.set()
@@ -253,3 +257,23 @@ def test_a_verdict_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: 
         screen.ring_bells(before, state)
         bells.append(file.getvalue().count("\a"))
     assert bells == [1, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("typed", "asked"),
+    [("a", "accept None"), ("r", "reject None"), ("3a", "accept 3"), ("12r", "reject 12"), ("3ma", "accept None")],
+)
+def test_keys_accept_and_reject_the_last_hit_or_the_one_whose_number_was_typed(typed: str, asked: str) -> None:
+    session = Session()
+    screen = TerminalScreen(session, Console(file=io.StringIO()))
+    for key in typed:
+        screen.handle_key(key)
+    assert session.asked == [asked]
+
+
+def test_an_accepted_hit_shows_its_faults_and_a_typed_number_is_shown() -> None:
+    accepted = ListedHit(2, HitFlags.OK, "231 N", accepted=HitFlags.DOUBLE_HIT)
+    assert "✓ ACCEPTED  double hit" in plain(replace(STATE, hits=(accepted,)))
+    console = Console(file=io.StringIO(), width=100)
+    console.print(render_state(STATE, muted=False, typed_number="12"))
+    assert "hit 12" in console.file.getvalue()  # type: ignore[attr-defined]

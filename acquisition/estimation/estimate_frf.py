@@ -242,24 +242,6 @@ class RunningMean:
         self._before, self.frf = self.frf, estimate_frf_from_spectra(sums, hits)
         self._sums, self.hits = sums, hits
 
-    def estimate_without(self, hit: Hit) -> Frf:
-        """Return H1 of the other hits.
-
-        Parameters
-        ----------
-        hit
-            Hit of the mean to leave out.
-
-        Raises
-        ------
-        ValueError
-            If the hit is not in the mean, or the only one.
-        """
-        others = self._others(hit)
-        if not others:
-            raise ValueError("this is the only hit in the mean, so no FRF is left without it")
-        return estimate_frf(others)
-
     def remove(self, hit: Hit) -> None:
         """Take a hit out of the mean.
 

@@ -63,13 +63,6 @@ def _compare_decays(hits: Sequence[Hit]) -> Floats:
     return _measure_distances(_normalize(np.abs(np.fft.rfft([decay[:size] for decay in decays]))))
 
 
-def _count_lines(hits: Sequence[Hit], powers: Floats) -> int:
-    """Return the number of lines up to the end of the usable band of all hits."""
-    frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    end = min(find_usable_band(frequency, power)[1] for power in powers)
-    return max(int(np.searchsorted(frequency, end, side="right")), 2)
-
-
 def _normalize(curves: Floats) -> Floats:
     return np.asarray(curves / np.linalg.norm(curves, axis=1, keepdims=True))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Circumstances, DataError, DeviceIdentity, Frf, Remark
+from acquisition import Circumstances, DataError, DeviceIdentity, Frf, Hit, Remark
 from acquisition.files.tap_file import read_circumstances
 from dsm import format_rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
@@ -77,6 +77,10 @@ WRONG_QUANTITY = RecordingQuestion("wrong-quantity")
 """Asked if the modes show another quantity than stated."""
 WRONG_UNIT = RecordingQuestion("wrong-unit")
 """Asked if the modes show a wrong unit or sensitivity."""
+ONE_HIT = RecordingQuestion(
+    "one-hit", sentence="only one hit was averaged, so nothing shows that it repeats: is the clamping firm?"
+)
+"""Asked of a tap test of a single hit."""
 EMULATED_DEVICE = RecordingQuestion(
     "emulated-device", sentence="recorded from an emulated device, but other tap tests of this machine are real"
 )
@@ -90,6 +94,7 @@ MODE_QUESTIONS = (
     STIFFNESS_OFF_MODEL,
     WRONG_QUANTITY,
     WRONG_UNIT,
+    ONE_HIT,
 )
 RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
@@ -142,6 +147,11 @@ def check_quantity(modes: Iterable[Mode]) -> Remark | None:
     codes = (WRONG_QUANTITY.code, WRONG_UNIT.code)
     asked = (remark for mode in modes for remark in mode.remarks if remark.code in codes)
     return next((replace(remark, about="") for remark in asked), None)
+
+
+def check_hit_count(hits: Sequence[Hit]) -> Remark | None:
+    """Return the question about a tap test with a single averaged hit, or None; hits: those averaged."""
+    return ONE_HIT.ask() if len(hits) == 1 else None
 
 
 def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:

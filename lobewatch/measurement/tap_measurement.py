@@ -114,7 +114,8 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
     about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
-    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
+    asked = filter(None, [band, questions.check_hit_count(tap.accepted)])
+    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *asked)
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
@@ -126,8 +127,8 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
             fit = partial(_fit_frf, by_hand=by_hand)
             *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
             about_hits = (*hidden_window_remarks(tap.accepted, fitted.modes), *touch_remarks(tap.accepted), *changes)
-            asked = filter(None, [questions.check_quantity(fitted.modes)])
-            said = (*remarks, *fitted.remarks, *about_hits, *asked)
+            quantity = filter(None, [questions.check_quantity(fitted.modes)])
+            said = (*remarks, *fitted.remarks, *about_hits, *quantity)
             return TapFit(*named, fitted.modes, said, frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")

@@ -28,7 +28,7 @@ from lobewatch.tool import Assembly, compute_lobes
 from lobewatch.tool.assembly import compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import compute_limit_band
 from lobewatch.verdicts.setting_robustness import model_softening
-from modal import Mode, UnexplainedPeak, find_unexplained_peaks, select_credible_modes
+from modal import Mode, UnexplainedPeak, select_credible_modes
 
 MAX_LOBE_DIAGRAMS = 24
 """Largest number of tap tests with a lobe diagram."""
@@ -122,15 +122,11 @@ class ReportData:
         modes = select_credible_modes([mode for mode in measurement.modes if low <= mode.frequency <= high]).modes
         return modes if all(mode.has_stiffness for mode in modes) else ()
 
-    @cached_property
+    @property
     def unexplained_peaks(self) -> Sequence[UnexplainedPeak]:
-        """Measured peaks that these modes do not explain; none of a cross FRF."""
+        """Measured peaks that the modes used for lobes do not explain; none of a cross FRF."""
         measurement = self.analysis.measurement(self.last.tap_id)
-        if measurement.frf is None or measurement.cross is not None:
-            return ()
-        low, high = self.machine.mode.band_hz or (0.0, math.inf)
-        peaks = find_unexplained_peaks(measurement.frf, self.accepted_modes)
-        return [peak for peak in peaks if low <= peak.frequency <= high]
+        return () if measurement.cross is not None else measurement.unexplained
 
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:

@@ -59,10 +59,8 @@ def make_series(data: ReportData) -> list[Section]:
     shown, more = rows[:MAX_SHOWN_SERIES], rows[MAX_SHOWN_SERIES:]
     now, limits = data.outlook.status.time, data.outlook.limits
     dates = ", ".join(f"-{percent:g} % {trends.reach_text(reach, now)}" for percent, reach in limits)
-    table, note = (
-        DataTable(SERIES_HEADS, shown, "words"),
-        Paragraph(data.no_dates or f"f1 limits reached: {dates}.", is_small=True),
-    )
+    table = DataTable(SERIES_HEADS, shown, "words")
+    note = Paragraph(data.no_dates or f"f1 limits reached: {dates}.", is_small=True)
     folded = Section(f"{len(more)} more series", [DataTable(SERIES_HEADS, more, "words")], "folded")
     return [Section("Series", [table, note]), *([folded] if more else [])]
 
@@ -212,13 +210,9 @@ def make_frequency_response(data: ReportData, style: str) -> list[Section]:
     if newest is None:
         return []
     band = data.response_band(newest)
-    unexplained = data.unexplained_peaks
-    figure = plot_frf(None if first is None else first.frf, newest, band, data.accepted_modes, unexplained)
+    figure = plot_frf(None if first is None else first.frf, newest, band, data.accepted_modes, data.unexplained_peaks)
     drawing = Drawing.of(figure, NumberTable.from_response(newest.in_band(band)))
-    text = "Receptance at the tool tip. Fit: sum of the accepted modes."
-    if unexplained:
-        where = ", ".join(f"{peak.frequency:.0f}" for peak in unexplained)
-        text += f" Triangles: peaks that the accepted modes do not explain ({where} Hz)."
+    text = "Receptance at the tool tip. Fit: sum of accepted modes. Triangles: peaks that they do not explain."
     return [Section("Frequency response", [Paragraph(text, is_small=True), drawing], style)]
 
 

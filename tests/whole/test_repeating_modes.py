@@ -33,7 +33,7 @@ def test_a_mode_of_half_of_the_points_repeats(
     monkeypatch.setattr(sys, "argv", ["repeating_modes.py", str(tmp_path)])
     repeating_modes.main()
     *_, row = capsys.readouterr().out.splitlines()
-    assert row == "| tool | 5 | 1.00 of 3 | 1.00 of 3 | 1.00 of 3 | 1.00 of 3 |"
+    assert row == "| tool | 5 | 1.00 of 3 | 1.00 of 3 | 1.00 of 3 | 0.67 of 3 |"
 
 
 @pytest.mark.parametrize(("count", "beside"), [(2, "0.00"), (3, "1.00")])

@@ -121,7 +121,7 @@ def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -
 
 
 def _averages_remedy(mode: Mode) -> str:
-    return "Average more hits" if mode.n_hits else "Measure the FRF again with more averages"
+    return "Average more hits" if mode.n_hits else "Measure again with more averages"
 
 
 def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool:

@@ -21,6 +21,7 @@ from modal.hit_scatter import (
     decay_covariance,
     hit_covariances,
     leave_one_out_frfs,
+    merge_scattered_decay_pairs,
     merge_scattered_pairs,
     single_hit_variance,
 )
@@ -255,7 +256,7 @@ def fit_decays(decays: ArrayLike, sample_rate: float, band: tuple[float, float] 
     Parameters
     ----------
     decays : array_like, shape (p, n)
-        Accelerations of p free decays (m/s^2).
+        Accelerations of p free decays after hits at one point in one direction (m/s^2).
     sample_rate : float
         Sample rate (Hz).
     band : tuple of float, optional
@@ -348,6 +349,7 @@ def modes_from_decays(state: Extraction) -> list[Mode]:
     ----------
     Liang & Zeger (1986), Biometrika 73, 13.
     """
+    state = merge_scattered_decay_pairs(state)
     pairs = [pair for band in state.bands for pair in _decay_modes(state, band)]
     highest = max((height for _, height in pairs), default=1.0)
     modes = [_drop_stiffness(mode, height / highest) for mode, height in pairs]

@@ -12,9 +12,10 @@ from modal.arrays import Complexes, Floats
 from modal.bands.dense_bands import MAX_HIDDEN_MODE_ERROR
 from modal.bands.extraction import Extraction, FittedBand, replace_band
 from modal.bands.fit_peaks import refit_real_constants
-from modal.bands.merge_modes import merge_pair, overlapping_pairs
+from modal.bands.merge_modes import MIN_SHAPE_MAC, merge_pair, overlapping_pairs
 from modal.bands.residual_analysis import moving_mode_variance
 from modal.fitting.band_fit import BandFit
+from modal.modes.match_modes import mac
 from modal.modes.mode import Mode, add_remark
 from modal.quality.assess_mode import MAX_HIT_SCATTER_RATIO
 from modal.quality.trust import Trust, assess_trust
@@ -188,6 +189,32 @@ def _merge_scattered_pairs(state: Extraction, band: FittedBand, pairs: Sequence[
         if merged is not None:
             return _merge_scattered_pairs(state, refit_real_constants(merged), pairs)
     return band
+
+
+def merge_scattered_decay_pairs(state: Extraction) -> Extraction:
+    """Merge pairs of overlapping modes whose sizes differ from decay to decay: one mode that is now here, now there.
+
+    Two modes that exist in every decay keep the ratio of their sizes, as hits at one point excite close modes alike.
+    """
+    for band in state.bands:
+        state = replace_band(state, band, _merge_scattered_decay_pairs(band))
+    return state
+
+
+def _merge_scattered_decay_pairs(band: FittedBand) -> FittedBand:
+    for i, j in () if band.edits else overlapping_pairs(band.fit):
+        merged = merge_pair(band, i, j, MAX_UNSTEADY_RESIDUAL) if _scatters_over_decays(band.fit, i, j) else None
+        if merged is not None:
+            return _merge_scattered_decay_pairs(merged)
+    return band
+
+
+def _scatters_over_decays(fit: BandFit, i: int, j: int) -> bool:
+    """Return whether the ratio of the constants of two modes differs from decay to decay by more than noise."""
+    size = np.abs(fit.constant[:, [i, j]])
+    by_noise = np.sum(np.sqrt(np.mean((fit.size_error[:, [i, j]] * size) ** 2, axis=0) / np.mean(size**2, axis=0)))
+    outside = 1 - mac(fit.constant[:, i], fit.constant[:, j])
+    return bool(outside > max(1 - MIN_SHAPE_MAC, (MAX_HIT_SCATTER_RATIO * by_noise) ** 2))
 
 
 def band_changes(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: Complexes) -> Floats:

@@ -14,7 +14,7 @@ from lobewatch.machine import NO_MODE_EDITS
 from lobewatch.machine.settings.setup_tables import SensorLoading
 from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
-from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
 from lobewatch.measurement.recording_questions import check_quantity
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
@@ -152,7 +152,9 @@ def fit_file_modes(
         windowed = tuple(windows.hidden_window_remarks(hits, modes))
         fitted, ringing = windows.refit_ringing_modes(modes, () if accept else hits, band, mass)
         windowed += ringing
-    found = (*_fit_remarks(modes, frf, band), *find_hit_remarks(hits, band))
+    changes = tuple(find_hit_remarks(hits, band))
+    modes, fitted = drop_explained_remedies(modes, changes), drop_explained_remedies(fitted, changes)
+    found = (*_fit_remarks(modes, frf, band), *changes)
     remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
     of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found, file_frf.places
@@ -166,9 +168,10 @@ def _fit_decay_modes(
     if decays.recorded_window is not None:
         raise DataError(f"{path}: the response has a window, which adds damping. Export the response without a window.")
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
-    modes = tuple(modal.modes_from_decays(state))
+    changes = tuple(find_hit_remarks(decays.hits, band))
+    modes = drop_explained_remedies(modal.modes_from_decays(state), changes)
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
-    remarks = (*decays.remarks, *fit_remarks, *find_hit_remarks(decays.hits, band))
+    remarks = (*decays.remarks, *fit_remarks, *changes)
     of_hits = decays.faults, decays.decisions, decays.n_found, decays.places
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 

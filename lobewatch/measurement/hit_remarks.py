@@ -1,12 +1,13 @@
 """Remarks on modes that change from hit to hit of one tap test."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 import modal
 from acquisition import Hit, HitFlags, Remark
-from modal import HitChange, HitChangeKind
+from modal import HitChange, HitChangeKind, Mode
 
 MIN_UNCOVERED_SPREAD = 0.25
 """Spread of a frequency over the hits from which its states limit cuts differently (damping ratios).
@@ -31,6 +32,8 @@ REMEDIES = {
     HitChangeKind.PARTIAL: "Look for loose parts, and hit the same point in the same direction",
 }
 """Remedy of a change from hit to hit, by its kind."""
+EXPLAINED_CODES = ("low-coherence", "scatter", "several-modes", "uncertain", "uneven-peak")
+"""Codes of remarks on modes that a change from hit to hit explains."""
 
 
 MIN_INCONSISTENT_HITS = 2
@@ -51,6 +54,20 @@ def find_hit_remarks(
         is_small = max(change.relative_spread for change in of_kind) < MIN_UNCOVERED_SPREAD
         if not (is_small and kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
             yield _make_remark(of_kind, is_small)
+
+
+def drop_explained_remedies(modes: Sequence[Mode], changes: Sequence[Remark]) -> tuple[Mode, ...]:
+    """Return the modes without the remedies that compete with the remedy of a change from hit to hit.
+
+    More hits, for example, only prolong a drift. changes: remarks of `find_hit_remarks`; without any the modes stay.
+    """
+    if not changes:
+        return tuple(modes)
+    return tuple(replace(mode, remarks=tuple(map(_drop_explained_remedy, mode.remarks))) for mode in modes)
+
+
+def _drop_explained_remedy(remark: Remark) -> Remark:
+    return replace(remark, cure="") if remark.code in EXPLAINED_CODES else remark
 
 
 def _find_changes(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> list[HitChange]:

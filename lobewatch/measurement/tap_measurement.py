@@ -18,7 +18,7 @@ from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_choice import find_choice_remarks
-from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
@@ -123,13 +123,14 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
                 said = (*remarks, *edited, *decay_remarks(machine.tap.sensor), *changes)
-                return TapFit(*named, tuple(modal.modes_from_decays(state)), said)
+                return TapFit(*named, drop_explained_remedies(modal.modes_from_decays(state), changes), said)
             fit = partial(_fit_frf, by_hand=by_hand)
             *_, fitted = fit_on_time(tap.frf, tap.accepted, machine.tap.sensor, fit)
             about_hits = (*hidden_window_remarks(tap.accepted, fitted.modes), *touch_remarks(tap.accepted), *changes)
             quantity = filter(None, [questions.check_quantity(fitted.modes)])
             said = (*remarks, *fitted.remarks, *about_hits, *quantity)
-            return TapFit(*named, fitted.modes, said, frf=fitted.extraction.frf)
+            modes = drop_explained_remedies(fitted.modes, changes)
+            return TapFit(*named, modes, said, frf=fitted.extraction.frf)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)

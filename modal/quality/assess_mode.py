@@ -115,9 +115,13 @@ def _position_remarks(state: Extraction, band: FittedBand, i: int, mode: Mode) -
         cure = "Check for drift and loose clamping, and for a window or smoothing in the analyser"
         yield mode_remark(mode, "uneven-peak", text, cure)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.close_frequencies):
-        where = " and ".join(f"{suspect:.0f}" for suspect in band.close_frequencies)
+        where = " and ".join(f"{suspect:.6g}" for suspect in band.close_frequencies)
         text = f"may be several modes near {where} Hz, too noisy to separate (stiffness K then combines all of them)"
-        yield mode_remark(mode, "several-modes", text, "Average more hits")
+        yield mode_remark(mode, "several-modes", text, _averages_remedy(mode))
+
+
+def _averages_remedy(mode: Mode) -> str:
+    return "Average more hits" if mode.n_hits else "Measure again with more averages"
 
 
 def _has_unfitted_neighbour(state: Extraction, band: FittedBand, i: int) -> bool:
@@ -144,7 +148,7 @@ def _value_remarks(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
         yield mode_remark(mode, "near-node", text, "Tap at a point with more motion")
     elif relative_error(mode) > REPORTED_MODE_ERROR or "uncertain" in dict(trust_rules(mode)):
         text = f"standard error of zeta or stiffness K is {100 * relative_error(mode):.0f} %"
-        yield mode_remark(mode, "uncertain", text, "Average more hits")
+        yield mode_remark(mode, "uncertain", text, _averages_remedy(mode))
     if mode.misfit is not None and mode.misfit > MAX_MISFIT_RATIO and share > MIN_MISFIT_SHARE:
         text = f"fit residual is {mode.misfit:.1f} times the noise and {100 * share:.0f} % of the peak"
         yield mode_remark(mode, "misfit", text)

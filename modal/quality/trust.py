@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from acquisition import Remark, stiffness_remark
 from modal.modes.mode import Mode
@@ -163,6 +163,8 @@ REJECTED_MODE_REMEDY = (
     "Check the peak with modal.synthesize_frf. Against drift, let the sensor settle or change its cable"
 )
 
+DIFFERENT_HITS_REMEDY = "Let the spindle warm up, check the clamping, and tap again with at least four hits"
+
 
 @dataclass(frozen=True, eq=False)
 class CredibleModes:
@@ -230,7 +232,24 @@ def _rejection_remark(mode: Mode) -> Remark | None:
     reasons = [REJECTION_REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
         reasons.append("peak cut off at the edge of the fitted band")
+    if _is_rejected_by_hits(mode):
+        text = f"mode not used, because the hits differ: standard error of zeta or K {100 * relative_error(mode):.0f} %"
+        return Remark("mode-differs-over-hits", at, text, DIFFERENT_HITS_REMEDY)
     if reasons:
         text = f"mode not used, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
         return Remark("mode-not-believed", at, text, REJECTED_MODE_REMEDY)
     return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, (cause or stiffness).cure)
+
+
+def _is_rejected_by_hits(mode: Mode) -> bool:
+    """Return whether a mode is too uncertain because the hits differ.
+
+    Then the fit to their mean is certain, or the coherence is low and the peak is not that of one mode. Noise lowers
+    the coherence, too, but leaves no misfit. A window makes an uneven peak, but lowers no coherence.
+    """
+    rejection = ("uncertain", Trust.REJECTED)
+    if mode.jackknife is None or rejection not in trust_rules(mode):
+        return False
+    codes = {remark.code for remark in mode.remarks}
+    is_uneven = "low-coherence" in codes and bool(codes & {"misfit", *MOVING_MODE_CODES})
+    return is_uneven or rejection not in trust_rules(replace(mode, jackknife=None))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import t
 
 from acquisition import Hit, Remark, estimate_frf
-from modal import Mode, Trust, assess_trust, fit_modes, match_modes, synthesize_frf, trust_rules
+from modal import Mode, Trust, assess_trust, fit_decays, fit_modes, match_modes, synthesize_frf, trust_rules
 from modal.hit_scatter import single_hit_factors
 
 RATE, SAMPLES, HITS = 12800.0, 6400, 10
@@ -84,6 +84,32 @@ def test_two_modes_that_every_hit_has_stay_two(ratio: float, zeta: float) -> Non
         found = near(tap(HITS * [0.0], zeta, seed, ratio))
         assert [mode.frequency / FREQUENCY for mode in found] == pytest.approx([1.0, ratio], rel=1e-3)
         assert all(assess_trust(mode) is Trust.TRUSTED for mode in found)
+
+
+def near_decays(hits: list[Hit]) -> list[Mode]:
+    start = round(0.0105 * RATE)
+    found = fit_decays([hit.acceleration[start:] for hit in hits], RATE, (300.0, 0.4 * RATE))
+    return [mode for mode in found if abs(mode.frequency / FREQUENCY - 1) < 0.1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "shifts", [np.linspace(0, -1, HITS).tolist(), HITS // 2 * [0.0, -1.0]], ids=["drift", "states"]
+)
+def test_decays_of_what_moves_from_hit_to_hit_are_one_mode_that_holds_every_state(
+    shifts: list[float], seed: int
+) -> None:
+    (mode,) = near_decays(tap(shifts, 0.01, seed))
+    low, high = mode.interval()[0]
+    assert low < FREQUENCY * (1 + 0.01 * min(shifts)) < FREQUENCY < high
+    assert "uneven-peak" in {remark.code for remark in mode.remarks}
+
+
+@pytest.mark.parametrize(("ratio", "zeta"), [(1.01, 0.01), (1.02, 0.01), (1.03, 0.03)])
+def test_two_modes_that_every_decay_has_stay_two(ratio: float, zeta: float) -> None:
+    for seed in range(3):
+        found = near_decays(tap(HITS * [0.0], zeta, seed, ratio))
+        assert [mode.frequency / FREQUENCY for mode in found] == pytest.approx([1.0, ratio], rel=1e-3)
 
 
 @given(st.lists(st.tuples(st.floats(1, 9), st.floats(-1, 1)), min_size=3, max_size=12))

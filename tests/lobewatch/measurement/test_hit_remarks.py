@@ -9,12 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, Hit, HitFlags, Structure, TapTest, estimate_frf
+from acquisition import Circumstances, Description, Hit, HitFlags, Remark, Structure, TapTest, estimate_frf
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.measurement.coverage import UNCOVERED_CODES
-from lobewatch.measurement.hit_remarks import HIT_CHANGE_CODES, SMALL_CHANGE_CODE, find_hit_remarks
+from lobewatch.measurement.file_modes import fit_file_modes
+from lobewatch.measurement.hit_remarks import (
+    EXPLAINED_CODES,
+    HIT_CHANGE_CODES,
+    SMALL_CHANGE_CODE,
+    drop_explained_remedies,
+    find_hit_remarks,
+)
 from lobewatch.measurement.tap_measurement import measure
+from modal import Mode
 from tests.modal.disturbed_hits import Share, tap_structure
 
 ZETA = 0.012
@@ -89,5 +97,31 @@ def test_a_tap_test_says_it_and_is_not_covered(tmp_path: Path, code: str | None)
     about = Circumstances("m", datetime(2026, 11, 20, tzinfo=UTC), "reference")
     test = TapTest("t", about, estimate_frf(hits), tuple(hits), (HitFlags.OK,) * len(hits))
     measurement = measure(test, MachineFolder(tmp_path / "m").machine)
+    mode_level = [remark for mode in measurement.modes for remark in mode.remarks if remark.code in EXPLAINED_CODES]
+    assert bool(mode_level) == bool(code)
+    assert not any(remark.cure for remark in mode_level)
     hit_level = [remark.code for remark in measurement.uncovered if remark.code in HIT_CHANGE_CODES.values()]
     assert hit_level == ([code] if code else [])
+
+
+def test_only_the_remedies_that_a_change_explains_are_dropped() -> None:
+    remarks = tuple(Remark(code, "900 Hz", "a text", "A remedy") for code in ("scatter", "not-driving-point"))
+    modes = [Mode(900.0, 0.01, 3e7, remarks=remarks)]
+    assert drop_explained_remedies(modes, ()) == tuple(modes)
+    (mode,) = drop_explained_remedies(modes, [Remark("hits-drift", "900 Hz", "a text")])
+    assert [remark.cure for remark in mode.remarks] == ["", "A remedy"]
+
+
+@pytest.mark.parametrize("has_force", [True, False])
+def test_the_modes_of_a_file_have_no_remedy_beside_that_of_the_change(tmp_path: Path, has_force: bool) -> None:
+    hits = tap(SHARES["hits-drift"])
+    names = ["time [s]", *(["force [N]"] if has_force else []), "acceleration [m/s^2]"]
+    response = np.concatenate([hit.acceleration for hit in hits])
+    force = [np.concatenate([hit.force for hit in hits])] if has_force else []
+    columns = np.column_stack([np.arange(response.size) / hits[0].sample_rate, *force, response])
+    np.savetxt(tmp_path / "hits.csv", columns, fmt="%.9g", delimiter=",", header=",".join(names), comments="")
+    file_modes = fit_file_modes(tmp_path / "hits.csv", description=Description(without_force=not has_force))
+    assert "hits-drift" in {remark.code for remark in file_modes.remarks}
+    explained = [remark for mode in file_modes.fitted for remark in mode.remarks if remark.code in EXPLAINED_CODES]
+    assert explained
+    assert not any(remark.cure for remark in explained)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -74,6 +77,20 @@ def test_what_is_too_noisy_to_tell_is_reported() -> None:
 def test_two_modes_in_noise_of_a_percent_are_reported_to_be_several() -> None:
     codes = [codes_between(noisy(pair(1.02), 1e-2, seed)) for seed in range(12)]
     assert sum("several-modes" in said for said in codes) >= 10
+
+
+def test_frequencies_of_suspected_modes_close_to_each_other_read_as_two() -> None:
+    read = 0
+    for seed in range(4):
+        slow = replace(noisy(pair(1.02), 1e-2, seed), frequency=LINES / 200)
+        said = [remark for mode in fit_modes(slow) for remark in mode.remarks if remark.code == "several-modes"]
+        for remark in said:
+            low, high = re.findall(r"\d+(?:\.\d+)?", remark.text)
+            assert float(low) == pytest.approx(float(high), rel=0.2)
+            assert float(low) < float(high)
+            assert remark.cure
+            read += 1
+    assert read
 
 
 @pytest.mark.parametrize("damping", [0.005, 0.03, 0.1])

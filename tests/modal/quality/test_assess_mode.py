@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import Frf, Remark, from_accelerance
+from acquisition import Frf, Remark, estimate_frf, from_accelerance
 from modal import Mode, fit_modes, synthesize_frf
+from tests.modal.test_moving_modes import tap
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 MODE = Mode(1722.0, 0.03, 3.5e7)
@@ -88,3 +89,18 @@ def test_stiffness_of_a_truncated_peak_is_right_within_its_error() -> None:
     for seed in range(5):
         (mode,) = fit_modes(noisy([MODE], seed=seed), (500.0, 1750.0))
         assert abs(mode.stiffness - MODE.stiffness) < 4 * mode.standard_error[2]
+
+
+def test_an_uncertain_mode_has_a_remedy_and_another_one_without_hits() -> None:
+    hits = tap([0.0, -1.0, -2.0], 0.01, 3)
+    frf = estimate_frf(hits)
+    with_hits, without = (
+        {remark.code: remark.cure for mode in modes for remark in mode.remarks}
+        for modes in (fit_modes(frf, hits=hits), fit_modes(frf))
+    )
+    both = {"uncertain", "several-modes"} & with_hits.keys() & without.keys()
+    assert both
+    for code in both:
+        assert with_hits[code]
+        assert without[code]
+        assert with_hits[code] != without[code]

@@ -8,8 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition import Remark
-from modal import Mode, Trust, assess_trust, fit_modes, match_modes, synthesize_frf, trust_rules
+from acquisition import Remark, estimate_frf
+from modal import (
+    Mode,
+    Trust,
+    assess_trust,
+    fit_modes,
+    match_modes,
+    select_credible_modes,
+    synthesize_frf,
+    trust_rules,
+)
+from tests.modal.test_moving_modes import tap
 
 pytestmark = pytest.mark.quick
 
@@ -135,3 +145,38 @@ def test_a_fitted_mode_carries_the_figures() -> None:
     assert mode.misfit_share is not None
     assert mode.misfit_share < 1e-6
     assert assess_trust(mode) is Trust.TRUSTED
+
+
+def test_a_mode_that_only_the_scatter_over_hits_rejects_has_its_own_code() -> None:
+    scatter = replace(GOOD, covariance=UNCERTAIN / 10, jackknife=3 * UNCERTAIN, n_hits=3)
+    poor = replace(GOOD, covariance=3 * UNCERTAIN, jackknife=3 * UNCERTAIN, n_hits=3)
+    codes = [select_credible_modes([mode]).remarks[0].code for mode in (scatter, poor)]
+    assert codes == ["mode-differs-over-hits", "mode-not-believed"]
+    assert select_credible_modes([scatter]).remarks[0].cure
+    assert select_credible_modes([replace(scatter, jackknife=UNCERTAIN / 10)]).remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("of_mode", "code"),
+    [
+        (["low-coherence", "uneven-peak"], "mode-differs-over-hits"),
+        (["low-coherence", "misfit"], "mode-differs-over-hits"),
+        (["low-coherence"], "mode-not-believed"),
+        (["uneven-peak", "misfit"], "mode-not-believed"),
+    ],
+)
+def test_an_uncertain_fit_is_due_to_the_hits_if_they_are_incoherent_and_the_peak_is_uneven(
+    of_mode: list[str], code: str
+) -> None:
+    remarks = tuple(Remark(one, "", "a text") for one in of_mode)
+    mode = replace(GOOD, covariance=3 * UNCERTAIN, jackknife=3 * UNCERTAIN, n_hits=3, remarks=remarks)
+    assert [remark.code for remark in select_credible_modes([mode]).remarks] == [code]
+    without_hits = replace(mode, jackknife=None, n_hits=0)
+    assert [remark.code for remark in select_credible_modes([without_hits]).remarks] == ["mode-not-believed"]
+
+
+def test_three_hits_that_differ_reject_their_modes_as_such() -> None:
+    for seed in range(3):
+        hits = tap([0.0, 2.0, 0.0], 0.01, seed)
+        remarks = select_credible_modes(fit_modes(estimate_frf(hits), hits=hits)).remarks
+        assert {remark.code for remark in remarks} == {"mode-differs-over-hits"}

@@ -39,7 +39,7 @@ def suggest_axes(array: NDArray[Any]) -> tuple[str, ...]:
     others = [axis for axis in range(3) if axis != samples]
     peaks = np.ma.array(np.max(np.abs(array), axis=samples), mask=np.ptp(array, axis=samples) == 0)
     crest = np.ma.log(peaks / np.std(array, axis=samples))
-    spreads = [np.ma.filled(np.ma.std(np.ma.median(crest, axis=axis)), 0.0) for axis in (1, 0)]
+    spreads = [np.ma.filled(np.ma.std(crest.mean(axis=axis)), 0.0) for axis in (1, 0)]
     channels = others[int(np.argmax(spreads))]
     return tuple("samples" if axis == samples else "channels" if axis == channels else "hits" for axis in range(3))
 

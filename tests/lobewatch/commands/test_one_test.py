@@ -111,7 +111,7 @@ def test_other_axes_are_an_error_of_the_option(shop: Shop, array: Path, axes: st
 def test_bad_files_and_bad_hits_are_named_and_counted(shop: Shop, files: list[Path], command: str) -> None:
     put_hit(files[1], HITS[1], rate=2 * RATE)
     put_hit(files[2], HITS[2, :1], "time [s],force [N]")
-    double = HITS[3] + 0.5 * np.roll(HITS[3], 80, axis=1) * np.array([[1.0], [0.0]])
+    double = HITS[3] + 0.9 * np.roll(HITS[3], 80, axis=1) * np.array([[1.0], [0.0]])
     put_hit(files[3], double)
     if command == "replay":
         said = answer("replay", shop.path, *files, "--one-test", *DATED)

@@ -115,7 +115,7 @@ def _reject_new_decisions(folder: MachineFolder, known: Collection[str | None], 
     """Reject new decisions on stored hits of several files: the order of the files may be another one now."""
     for tap in folder.taps():
         if tap.id in known and not set(description.hit_decisions) <= set(tap.hit_decisions):
-            cure = f"Decide on its hits with lobewatch modes {folder.path} {tap.id}."
+            cure = "Decide on the hits of the stored tap test instead."
             raise ValueError(f"the files are stored already as {tap.id}, perhaps in another order. {cure}")
 
 

@@ -171,15 +171,15 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
     if len(sizes) > 1:
         report.add_fault(f"the channels differ in number of samples ({format_signal_names(of_one_length)})")
         return 0.0, used
-    if sizes and min(sizes) < MIN_SAMPLES:
-        report.add_fault(f"{min(sizes)} samples are too few for a hit. Record at least {MIN_SAMPLES} samples")
-        return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
         report.add_fault(f"the channels differ in sample rate ({min(rates):g} and {max(rates):g} Hz)")
         return 0.0, used
     times = [time for time in times if time.values.size in sizes]
     report.add_flaws([*used, *times])
+    if sizes and min(sizes) < MIN_SAMPLES:
+        report.add_fault(f"{min(sizes)} samples are too few for a hit. Record at least {MIN_SAMPLES} samples")
+        return 0.0, used
     by_axis = _compute_rate_from_time(times, report)
     return _agree_on_rate(rates[0] if rates else by_axis, report), used
 

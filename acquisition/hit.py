@@ -12,6 +12,8 @@ from acquisition.arrays import Codes, Floats
 from acquisition.channel import Channel, ChannelQuantity
 from acquisition.errors import DataError
 
+MIN_SAMPLES = 8
+"""Smallest number of samples of a hit; chosen."""
 MAX_SI_VALUE = 1e50
 """Largest absolute value in SI units. No measurement is larger, and powers of larger values may be infinite."""
 
@@ -66,11 +68,11 @@ class Hit:
             if not -MAX_SI_VALUE <= np.min(values, initial=0.0) <= np.max(values, initial=0.0) <= MAX_SI_VALUE:
                 bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
                 flaw = describe_invalid_value(values[bad[0]])
-                raise ValueError(f"{name} is {flaw} at {bad.size} samples, first at sample {bad[0]}")
+                raise ValueError(f"{name} is {flaw} at {bad.size} of {values.size} samples, first at sample {bad[0]}")
         same = self.force.shape in (self.acceleration.shape, (0,))
-        if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
+        if not same or self.acceleration.ndim != 1 or self.acceleration.size < MIN_SAMPLES:
             shapes = f"force {self.force.shape} and acceleration {self.acceleration.shape}"
-            raise ValueError(f"{shapes} must be 1-D records of equal length, at least 8 samples")
+            raise ValueError(f"{shapes} must be 1-D records of equal length, at least {MIN_SAMPLES} samples")
         if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
             raise ValueError(f"sample_rate={self.sample_rate} Hz is not above 0")
 

@@ -106,7 +106,8 @@ def inspect_file(path: Path | str, description: Description = EMPTY_DESCRIPTION)
     labels = {name: getattr(about, name) for name in names}
     conditions = about.conditions if about and about.machine else None
     facts = tuple(_list_facts(hits, frf))
-    return Recording(path, file_format.title, hits, frf, facts, problems, **labels, conditions=conditions)
+    units = ("N", "m/s^2")[0 if hits and hits[0].has_force else 1 :]
+    return Recording(path, file_format.title, hits, frf, facts, problems, **labels, conditions=conditions, units=units)
 
 
 def _try_inspect(path: Path, description: Description) -> Recording:
@@ -214,9 +215,9 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     -1e-06j
     """
     path = Path(path)
-    file_format = detect_format(path)
-    if file_format.read_frf is not None and not description.hit_files:
-        return file_format.read_frf(path)
+    read_stored = None if description.hit_files else detect_format(path).read_frf
+    if read_stored is not None:
+        return read_stored(path)
     recording = read_recording(path, description)
     if isinstance(recording, Frf):
         return recording

@@ -137,7 +137,7 @@ def _resolve_names(file: Path, names: Sequence[str], *, one_test: bool) -> tuple
     from lobewatch.logbook.recordings.recorded_files import find_recordings
 
     if one_test:
-        first, *others = find_recordings([file, *names])[0]
+        first, *others = find_recordings([file, *names], repeated=True)[0]
         return first, "", tuple(others)
     if len(names) > 1:
         text = f"{len(names) + 1} files. Give --one-test if they are hits of one tap test, or name a single file"

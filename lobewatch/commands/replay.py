@@ -75,7 +75,7 @@ def replay(
     chosen = parse_hit_decisions(accept_hit or (), reject_hit or ())
     description = file_options.description(**known, hit_decisions=chosen)
     print_remarks((workers := Workers(jobs, scheduler)).remarks)
-    logbook, (files, passed) = Logbook.open(machine), find_recordings(files)
+    logbook, (files, passed) = Logbook.open(machine), find_recordings(files, repeated=file_options.one_test)
     recordings, description = shared.join_hit_files(files, description)
     codes, edits = check_question_codes(accept or ()), parse_mode_edits(add, drop, fix)
     if dry_run:

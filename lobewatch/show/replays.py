@@ -42,9 +42,9 @@ class ReplayProgress(Progress):
         self._next_line = time.monotonic() + FIRST_LINE_DELAY
 
     def __call__(self, step: str, done: int, of: int) -> None:
-        """Show the progress of a step: so many files are done, of so many."""
-        if self.disable and of and time.monotonic() >= self._next_line:
-            notes.print(f"{REPLAY_STEP_NAMES[step]}: {done} of {count_noun(of, 'file')} done", markup=False)
+        """Show the progress of a step: so many files are done, of so many. A single file needs no line."""
+        if self.disable and of > 1 and time.monotonic() >= self._next_line:
+            notes.print(f"{REPLAY_STEP_NAMES[step]}: {done} of {of} files done", markup=False)
             self._next_line = time.monotonic() + LINE_INTERVAL
         if step not in self._step_ids:
             self._step_ids[step] = self.add_task(REPLAY_STEP_NAMES[step], total=of)

@@ -129,6 +129,8 @@ class ImportReport:
     """Faults that prevent the import."""
     remarks: list[Remark] = field(default_factory=list)
     """Remarks on hits that are left out."""
+    units: list[str] = field(default_factory=list)
+    """Units of the force and the response of its hits, as stated."""
 
     def add_fact(self, name: str, value: str, origin: Origin = "file") -> None:
         """Add a known fact."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from acquisition.files.contents.column_headings import assign_columns, infer_role
 from acquisition.files.contents.contents import Description, ImportReport, Signal
 from acquisition.files.contents.resolve_hits import infer_kind
+from acquisition.hit import MIN_SAMPLES
 
 Signals = list[Signal]
 AXES = ("hits", "channels", "samples")
@@ -32,13 +33,13 @@ _BORDER = re.compile(r"^[\s_.:/#-]+|[\s_.:#-]+(?=[/.]|$)|/$")
 def suggest_axes(array: NDArray[Any]) -> tuple[str, ...]:
     """Return the likely axes of an array: most samples, and channels along the axis where the crest factor differs.
 
-    A force is a short pulse in every hit, a response is not.
+    A force is a short pulse in every hit, a response is not. Hits without any change do not count.
     """
     samples = int(np.argmax(array.shape))
     others = [axis for axis in range(3) if axis != samples]
-    peaks, levels = np.max(np.abs(array), axis=samples), np.std(array, axis=samples)
-    crest = np.nan_to_num(np.log((peaks + np.finfo(float).tiny) / (levels + np.finfo(float).tiny)))
-    spreads = np.std(crest.mean(axis=1)), np.std(crest.mean(axis=0))
+    peaks = np.ma.array(np.max(np.abs(array), axis=samples), mask=np.ptp(array, axis=samples) == 0)
+    crest = np.ma.log(peaks / np.std(array, axis=samples))
+    spreads = [np.ma.filled(np.ma.std(crest.mean(axis=axis)), 0.0) for axis in (1, 0)]
     channels = others[int(np.argmax(spreads))]
     return tuple("samples" if axis == samples else "channels" if axis == channels else "hits" for axis in range(3))
 
@@ -127,7 +128,16 @@ def _arrange_arrays(signals: Sequence[Signal], axes: Sequence[str], report: Impo
         raise report.reject("axes", ",".join(axes), f"the arrays differ: {listed}")
     if not stacks:
         raise report.reject_useless("axes", ",".join(axes), "the file has no array of two or three axes")
-    return stacks
+    _check_stacks([*stacks.values()], axes, report)
+    return {key: stack.real for key, stack in stacks.items()}
+
+
+def _check_stacks(stacks: Sequence[NDArray[Any]], axes: Sequence[str], report: ImportReport) -> None:
+    if any(np.iscomplexobj(stack) and np.any(stack.imag) for stack in stacks):
+        raise report.reject("axes", ",".join(axes), "the array is complex", "Export signals over time as real numbers")
+    if (n := stacks[0].shape[2]) < MIN_SAMPLES:
+        fault = f"{n} samples are too few for a hit, which needs at least {MIN_SAMPLES}"
+        raise report.reject("axes", ",".join(axes), fault, "Check the order of the axes")
 
 
 def _make_channels(column: Signal, channels: NDArray[Any], hit: int) -> Signals:

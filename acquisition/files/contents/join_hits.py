@@ -25,12 +25,12 @@ def make_left_out_remark(place: str, fault: str, cure: str = "") -> Remark:
 def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
     """Join hits, each with its place, and make a remark on each that is left out.
 
-    The sample rate of most hits counts, and so does whether they have a force. Hits shorter than half the median are
-    left out, the others are cut to the shortest. ADC codes are kept if all hits have the same channels.
+    Most hits of one sample rate with, or else without, a force count. Hits shorter than half the median are left out,
+    the others are cut to the shortest. ADC codes are kept if all hits have the same channels.
     """
-    rate, has_force = _choose_most_frequent_rate(hits), 2 * sum(hit.has_force for hit in hits.values()) >= len(hits)
-    faults = {place: _find_difference(hit, rate, has_force) for place, hit in hits.items()}
-    faults |= _find_repeated(hits)
+    usual = _choose_usual(hits)
+    faults = {place: _find_difference(hit, usual) for place, hit in hits.items()}
+    faults |= _find_repeated({place: hit for place, hit in hits.items() if not faults[place]})
     sizes = [hit.acceleration.size for place, hit in hits.items() if not faults[place]]
     least = MIN_LAST_HIT_SHARE * float(np.median(sizes))
     for place, hit in hits.items():
@@ -40,24 +40,25 @@ def join_hits(hits: Mapping[str, Hit]) -> tuple[list[Hit], list[Remark]]:
     remarks = [make_left_out_remark(place, fault, _CURE) for place, fault in faults.items() if fault]
     n, channels = min(hit.acceleration.size for hit in used), {hit.channels for hit in used}
     before = used[0].pre_trigger if len({hit.pre_trigger for hit in used}) == 1 else 0
-    alike = [replace(hit, sample_rate=rate, pre_trigger=before) for hit in used]
+    alike = [replace(hit, sample_rate=usual.sample_rate, pre_trigger=before) for hit in used]
     return [_cut(hit, n, len(channels) == 1) for hit in alike], remarks
 
 
-def _choose_most_frequent_rate(hits: Mapping[str, Hit]) -> float:
-    rates = [hit.sample_rate for hit in hits.values()]
-    return max(rates, key=lambda rate: sum(_is_same_rate(rate, other) for other in rates))
+def _choose_usual(hits: Mapping[str, Hit]) -> Hit:
+    """Return the first of most hits that can be joined, of equally many one with a force."""
+
+    def rank(hit: Hit) -> tuple[int, bool]:
+        return sum(not _find_difference(other, hit) for other in hits.values()), hit.has_force
+
+    return max(hits.values(), key=rank)
 
 
-def _is_same_rate(one: float, other: float) -> bool:
-    return abs(one - other) <= MAX_RATE_DIFFERENCE * min(one, other)
-
-
-def _find_difference(hit: Hit, rate: float, has_force: bool) -> str:
-    if not _is_same_rate(hit.sample_rate, rate):
-        return f"sample rate {hit.sample_rate:.6g} Hz differs from the {rate:.6g} Hz of the other hits"
-    if hit.has_force != has_force:
-        return "no force, unlike the other hits" if has_force else "a force, unlike the other hits"
+def _find_difference(hit: Hit, usual: Hit) -> str:
+    rate, usual_rate = hit.sample_rate, usual.sample_rate
+    if abs(rate - usual_rate) > MAX_RATE_DIFFERENCE * min(rate, usual_rate):
+        return f"sample rate {rate:.6g} Hz differs from the {usual_rate:.6g} Hz of the other hits"
+    if hit.has_force != usual.has_force:
+        return "no force, unlike the other hits" if usual.has_force else "a force, unlike the other hits"
     return ""
 
 

@@ -2,15 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, count
 
 from acquisition.errors import Remark, join_sentences
 from acquisition.files.contents.contents import Fact
 from acquisition.files.contents.join_hits import join_hits, make_left_out_remark
 from acquisition.files.contents.recording import Recording
+from acquisition.files.contents.units import parse_unit
 from acquisition.hit import Hit
-
-_UNIT_FACTS = ("force", "unit")
-"""Names of the facts with the units of force and response."""
 
 
 def join_recordings(recordings: Sequence[Recording]) -> Recording:
@@ -45,20 +44,20 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
 
 def _compare_units(usable: Sequence[Recording]) -> Iterator[Remark]:
     """Yield a remark on each file with another unit than most of them."""
-    units = [tuple(fact.value for fact in recording.facts if fact.name in _UNIT_FACTS) for recording in usable]
+    units = [tuple(map(parse_unit, recording.units)) for recording in usable]
     usual = max(units, key=units.count)
+    of_most = ", ".join(usable[units.index(usual)].units)
     for recording, unit in zip(usable, units, strict=True):
         if unit != usual:
-            text = f"converted from {', '.join(unit)} instead of {', '.join(usual)} as in the other files"
+            text = f"converted from {', '.join(recording.units)} instead of {of_most} as in the other files"
             yield Remark("units-differ", recording.path.name, text, "Check the units in this file")
 
 
 def _name_hits(recording: Recording, name: str, earlier: dict[str, Hit]) -> dict[str, Hit]:
-    """Return the hits of a file by their place; two files of one name are numbered."""
-    places = [f"{name}, hit {number}" for number in range(1, len(recording.hits) + 1)]
-    if places[0] in earlier:
-        places = [f"{recording.path}, hit {number}" for number in range(1, len(recording.hits) + 1)]
-    return dict(zip(places, recording.hits, strict=True))
+    """Return the hits of a file by their place, with the path of a second file of one name."""
+    names = chain((name, str(recording.path)), (f"{recording.path} ({number})" for number in count(2)))
+    free = next(name for name in names if f"{name}, hit 1" not in earlier)
+    return {f"{free}, hit {number}": hit for number, hit in enumerate(recording.hits, 1)}
 
 
 def _reject_frf(recording: Recording) -> Recording:

@@ -70,6 +70,8 @@ class Recording:
     window: float | None = None
     """Time constant of the exponential window over the response (s); NaN if unknown, None without a window."""
 
+    units: tuple[str, ...] = ()
+    """Units of force and response that the hits are converted from; only that of the response without a force."""
     places: tuple[str, ...] = ()
     """File and number of each hit in it, where the hits are of several files; empty otherwise."""
 
@@ -117,7 +119,7 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
     labels = contents.created, contents.tool, contents.direction
     remarks = tuple(replace(remark, about=f"{path.name}, {remark.about}") for remark in report.remarks)
     recording = Recording(path, title, hits, found.frf, facts, problems, *labels, remarks=remarks)
-    return replace(recording, window=parse_time_constant(window))
+    return replace(recording, window=parse_time_constant(window), units=tuple(report.units))
 
 
 class _Resolved(NamedTuple):
@@ -132,13 +134,16 @@ class _Resolved(NamedTuple):
 
 
 def _resolve_contents(contents: Contents, report: ImportReport) -> _Resolved:
+    if not contents.signals:
+        report.add_fault("the file has no columns of numbers")
+        return _Resolved(())
     by_columns = ImportReport(report.description)
     signals = assign_columns(contents.signals, by_columns)
     if _holds_frf(signals):
         _reject_useless_fields(("rate", "full_scale", "force", "axes"), "an FRF, not signals over time", report)
         report.merge(by_columns)
         return _Resolved(signals, resolve_frf(replace(contents, signals=signals), report) if report.is_clean else None)
-    if contents.signals and (report.description.axes or report.description.one_test):
+    if report.description.axes or report.description.one_test:
         found = report.attempt(split_hits, contents.signals) or []
         return _Resolved(signals, hits=_resolve_test(found, report) if found else ())
     report.merge(by_columns)
@@ -166,7 +171,8 @@ def _resolve_test(found: Sequence[HitSignals], report: ImportReport) -> list[Hit
     if first.report.is_clean and not _has_known_kinds(first.signals, report.description):
         names, example = format_signal_names(first.signals), f' "{suggest_columns(first.signals)}"'
         report.add_missing(f"meaning of the columns {names} of each hit", "columns", example)
-        if not any(signal.rate or signal.role == "time" for signal in first.signals):
+        has_rate = any(signal.rate or signal.role == "time" for signal in first.signals)
+        if not has_rate and report.description.rate is None:
             report.add_missing("sample rate if no column is the time", "rate", " 51200")
     return [] if report.missing else resolve_test(found, report)
 

@@ -12,7 +12,7 @@ from acquisition.files.contents.column_headings import format_signal_names
 from acquisition.files.contents.contents import Contents, ImportReport, Signal, UnresolvedError, cut_to_shortest
 from acquisition.files.contents.join_hits import MAX_RATE_DIFFERENCE, join_hits, make_left_out_remark
 from acquisition.files.contents.units import MOTION_QUANTITIES, STANDARD_GRAVITY, parse_unit
-from acquisition.hit import Hit
+from acquisition.hit import MIN_SAMPLES, Hit
 from acquisition.hit_quality.overload_and_hum import find_overload
 from acquisition.hits.capture_hits import split_record
 
@@ -41,7 +41,9 @@ def resolve_hits(contents: Contents, report: ImportReport) -> list[Hit]:
         if hit is None:
             report.merge(replace(record_report, facts=[]))
             return []
-        report.facts += record_report.facts if not hits else []
+        if not hits:
+            report.facts += record_report.facts
+            report.units += record_report.units
         parts = split_record(hit)
         if len(parts) > 1:
             report.add_fact("hits", f"{len(parts)} in one record, {parts[0].acceleration.size} samples per hit")
@@ -60,6 +62,7 @@ def resolve_test(found: Sequence[tuple[Sequence[Signal], ImportReport]], report:
                 broken[place] = hit_report
             else:
                 report.facts += hit_report.facts if not hits else []
+                report.units += hit_report.units if not hits else []
                 hits[place] = part
     if not hits:
         report.merge(replace(next(iter(broken.values())), facts=[]))
@@ -164,15 +167,19 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
     times = [signal for signal in signals if signal.role == "time"]
     used, times = cut_to_shortest(used, times, report)
     of_one_length = used or [signal for signal in signals if signal.values.size == signals[0].values.size]
-    if len({signal.values.size for signal in of_one_length}) > 1:
+    sizes = {signal.values.size for signal in of_one_length}
+    if len(sizes) > 1:
         report.add_fault(f"the channels differ in number of samples ({format_signal_names(of_one_length)})")
         return 0.0, used
     rates = [signal.rate for signal in of_one_length if signal.rate is not None]
     if rates and max(rates) > min(rates) * (1 + MAX_RATE_DIFFERENCE):
         report.add_fault(f"the channels differ in sample rate ({min(rates):g} and {max(rates):g} Hz)")
         return 0.0, used
-    times = [time for time in times if time.values.size == of_one_length[0].values.size]
+    times = [time for time in times if time.values.size in sizes]
     report.add_flaws([*used, *times])
+    if sizes and min(sizes) < MIN_SAMPLES:
+        report.add_fault(f"{min(sizes)} samples are too few for a hit. Record at least {MIN_SAMPLES} samples")
+        return 0.0, used
     by_axis = _compute_rate_from_time(times, report)
     return _agree_on_rate(rates[0] if rates else by_axis, report), used
 
@@ -181,15 +188,11 @@ def _compute_rate_from_time(times: Sequence[Signal], report: ImportReport) -> fl
     """Return the rate of the time columns, which must agree; None without one whose unit is known."""
     if not times or any(time.flaws for time in times):
         return None
-    size = times[0].values.size
-    if size < 8:
-        report.add_fault(f"{size} samples are too few for a hit. Record at least 8 samples")
-        return None
     steps = [_resolve_step(np.asarray(time.values, dtype=np.float64), report) for time in times]
     if not all(steps):
         return None
     starts = [time.values[0] for time in times]
-    if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * size > steps[0]:
+    if np.ptp(starts) > MAX_TIME_DEVIATION * steps[0] or np.ptp(steps) * times[0].values.size > steps[0]:
         begin, step = (" and ".join(f"{value:.6g}" for value in values) for values in (starts, steps))
         report.add_fault(f"the time columns differ (start {begin}, step {step})")
         return None

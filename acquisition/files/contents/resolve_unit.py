@@ -116,6 +116,7 @@ def resolve_response_unit(signal: Signal, report: ImportReport) -> tuple[str, fl
     unit, origin = _resolve_unit(signal.unit, given, MOTION_QUANTITIES, texts, report)
     _check_quantity(unit.quantity, signal, report)
     report.add_fact("unit", f"{signal.unit or given} ({unit.quantity})", origin)
+    report.units.append(signal.unit or given)
     return unit.quantity, unit.factor
 
 
@@ -124,6 +125,7 @@ def resolve_force_unit(signal: Signal, report: ImportReport) -> float:
     given, texts = report.description.force_unit, ("force_unit", "N or lbf", signal.name)
     unit, origin = _resolve_unit(signal.unit, given, ("force",), texts, report)
     report.add_fact("force", f"{signal.name}, {signal.unit or given}", origin)
+    report.units.append(signal.unit or given)
     return unit.factor
 
 

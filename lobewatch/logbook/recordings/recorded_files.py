@@ -5,7 +5,7 @@ import io
 import re
 import tempfile
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -60,31 +60,32 @@ def read_tap_bytes(content: bytes) -> TapTest:
         return acquisition.read_tap(path)
 
 
-def find_recordings(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
-    """Find recorded files by path, folder or pattern.
+def find_recordings(places: Sequence[Path | str], *, repeated: bool = False) -> tuple[list[Path], list[Path]]:
+    """Find recorded files by path, folder or pattern, those of a folder or pattern in the order of their numbers.
 
-    Returns each file once, and the files that were passed over: those in a folder with an extension of no known
-    format, and texts without a row of numbers. A file named by its path is always taken. DataError for a folder or
-    pattern without any recorded file.
+    Returns each file once unless `repeated`, and the files that were passed over: those in a folder with an extension
+    of no known format, and texts without a row of numbers. A file named by its path is always taken. DataError for a
+    folder or pattern without any recorded file.
     """
-    files, passed_over = dict[Path, None](), list[Path]()
+    files, passed_over = list[Path](), list[Path]()
     for place in places:
         path = Path(place)
         if path.is_dir():
             recordings, others = _find_in_folder(path)
-            files |= dict.fromkeys(recordings)
+            files += recordings
             passed_over += others
         elif path.exists() or not glob.has_magic(str(place)):
-            files[path] = None
+            files.append(path)
         else:
-            files |= dict.fromkeys(_find_matching(str(place)))
-    return list(files), passed_over
+            files += _find_matching(str(place))
+    return files if repeated else list(dict.fromkeys(files)), passed_over
 
 
 def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     """Find the recordings in a folder, and the other files that are not hidden."""
     paths = [path for path in folder.rglob("*") if path.is_file()]
-    files = sorted(p for p in paths if not any(part.startswith(".") for part in p.relative_to(folder).parts))
+    shown = (path for path in paths if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+    files = _sort_by_number(shown)
     extensions = {extension for file_format in acquisition.list_formats() for extension in file_format.extensions}
     recordings = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not recordings:
@@ -96,22 +97,36 @@ def _find_in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
 
 def _find_matching(pattern: str) -> list[Path]:
     names = glob.glob(pattern, recursive=True)  # noqa: PTH207 - pathlib takes no absolute pattern
-    files = sorted(path for path in map(Path, names) if path.is_file())
+    files = _sort_by_number(path for path in map(Path, names) if path.is_file())
     if not files:
         raise DataError(f"{pattern}: no file matches this pattern")
     return files
 
 
+def _sort_by_number(paths: Iterable[Path]) -> list[Path]:
+    """Sort paths with their numbers as numbers: hit_2 before hit_10."""
+    return sorted(sorted(paths), key=lambda path: [*map(_split_numbers, path.parts)])
+
+
+def _split_numbers(name: str) -> list[str | int]:
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]
+
+
 def read_source(file: Path, description: Description) -> bytes:
-    """Return the content of a recorded file; of several files of one tap test a ZIP archive, always the same bytes."""
+    """Return the content of a recorded file; of several files of one tap test a ZIP archive.
+
+    The bytes of the archive do not depend on the order of the files.
+    """
     if not description.hit_files:
         return file.read_bytes()
+    files = {(path.name, path.read_bytes()) for path in (file, *description.hit_files)}
     memory = io.BytesIO()
     with zipfile.ZipFile(memory, "w") as archive:
-        for number, path in enumerate((file, *description.hit_files), 1):
-            entry = zipfile.ZipInfo(f"{number}/{path.name}")
+        by_name = sorted(files, key=lambda named: (_split_numbers(named[0]), named))
+        for number, (name, content) in enumerate(by_name, 1):
+            entry = zipfile.ZipInfo(f"{number}/{name}")
             entry.create_system = _UNIX_SYSTEM
-            archive.writestr(entry, path.read_bytes())
+            archive.writestr(entry, content)
     return memory.getvalue()
 
 

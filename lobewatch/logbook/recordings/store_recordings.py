@@ -1,7 +1,7 @@
 """Store recorded files as tap tests of a machine, each once."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import chain, pairwise
@@ -83,24 +83,40 @@ class ReplayPlan(NamedTuple):
     def of(cls, folder: MachineFolder, files: Sequence[Path], description: Description) -> Self:
         """Read the files. The tap test of one of several responses must have the same direction.
 
-        Raises ValueError for decisions on the hits of several files.
+        Raises ValueError for decisions on the hits of several files that are not one new tap test.
         """
         if description.hit_decisions and len(files) > 1:
             cure = "Replay the files one by one, or give Description.one_test."
             raise ValueError(f"decisions on hits need one file, not {len(files)}. {cure}")
-        plan = cls({}, {}, {}, {})
-        for file in files:
-            try:
-                plan.digests[file] = hashlib.sha256(read_source(file, description)).hexdigest()
-            except OSError as error:
-                plan.unread[file] = error
+        plan = cls(*_hash_files(files, description), {}, {})
         for tap in reversed(folder.taps()):  # the first one counts
             if description.response is None or tap.direction == (description.direction or tap.direction):
                 plan.stored.update(dict.fromkeys(filter(None, (tap.source_sha256, tap.sha256)), tap.id))
         for file, digest in plan.digests.items():
             if digest not in plan.stored:
                 plan.new.setdefault(digest, file)
+        if description.hit_files:
+            _reject_new_decisions(folder, {plan.stored.get(digest) for digest in plan.digests.values()}, description)
         return plan
+
+
+def _hash_files(files: Sequence[Path], description: Description) -> tuple[dict[Path, str], dict[Path, OSError]]:
+    """Return the SHA-256 of each file, and the error of each unreadable one."""
+    digests, unread = dict[Path, str](), dict[Path, OSError]()
+    for file in files:
+        try:
+            digests[file] = hashlib.sha256(read_source(file, description)).hexdigest()
+        except OSError as error:
+            unread[file] = error
+    return digests, unread
+
+
+def _reject_new_decisions(folder: MachineFolder, known: Collection[str | None], description: Description) -> None:
+    """Reject new decisions on stored hits of several files: the order of the files may be another one now."""
+    for tap in folder.taps():
+        if tap.id in known and not set(description.hit_decisions) <= set(tap.hit_decisions):
+            cure = "Decide on the hits of the stored tap test instead."
+            raise ValueError(f"the files are stored already as {tap.id}, perhaps in another order. {cure}")
 
 
 def store_recordings(

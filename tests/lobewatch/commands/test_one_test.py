@@ -16,6 +16,7 @@ from typer.testing import Result
 
 from acquisition import DataError, read_hits, read_tap
 from lobewatch import Logbook
+from lobewatch.show import replays
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
@@ -110,7 +111,7 @@ def test_other_axes_are_an_error_of_the_option(shop: Shop, array: Path, axes: st
 def test_bad_files_and_bad_hits_are_named_and_counted(shop: Shop, files: list[Path], command: str) -> None:
     put_hit(files[1], HITS[1], rate=2 * RATE)
     put_hit(files[2], HITS[2, :1], "time [s],force [N]")
-    double = HITS[3] + 0.95 * np.roll(HITS[3], 80, axis=1) * np.array([[1.0], [0.0]])
+    double = HITS[3] + 0.9 * np.roll(HITS[3], 80, axis=1) * np.array([[1.0], [0.0]])
     put_hit(files[3], double)
     if command == "replay":
         said = answer("replay", shop.path, *files, "--one-test", *DATED)
@@ -183,3 +184,47 @@ def test_groups_of_an_hdf5_file_are_one_tap_test(shop: Shop, tmp_path: Path) -> 
     columns = ("--columns", "force [N]=force,acceleration [m/s^2]=acc", "--rate", RATE)
     said = answer("replay", shop.path, path, *DATED, "--one-test", *columns)
     assert list(said["hits"].values()) == [{"found": 5, "used": 5}]
+
+
+def test_files_in_another_order_are_the_stored_tap_test(shop: Shop, files: list[Path]) -> None:
+    in_order = (files[2], files[0], files[4], files[1], files[3])
+    run("replay", shop.path, *in_order, "--one-test", *DATED, "--reject-hit", 1)
+    (tap,) = shop.folder.taps()
+    stored = np.array([hit.signals for hit in read_tap(shop.path / tap.file).hits])
+    assert stored == pytest.approx(HITS[[2, 0, 4, 1, 3]], abs=1e-6)
+    for again in (files, files[::-1], [*files, files[0]]):
+        assert list(answer("replay", shop.path, *again, "--one-test", *DATED)["known"].values()) == [tap.id]
+    run("replay", shop.path, *files, "--one-test", *DATED, "--reject-hit", 1)
+    for options in ((), ("--dry-run",)):
+        with pytest.raises(ValueError, match=tap.id):
+            run("replay", shop.path, *files, "--one-test", *DATED, "--reject-hit", 3, *options)
+    assert [(entry.id, len(entry.hit_decisions)) for entry in shop.folder.taps()] == [(tap.id, 1)]
+
+
+@pytest.mark.parametrize("command", ["replay", "modes"])
+def test_an_empty_first_file_and_a_repeated_file_are_named(shop: Shop, files: list[Path], command: str) -> None:
+    files[0].write_text("")
+    given = ("replay", shop.path, *DATED) if command == "replay" else ("modes",)
+    said = answer(*given, *files, files[1], "--one-test")
+    left_out = [remark["about"] for remark in said["remarks"] if remark["code"] == "hit-left-out"]
+    assert left_out == [files[0].name, f"{files[1]}, hit 1"]
+
+
+def test_ten_files_of_a_folder_are_averaged_in_the_order_of_their_numbers(shop: Shop, tmp_path: Path) -> None:
+    hits = make_hits(10)
+    (tmp_path / "ten").mkdir()
+    for number, hit in enumerate(hits, 1):
+        put_hit(tmp_path / "ten" / f"hit_{number}.csv", hit)
+    run("replay", shop.path, tmp_path / "ten", "--one-test", *DATED)
+    stored = read_tap(shop.path / shop.folder.taps()[0].file)
+    assert np.array([hit.signals for hit in stored.hits]) == pytest.approx(hits, abs=1e-6)
+
+
+def test_a_single_file_needs_no_line_of_progress(
+    shop: Shop, files: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replays, "FIRST_LINE_DELAY", 0.0)
+    monkeypatch.setattr(replays, "LINE_INTERVAL", 0.0)
+    step = replays.REPLAY_STEP_NAMES["store"]
+    assert step not in run("replay", shop.path, *files[:2], "--one-test", *DATED).stderr
+    assert step in run("replay", shop.path, *files[2:], *DATED).stderr

@@ -275,3 +275,42 @@ def test_hits_without_a_force_are_found_by_a_word(tmp_path: Path) -> None:
     np.savetxt(path, HITS[:, 1].T, "%.12g", ",", header=",".join(names), comments="")
     said = Description(one_test=True, rate=RATE, without_force=True)
     assert [hit.has_force for hit in inspect_file(path, said).require_valid().hits] == [False] * 5
+
+
+@pytest.mark.parametrize("shape", [(5, 2, N), (5, N)])
+def test_a_complex_array_is_no_array_of_hits(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    array = HITS.reshape(5, -1, N)[:, : shape[1] if len(shape) == 3 else 1].reshape(shape)
+    said = Description(axes=AXES, columns=NAMED if len(shape) == 3 else ("force [N]=array",), rate=RATE)
+    put_npy(tmp_path / "a.npy", array + 0.5j)
+    problems = inspect_file(tmp_path / "a.npy", said).problems
+    assert "Description.axes hits,channels,samples: the array is complex" in problems
+    put_npy(tmp_path / "a.npy", HITS.astype(complex))
+    assert are(inspect_file(tmp_path / "a.npy", Description(axes=AXES, columns=NAMED, rate=RATE)), HITS)
+
+
+@pytest.mark.parametrize("axes", ORDERS)
+def test_an_empty_hit_does_not_change_the_suggested_axes(axes: tuple[str, ...]) -> None:
+    hits = make_hits(10)
+    for value in (0.0, 0.1, np.nan):
+        hits[3] = value
+        assert suggest_axes(ordered(axes, hits)) == axes
+    assert sorted(suggest_axes(ordered(axes, np.zeros((5, 2, N))))) == sorted(AXES)
+
+
+def test_the_rate_is_not_asked_for_where_it_is_given(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", one=HITS[:, 0], two=HITS[:, 1])
+    asked = [inspect_file(tmp_path / "a.npz", Description(one_test=True, rate=rate)).problems for rate in (None, RATE)]
+    assert ["Description.columns" in problems for problems in asked] == [True, True]
+    assert ["Description.rate" in problems for problems in asked] == [True, False]
+
+
+def test_arrays_without_hits_or_with_few_samples_are_rejected(tmp_path: Path) -> None:
+    said = Description(axes=AXES, columns=NAMED, rate=RATE)
+    put_npy(tmp_path / "a.npy", np.zeros((0, 2, 500)))
+    assert inspect_file(tmp_path / "a.npy", said).problems == "the file has no columns of numbers"
+    put_npy(tmp_path / "a.npy", np.ones((3, 2, 5)))
+    problems = inspect_file(tmp_path / "a.npy", said).problems
+    assert all(part in problems for part in ("Description.axes", "5 samples", "at least 8"))
+    np.savez(tmp_path / "b.npz", force=HITS[0, 0, :5], acceleration=HITS[0, 1, :5])
+    columns = ("force [N]=force", "acceleration [m/s^2]=acceleration")
+    assert "5 samples" in inspect_file(tmp_path / "b.npz", Description(columns=columns, rate=RATE)).problems

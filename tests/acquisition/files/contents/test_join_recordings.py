@@ -161,3 +161,43 @@ def test_hits_of_nearly_one_rate_get_the_same_rate_and_pre_trigger() -> None:
     joined, remarks = join_hits(hits)
     assert [(hit.sample_rate, hit.pre_trigger) for hit in joined] == [(10240.0, 100)] * 3
     assert remarks == []
+
+
+def test_only_units_that_differ_are_named(files: list[Path], tmp_path: Path) -> None:
+    names = ("time [s],Hammer [N],Top [m/s^2]", "time [s],force [N],acceleration [m/s2]")
+    for file, hit, heading in zip(files, HITS, names, strict=False):
+        put_hit(file, hit, heading)
+    convert(files[2], tmp_path / "tap.uff", Description(), hits=True)
+    assert join([*files, tmp_path / "tap.uff"]).require_valid().remarks[1:] == ()
+    scale = np.array([[4.4482216152605], [1.0]])
+    put_hit(files[0], HITS[0] / scale, names[0].replace("[N]", "[lbf]"))
+    (remark,) = join(files).require_valid().remarks
+    assert (remark.code, remark.about) == ("units-differ", files[0].name)
+    assert "lbf, m/s^2" in remark.text
+    assert "Hammer" not in remark.text
+
+
+def test_an_empty_first_file_is_left_out(files: list[Path]) -> None:
+    files[0].write_text("")
+    assert left_out(join(files).require_valid()) == [files[0].name]
+    assert read_frf(files[0], Description(hit_files=tuple(files[1:]))).n_averages == len(HITS) - 1
+
+
+def test_a_file_named_twice_is_left_out(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(files[0].parent)
+    first, second = (Path(file.name) for file in files[:2])
+    joined = join([first, second, first, first]).require_valid()
+    assert (len(joined.hits), joined.n_found) == (2, 4)
+    assert left_out(joined) == [f"{first} (2), hit 1", f"{first} (3), hit 1"]
+
+
+def test_rate_and_force_of_most_hits_are_chosen_together() -> None:
+    none = np.empty(0)
+    hits = {str(k): Hit(HITS[k, 0] if k > 1 else none, HITS[k, 1], RATE * (1 if k < 2 else 2)) for k in range(4)}
+    joined, remarks = join_hits(hits)
+    assert [(hit.sample_rate, hit.has_force) for hit in joined] == [(2 * RATE, True)] * 2
+    assert [remark.about for remark in remarks] == ["0", "1"]
+    force, response = HITS[0]
+    alike = {name: Hit(force, response, rate) for name, rate in zip("abc", (RATE, 2 * RATE, 2 * RATE), strict=True)}
+    joined, remarks = join_hits(alike)
+    assert ([hit.sample_rate for hit in joined], [remark.about for remark in remarks]) == ([2 * RATE], ["a", "c"])

@@ -48,3 +48,20 @@ def test_equal_messages_are_grouped_and_many_files_counted() -> None:
     lines = format_rejections({Path("a"): "bad", Path("b"): "worse"}, 2).splitlines()
     assert lines[1:] == ["a: bad", "b: worse"]
     assert re.search(r"\b2 files", lines[0])
+
+
+def test_files_of_a_folder_and_a_pattern_follow_their_numbers(tmp_path: Path) -> None:
+    names = ["hit_1.csv", "hit_2.csv", "hit_10.csv", "hit_010.csv", "run 9/1.csv", "run 10/1.csv"]
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1,2\n3,4\n", "utf-8")
+    expected = [tmp_path / name for name in [*names[:2], "hit_010.csv", "hit_10.csv", *names[4:]]]
+    assert find_recordings([tmp_path])[0] == expected
+    assert find_recordings([f"{tmp_path}/hit_*.csv"])[0] == expected[:4]
+
+
+def test_a_file_is_repeated_only_on_request(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("1,2\n3,4\n", "utf-8")
+    places = [tmp_path / "a.csv", tmp_path, tmp_path / "a.csv"]
+    assert find_recordings(places)[0] == [tmp_path / "a.csv"]
+    assert find_recordings(places, repeated=True)[0] == [tmp_path / "a.csv"] * 3

@@ -90,7 +90,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
         "tool": measurement.tool,
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
-        "hit_list": hits_json(tap.flags, tap.decisions),
+        "hit_list": hits_json(tap.flags, tap.decided_flags),
         "remarks": recording.remarks,
         "lines": tap.frf and tap.frf.frequency.size,
         "averages": tap.frf and tap.frf.n_averages,
@@ -142,7 +142,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         f"{count} {word}" for word, count in words.items()
     )
     kind = hits if preview.tap.hits else "an FRF"
-    details += filter(None, [format_unused_hits(preview.tap.flags, preview.tap.decisions, recording.places)])
+    details += filter(None, [format_unused_hits(preview.tap.decided_flags, recording.places)])
     return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 

@@ -283,7 +283,7 @@ def test_a_withdrawn_decision_of_the_replay_leaves_no_trace_in_the_result(shop: 
 
 def test_a_rebuilt_journal_without_decisions_gives_the_result_of_the_verdicts(shop: Shop, file: Path) -> None:
     run("replay", shop.path, file, *DATED, "--reject-hit", WIDER)
-    for path in shop.path.glob("journal.jsonl*"):
+    for path in shop.path.glob("journal*.jsonl"):
         path.unlink()
     run("rebuild", shop.path)
     (entry,) = shop.logbook.taps
@@ -298,7 +298,7 @@ def test_a_tap_test_of_one_accepted_hit_opens_without_its_journal(shop: Shop, fi
     first = 1 + (CLIPPED - 1) * N
     file.write_text("\n".join([rows[0], *rows[first : first + N]]), "utf-8")
     run("replay", shop.path, file, *DATED, "--accept-hit", "1:overload-force")
-    for path in shop.path.glob("journal.jsonl*"):
+    for path in shop.path.glob("journal*.jsonl"):
         path.unlink()
     run("rebuild", shop.path)
     tap = shop.folder.read(shop.logbook.taps[-1])
@@ -328,7 +328,9 @@ def test_all_commands_number_the_hits_of_a_tap_file_alike(shop: Shop, live: Path
     (entry,) = shop.logbook.taps
     assert used(run("modes", shop.path, entry.id, "--json")) == [2]
     assert shop.folder.read(entry).flags == read_tap(live).flags
-    assert read_tap(shop.path / entry.file).source.content == b""
+    source = read_tap(shop.path / entry.file).source
+    assert source is not None
+    assert source.content == b""
 
 
 def test_edits_that_do_not_fit_store_no_decision(shop: Shop, file: Path) -> None:

@@ -158,7 +158,8 @@ def read_tap_test(
     source = SourceFile(f"{file.stem} and {len(description.hit_files)} more.zip" if is_joined else file.name, content)
     tap = TapTest(acquisition.new_tap_id(about), about, recording.frf, recording.hits)
     if not is_joined and (judged := read_judged_tap(at)) is not None:
-        source = source.without_content if judged.source is None else source
+        is_live = judged.source is None and len(judged.hits) == len(recording.hits)
+        source = source.without_content if is_live else source
         tap, recording = replace(judged, id=tap.id, circumstances=about), replace(recording, hits=judged.hits)
     return _evaluate_tap_test(replace(tap, source=source), recording.path, description.hit_decisions), recording
 

@@ -328,9 +328,6 @@ def test_all_commands_number_the_hits_of_a_tap_file_alike(shop: Shop, live: Path
     (entry,) = shop.logbook.taps
     assert used(run("modes", shop.path, entry.id, "--json")) == [2]
     assert shop.folder.read(entry).flags == read_tap(live).flags
-    source = read_tap(shop.path / entry.file).source
-    assert source is not None
-    assert source.content == b""
 
 
 def test_edits_that_do_not_fit_store_no_decision(shop: Shop, file: Path) -> None:

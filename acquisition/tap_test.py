@@ -231,7 +231,7 @@ class TapTest:
     source: SourceFile | None = None
     """File that a replayed test was read from."""
     decisions: tuple[HitDecision, ...] = ()
-    """Decisions of a person on hits, at most one per hit. No tap file holds them."""
+    """Decisions of a person on hits, at most one per hit; of a tap file, those behind its FRF."""
 
     @property
     def decided_flags(self) -> tuple[HitFlags, ...]:

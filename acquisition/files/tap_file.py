@@ -27,7 +27,8 @@ from acquisition.files.contents.contents import Format
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
-from acquisition.tap_test import Circumstances, Conditions, SourceFile, TapTest
+from acquisition.hit_quality.decide_hits import decide_stored_hits
+from acquisition.tap_test import Circumstances, Conditions, HitDecision, SourceFile, TapTest
 
 if TYPE_CHECKING:
     import h5py
@@ -102,11 +103,8 @@ def _get_software_name() -> str:
 
 
 def round_as_stored(tap: TapTest) -> TapTest:
-    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32.
-
-    After decisions the FRF is not that of the file.
-    """
-    if not tap.hits or tap.decisions or tap.frf is None or tap.frf.coherence is None:
+    """Return a tap test as its file gives it: with hits, the coherence is rounded to float32."""
+    if not tap.hits or tap.frf is None or tap.frf.coherence is None:
         return tap
     return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 
@@ -122,7 +120,7 @@ def read_tap(path: Path | str) -> TapTest:
     Returns
     -------
     TapTest
-        Tap test with all its hits.
+        Tap test with all its hits. Its decisions are those behind its FRF; the journal has those that count.
 
     Raises
     ------
@@ -133,9 +131,19 @@ def read_tap(path: Path | str) -> TapTest:
         try:
             hits, flags = raw_hits.read_raw_hits(file)
             tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
-            return TapTest(tap_id, about, frf, hits, flags, _read_source(file))
+            return TapTest(tap_id, about, frf, hits, flags, _read_source(file), _read_decisions(file, flags))
         except KeyError as error:
             raise DataError(f"{path}: incomplete tap file ({error}). Restore the file from a backup.") from error
+
+
+def _read_decisions(file: h5py.File, flags: Sequence[HitFlags]) -> tuple[HitDecision, ...]:
+    """Read the decisions behind the FRF: an averaged hit with faults was accepted, another one without was rejected."""
+    averaged = file["raw/accepted"][()].tolist() if flags else []
+    return tuple(
+        HitDecision(number, "accept" if found else "reject", found.codes)
+        for number, (found, is_averaged) in enumerate(zip(flags, averaged, strict=True), 1)
+        if bool(found) == is_averaged
+    )
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
@@ -318,12 +326,12 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
     return kept or read_tap(path).required_frf
 
 
-def has_all_hits(path: Path, hits: Sequence[Hit]) -> bool:
-    """Return whether a file is a live tap test of lobewatch and these are all its hits."""
-    if not hits or not _is_lobewatch_file(read_regular_file(path), path):
-        return False
-    tap = read_tap(path)
-    return tap.source is None and len(tap.hits) == len(hits)
+def read_judged_tap(path: Path) -> TapTest | None:
+    """Read a tap file with hits by its verdicts on all of them, without decisions; None for another file."""
+    if not _is_lobewatch_file(read_regular_file(path), path):
+        return None
+    tap = decide_stored_hits(read_tap(path))
+    return tap if tap.hits else None
 
 
 def _is_lobewatch_file(head: bytes, path: Path) -> bool:
@@ -338,5 +346,5 @@ TAP_FORMAT = Format(
     _is_lobewatch_file,
     read_tap_recording,
     lambda path: read_tap_hits(path)[1],
-    lambda path: read_tap(path).required_frf,
+    lambda path: decide_stored_hits(read_tap(path)).required_frf,
 )

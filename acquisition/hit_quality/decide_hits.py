@@ -102,10 +102,18 @@ def decide_hits(tap: TapTest, decisions: Sequence[HitDecision]) -> TapTest:
     >>> [flags.words for flags in decided.decided_flags], decided.frf.n_averages
     (['undone', 'good', 'good'], 2)
     """
-    if decisions == tap.decisions:
-        return tap
-    frf, _ = average_decided_hits(tap.hits, decide_flags(tap.flags, decisions))
-    return replace(tap, frf=frf, decisions=tuple(decisions))
+    decided = replace(tap, decisions=tuple(decisions))
+    if [*map(bool, decided.decided_flags)] == [*map(bool, tap.decided_flags)]:
+        return decided
+    return replace(decided, frf=average_decided_hits(tap.hits, decided.decided_flags)[0])
+
+
+def decide_stored_hits(tap: TapTest, decisions: Sequence[HitDecision] = ()) -> TapTest:
+    """Return a tap test of a file with the decisions in the journal, in place of those behind the FRF of the file.
+
+    Without decisions and without a good hit, those of the file stay, so that the test still opens.
+    """
+    return decide_hits(tap, decisions if decisions or not all(tap.flags) else tap.decisions)
 
 
 def average_decided_hits(hits: Sequence[Hit], flags: Sequence[HitFlags]) -> tuple[Frf | None, tuple[Hit, ...]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from functools import wraps
 from pathlib import Path
@@ -292,9 +293,9 @@ class Logbook:
                 self.folder, files, description, on_stored=self._remember_fit, **options
             )
             self._invalidate()
-            for tap_id in outcome.already_stored.values():
-                self.decide_hits(tap_id, description.hit_decisions)
-        return outcome
+            known = dict.fromkeys(outcome.already_stored.values())
+            decided = [tap_id for tap_id in known if self.decide_hits(tap_id, description.hit_decisions)]
+        return replace(outcome, decided_tap_ids=decided)
 
     def _remember_fit(self, fit: TapFit, more: bool) -> None:
         """Remember the fit of a stored tap test. If more follow, now and then write the rows of the history."""
@@ -349,7 +350,7 @@ class Logbook:
         self._invalidate()
         return reasons
 
-    def decide_hits(self, tap_id: str, decisions: Sequence[HitDecision]) -> None:
+    def decide_hits(self, tap_id: str, decisions: Sequence[HitDecision]) -> bool:
         """Store decisions on hits of a tap test permanently. The same decision again changes nothing.
 
         Parameters
@@ -359,6 +360,11 @@ class Logbook:
         decisions
             Decisions, at most one per hit.
 
+        Returns
+        -------
+        bool
+            Whether anything was stored.
+
         Raises
         ------
         ValueError
@@ -367,16 +373,21 @@ class Logbook:
             If the file is damaged.
         """
         if not decisions:
-            return
+            return False
         with self.folder.locked():
             self._invalidate()
-            tap = self.folder.read(self.files.by_id[tap_id])
-            decide_hits(tap, add_decisions(tap.flags, tap.decisions, decisions))
-            new = [decision for decision in decisions if decision not in tap.decisions]
+            self.read_decided(tap_id, decisions)
+            new = [made for made in decisions if made not in self.files.by_id[tap_id].hit_decisions]
             if new:
                 store_hit_decisions(self.folder, tap_id, new)
                 self.fits.pop(tap_id, None)
                 self._invalidate()
+        return bool(new)
+
+    def read_decided(self, tap_id: str, decisions: Sequence[HitDecision]) -> TapTest:
+        """Read a tap test with further decisions on its hits. Errors as `decide_hits`."""
+        tap = self.folder.read(self.files.by_id[tap_id])
+        return decide_hits(tap, add_decisions(tap.flags, tap.decisions, decisions))
 
     def _invalidate(self) -> None:
         """Forget everything after a change on the disk."""

@@ -1,7 +1,7 @@
 """Store operator entries: acknowledged alarms and modes edited by hand."""
 
 import getpass
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 
 import msgspec
@@ -13,6 +13,7 @@ from lobewatch.logbook.recordings.store_recordings import group_by_message
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import find_excludable_entry
 from lobewatch.measurement import FileModes, fit_file_modes
+from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, fit_tap
 from lobewatch.monitoring.status_rules import Alarm, select_alarms
 from modal import ModeEdits
 
@@ -59,16 +60,22 @@ def read_tap_modes(
     """
     entries = [*logbook.files.by_id.values()]
     tap = find_excludable_entry(name, entries, (), str(logbook.folder.path))
+    if edits and decisions:
+        fit = fit_tap(logbook.read_decided(tap.id, decisions), logbook.machine, edits)
+        _refuse_reasons(remark.text for remark in fit.remarks if remark.code == EDITS_NOT_APPLIED_CODE)
     logbook.decide_hits(tap.id, decisions)
     if edits is not None:
-        reasons = logbook.edit_modes([tap.id], edits)
-        if reasons:
-            raise ValueError(join_sentences(reasons[tap.id], "Nothing was stored"))
+        _refuse_reasons(logbook.edit_modes([tap.id], edits).values())
     tap = logbook.files.by_id[tap.id]
     logbook.folder.read(tap)
     path, sensor = logbook.folder.path / tap.file, logbook.machine.tap.sensor
     known = Description(hit_decisions=tap.hit_decisions)
     return fit_file_modes(path, description=known, by_hand=tap.by_hand, sensor=sensor)
+
+
+def _refuse_reasons(reasons: Iterable[str]) -> None:
+    for reason in reasons:
+        raise ValueError(join_sentences(reason, "Nothing was stored"))
 
 
 def store_edits(logbook: Logbook, tap_ids: Sequence[str], edits: ModeEdits) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from acquisition import DataError
-from acquisition.hit_quality.decide_hits import decide_hits
+from acquisition.hit_quality.decide_hits import decide_stored_hits
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.recorded_files import parse_context, read_tap_bytes
@@ -72,7 +72,7 @@ def _make_verdict_request(logbook: Logbook, tap_id: str, toml: str) -> VerdictRe
 def fit_tap_bytes(tap: TapFileBytes) -> TapFit | None:
     """Fit the modes of a tap file. None if it cannot be read."""
     try:
-        decided = decide_hits(read_tap_bytes(tap.content), tap.entry.hit_decisions)
+        decided = decide_stored_hits(read_tap_bytes(tap.content), tap.entry.hit_decisions)
         return fit_tap(decided, parse_context(tap.machine_toml).machine, tap.entry.by_hand)
     except ValueError:
         return None

@@ -77,6 +77,7 @@ def _read_recordings(
         digest = digests.get(file, "")
         result = explain_file_error(file, unread[file]) if file in unread else results.get(digest)
         if result is None:
+            logbook.read_decided(stored[digest], description.hit_decisions)
             yield ReplayPreview(file, stored_tap_id=stored[digest])
         elif isinstance(result, str):
             yield ReplayPreview(file, rejection=result)

@@ -18,7 +18,7 @@ import msgspec
 
 from acquisition import DataError, HitDecision, Remark, TapTest, read_tap, write_tap
 from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
-from acquisition.hit_quality.decide_hits import decide_hits
+from acquisition.hit_quality.decide_hits import decide_stored_hits
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal import entries as journal_entries
@@ -308,7 +308,7 @@ class MachineFolder:
             raise DamagedTapError(tap_damage_remark(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
-            return decide_hits(read_tap(path), entry.hit_decisions)
+            return decide_stored_hits(read_tap(path), entry.hit_decisions)
         except ValueError as error:
             text = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, text), entry, self.path) from error

@@ -24,8 +24,11 @@ from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
-LOST_ENTRIES_ADVICE = "Enter lost events, exclusions, accepted questions and cuts judged by ear again "
-LOST_ENTRIES_ADVICE += "(folder_updates.add_event, exclude_entry, MachineFolder.accept, folder_updates.store_cut)."
+LOST_ENTRIES_ADVICE = (
+    "Enter lost decisions on hits, events, exclusions, accepted questions and cuts judged by ear again "
+)
+LOST_ENTRIES_ADVICE += "(Logbook.decide_hits, folder_updates.add_event, exclude_entry, MachineFolder.accept, "
+LOST_ENTRIES_ADVICE += "folder_updates.store_cut)."
 """Advice on entries that no copy of the journal has."""
 
 

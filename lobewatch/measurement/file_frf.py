@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import acquisition
-from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Remark
+from acquisition import DataError, Description, Fact, Frf, Hit, HitDecision, HitFlags, Recording, Remark
 from acquisition.errors import join_sentences
 from acquisition.files.read_recording import detect_format
-from acquisition.files.tap_file import TAP_FORMAT
+from acquisition.files.tap_file import TAP_FORMAT, read_judged_tap
 from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
-from acquisition.tap_test import decide_flags
+from acquisition.tap_test import TapTest, decide_flags
 from lobewatch.measurement.exponential_window import Window, missing_window_text, own_window_remark, window_ringing_hits
 from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.step_times import time_step
@@ -39,6 +39,8 @@ class FileFrf:
     """Time constant of the response window in the file (s); NaN for an unknown shape, None without one."""
     faults: tuple[HitFlags, ...] = ()
     """Faults of all hits of the file."""
+    flags: tuple[HitFlags, ...] = ()
+    """Flags of these hits without accepted faults and after decisions; falsy for an averaged hit."""
     decisions: tuple[HitDecision, ...] = ()
     """Decisions of a person on these hits."""
     places: tuple[str, ...] = ()
@@ -63,17 +65,20 @@ def read_file_frf(
         missing = missing_window_text(recording.window, window)
         raise DataError(join_sentences(f"{path}: {recording.problems}", missing, phase))
     recording.require_measurable()
-    if recording.frf is not None:
+    is_tap_file = not description.hit_files and detect_format(path) is TAP_FORMAT
+    tap = read_judged_tap(path) if is_tap_file else None
+    if tap is None and recording.frf is not None:
+        add_decisions((), (), description.hit_decisions)
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_set_averages(path, recording.frf, averages), facts=facts, recorded_window=recording.window)
     if averages is not None:
         finding = f"Description.averages {averages}: lobewatch counts the hits of {path.name}"
         raise ValueError(f"{finding}. Leave out the number of averages.")
-    frf = _average_hits(path, recording.hits, accepted, description)
-    facts, remarks, n_found = recording.facts, (*recording.remarks, *frf.remarks), recording.n_found
-    return replace(
-        frf, facts=facts, recorded_window=recording.window, remarks=remarks, n_found=n_found, places=recording.places
-    )
+    recording = recording if tap is None else replace(recording, hits=tap.hits)
+    frf = _average_hits(recording, tap, accepted, description)
+    remarks, n_found, places = (*recording.remarks, *frf.remarks), recording.n_found, recording.places
+    of_file = replace(frf, facts=recording.facts, recorded_window=recording.window, remarks=remarks)
+    return replace(of_file, n_found=n_found, places=places)
 
 
 def _check_phase(path: Path, description: Description) -> str:
@@ -88,40 +93,39 @@ def _check_phase(path: Path, description: Description) -> str:
     return ""
 
 
-def _average_hits(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
-    faults = tuple(map(acquisition.check_hit, hits))
-    if description.hit_decisions:
-        return _average_decided_hits(path, hits, faults, accepted, description)
-    good = tuple(hit for hit, verdict in zip(hits, faults, strict=True) if not verdict & ~accepted)
-    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in faults)
-    if refused:
+def _average_hits(recording: Recording, tap: TapTest | None, accepted: HitFlags, description: Description) -> FileFrf:
+    """Average the hits of a recording, of a tap file by its own verdicts, without those that the checks refuse."""
+    hits, earlier = recording.hits, () if tap is None else tap.decisions
+    faults = tuple(map(acquisition.check_hit, hits)) if tap is None else tap.flags
+    left = tuple(found & ~accepted for found in faults)
+    decisions = add_decisions(left, earlier, description.hit_decisions)
+    flags = decide_flags(left, decisions)
+    if decisions:
+        frf, used = average_decided_hits(hits, flags)
+        remarks = (*find_choice_remarks(faults, decisions),)
+        return FileFrf(frf, used, remarks=remarks, faults=faults, flags=flags, decisions=decisions)
+    good = tuple(hit for hit, found in zip(hits, flags, strict=True) if not found)
+    if refused := sum(bool(found) and not now for found, now in zip(faults, flags, strict=True)):
         text = f"average includes {refused} of {len(hits)} hits that failed the checks"
         frf = acquisition.estimate_frf(good) if good[0].has_force else None
-        return FileFrf(frf, good, remarks=(Remark("hits-accepted", "", text),), faults=faults)
+        return FileFrf(frf, good, remarks=(Remark("hits-accepted", "", text),), faults=faults, flags=flags)
     if good and not good[0].has_force:
-        return FileFrf(None, good, faults=faults)
+        return FileFrf(None, good, faults=faults, flags=flags)
     try:
-        return FileFrf(acquisition.read_frf(path, description), good, faults=faults)
+        return FileFrf(acquisition.read_frf(recording.path, description), good, faults=faults, flags=flags)
     except DataError:
-        ringing = [hit for hit, verdict in zip(hits, faults, strict=True) if verdict == HitFlags.NOT_DECAYED]
+        ringing = [hit for hit, found in zip(hits, faults, strict=True) if found == HitFlags.NOT_DECAYED]
         if not ringing or not hits[0].has_force:
             raise
-        frf, windowed, tau = window_ringing_hits(ringing)
-        cure = "Record longer, or use the hits without a window with fit_file_modes.accept not-decayed"
-        return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),), faults=faults)
+        return _window_hits(ringing, faults)
 
 
-def _average_decided_hits(
-    path: Path, hits: Sequence[Hit], faults: tuple[HitFlags, ...], accepted: HitFlags, description: Description
-) -> FileFrf:
-    """Average the hits that remain after decisions, of one tap file by its own verdicts on all its hits."""
-    if detect_format(path) is TAP_FORMAT and not description.hit_files:
-        tap = acquisition.read_tap(path)
-        hits, faults = tap.hits, tap.flags
-    left = [found & ~accepted for found in faults]
-    decisions = add_decisions(left, (), description.hit_decisions)
-    frf, used = average_decided_hits(hits, decide_flags(left, decisions))
-    return FileFrf(frf, used, remarks=(*find_choice_remarks(faults, decisions),), faults=faults, decisions=decisions)
+def _window_hits(ringing: Sequence[Hit], faults: tuple[HitFlags, ...]) -> FileFrf:
+    """Average the hits whose only fault is that they ring at the end, with our own window."""
+    frf, windowed, tau = window_ringing_hits(ringing)
+    cure = "Record longer, or use the hits without a window with fit_file_modes.accept not-decayed"
+    flags = tuple(HitFlags.OK if found == HitFlags.NOT_DECAYED else found for found in faults)
+    return FileFrf(frf, windowed, tau, (own_window_remark("", tau, cure),), faults=faults, flags=flags)
 
 
 def _parse_accepted_flags(codes: Collection[str]) -> HitFlags:

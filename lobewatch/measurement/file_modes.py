@@ -51,6 +51,8 @@ class FileModes:
     """Mode edits."""
     hits: tuple[HitFlags, ...] = ()
     """Faults of each hit of the file; empty if it contains only an FRF."""
+    hit_flags: tuple[HitFlags, ...] = ()
+    """Flags of these hits without accepted faults and after decisions; falsy for an averaged hit."""
     hit_decisions: tuple[HitDecision, ...] = ()
     """Decisions of a person on these hits."""
     n_found: int = 0
@@ -157,7 +159,7 @@ def fit_file_modes(
     found = (*_fit_remarks(modes, frf, band), *changes)
     remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
-    of_hits = file_frf.faults, file_frf.decisions, file_frf.n_found, file_frf.places
+    of_hits = file_frf.faults, file_frf.flags, file_frf.decisions, file_frf.n_found, file_frf.places
     return FileModes(path, frf, extraction, modes, fitted, picked, remarks, file_frf.facts, by_hand, *of_hits)
 
 
@@ -172,7 +174,7 @@ def _fit_decay_modes(
     modes = drop_explained_remedies(modal.modes_from_decays(state), changes)
     fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks, *changes)
-    of_hits = decays.faults, decays.decisions, decays.n_found, decays.places
+    of_hits = decays.faults, decays.flags, decays.decisions, decays.n_found, decays.places
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from acquisition import HitDecision, HitFlags, Remark
-from acquisition.tap_test import decide_flags
 
 HIT_DECISIONS_CODE = "hits-by-hand"
 """Code of the remark on decisions on hits; it is about all of them."""
@@ -17,15 +16,20 @@ def format_decisions(decisions: Sequence[HitDecision]) -> str:
     return ", ".join(map(str, decisions))
 
 
-def format_unused_hits(faults: Sequence[HitFlags], decisions: Sequence[HitDecision], places: Sequence[str] = ()) -> str:
-    """Return how many hits are averaged, and each other hit with its flags; empty if all are.
+def format_unused_hits(flags: Sequence[HitFlags], places: Sequence[str] = ()) -> str:
+    """Return each hit that is not averaged with its flags; empty if all are.
 
     places: file of each hit and its number there, if the hits are of several files.
     """
-    flags, of = decide_flags(faults, decisions), [f"{place}: " for place in places] or [""] * len(faults)
+    of = [f"{place}: " for place in places] or [""] * len(flags)
     listed = enumerate(zip(flags, of, strict=True), 1)
-    unused = [f"hit {number} ({place}{found.words})" for number, (found, place) in listed if found]
-    return f"{flags.count(HitFlags.OK)} of {len(flags)} hits averaged, without {', '.join(unused)}" if unused else ""
+    unused = [f"hit {number} ({place}{_format_flags(found)})" for number, (found, place) in listed if found]
+    return f"without {', '.join(unused)}" if unused else ""
+
+
+def _format_flags(flags: HitFlags) -> str:
+    """Return flags in words, where a hit that a person took out is rejected by hand."""
+    return ", ".join("rejected by hand" if flag is HitFlags.UNDONE else flag.words for flag in flags)
 
 
 def find_choice_remarks(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> list[Remark]:
@@ -45,7 +49,7 @@ def find_choice_remarks(faults: Sequence[HitFlags], decisions: Sequence[HitDecis
     """
     remarks = []
     if decisions:
-        remarks.append(Remark(HIT_DECISIONS_CODE, format_decisions(decisions), "hits chosen by the user"))
+        remarks.append(Remark(HIT_DECISIONS_CODE, format_decisions(decisions), "the user decided on these hits"))
     accepted = [decision for decision in decisions if decision.decision == "accept"]
     if clipped := [d.hit for d in accepted if HitFlags.from_codes(d.codes) & OVERLOAD_FLAGS]:
         numbers = ", ".join(map(str, clipped))

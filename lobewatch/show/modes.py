@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from rich.table import Table
 
-from acquisition import Fact, HitDecision, HitFlags, Remark, merge_remarks
-from acquisition.tap_test import decide_flags
+from acquisition import Fact, HitFlags, Remark, merge_remarks
 from dsm import format_rounded, format_with_error
 from lobewatch.measurement import FileModes
 from lobewatch.measurement.hit_choice import format_unused_hits
@@ -155,12 +154,11 @@ def peak_picking_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
     return table
 
 
-def hits_json(faults: Sequence[HitFlags], decisions: Sequence[HitDecision]) -> list[JsonObject]:
-    """Return each hit with its number, its verdict and codes, and whether it is averaged."""
-    listed = zip(faults, decide_flags(faults, decisions), strict=True)
+def hits_json(faults: Sequence[HitFlags], flags: Sequence[HitFlags]) -> list[JsonObject]:
+    """Return each hit with its number, its verdict and codes, and whether it is averaged, which leaves no flags."""
     return [
-        {"number": number, "verdict": found.words, "codes": found.codes, "used": not flags}
-        for number, (found, flags) in enumerate(listed, 1)
+        {"number": number, "verdict": found.words, "codes": found.codes, "used": not left}
+        for number, (found, left) in enumerate(zip(faults, flags, strict=True), 1)
     ]
 
 
@@ -173,7 +171,7 @@ def file_modes_json(file_modes: FileModes) -> JsonObject:
         "n_hits_found": file_modes.n_found,
         "usable_band_hz": frf and frf.usable_band,
         "facts": file_modes.facts,
-        "hits": hits_json(file_modes.hits, file_modes.hit_decisions),
+        "hits": hits_json(file_modes.hits, file_modes.hit_flags),
         "hit_decisions": file_modes.hit_decisions,
         "by_hand": file_modes.by_hand,
         "modes": list(map(mode_json, file_modes.fitted)),
@@ -192,7 +190,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> Text
     texts: Texts = [
         f"{file_modes.path.name}: {_frf_text(file_modes)}",
         *fact_lines(file_modes.facts, NON_FILE_ORIGINS),
-        *filter(None, [format_unused_hits(file_modes.hits, file_modes.hit_decisions, file_modes.places)]),
+        *filter(None, [format_unused_hits(file_modes.hit_flags, file_modes.places)]),
         *map(str, merge_remarks(of_files)),
         mode_table(shown),
         trust_summary(file_modes.fitted, everything=everything),

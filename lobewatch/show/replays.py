@@ -90,7 +90,7 @@ def preview_json(preview: ReplayPreview) -> JsonObject:
         "tool": measurement.tool,
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
-        "hit_list": hits_json(tap.flags, tap.decisions),
+        "hit_list": hits_json(tap.flags, tap.decided_flags),
         "remarks": recording.remarks,
         "lines": tap.frf and tap.frf.frequency.size,
         "averages": tap.frf and tap.frf.n_averages,
@@ -142,7 +142,7 @@ def _preview_lines(preview: ReplayPreview) -> list[str]:
         f"{count} {word}" for word, count in words.items()
     )
     kind = hits if preview.tap.hits else "an FRF"
-    details += filter(None, [format_unused_hits(preview.tap.flags, preview.tap.decisions, recording.places)])
+    details += filter(None, [format_unused_hits(preview.tap.decided_flags, recording.places)])
     return [f"{preview.file}: {recording.title}, {kind}", *(f"  {line}" for line in details)]
 
 
@@ -222,14 +222,15 @@ def emit_replay(
 def _stored_summary(outcome: ReplayOutcome, n_files: int) -> str:
     """Return how many files were stored, or that they are one tap test."""
     n_stored, n_taps = len(outcome.new_tap_ids), len(outcome.tap_ids) + len(outcome.rejected)
+    decided = ", decisions on hits stored" if outcome.decided_tap_ids else ""
     if n_taps < n_files:
-        return f"{n_files} files {'' if n_stored else 'already '}stored as one tap test"
-    return f"{n_stored} of {count_noun(n_files, 'file')} stored"
+        return f"{n_files} files {'' if n_stored else 'already '}stored as one tap test{decided}"
+    return f"{n_stored} of {count_noun(n_files, 'file')} stored{decided}"
 
 
 def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
-    """Return all new tap tests, and the files that were known already or rejected."""
-    stored = outcome.new_tap_ids
+    """Return all new tap tests, those with new decisions on hits, and the files that were known already or rejected."""
+    stored = [*outcome.new_tap_ids, *outcome.decided_tap_ids]
     return {
         "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored],
         "programs": list(map(verdict_json, logbook.verdicts())) if stored else [],
@@ -244,11 +245,11 @@ def replay_json(outcome: ReplayOutcome, logbook: Logbook) -> JsonObject:
 
 def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
     """Return a few tap tests in full, many as their series, and the verdicts on the programs."""
-    stored, texts = outcome.new_tap_ids, Texts()
+    stored, texts = [*outcome.new_tap_ids, *outcome.decided_tap_ids], Texts()
     if len(set(stored)) <= MAX_TAPS_IN_FULL:
         for tap_id in stored:
             texts += measurement_texts(logbook.measurement(tap_id), logbook)
-            texts += _hit_count_texts([outcome.hit_counts[tap_id]])
+            texts += _hit_count_texts([count for known, count in outcome.hit_counts.items() if known == tap_id])
     else:
         rows = logbook.history.rows
         asked = {row.tap_id: row.questions for row in rows}
@@ -264,7 +265,7 @@ def replay_texts(outcome: ReplayOutcome, logbook: Logbook) -> Texts:
 
 def _hit_count_texts(counts: Sequence[HitCount]) -> list[str]:
     """Return how many hits were found and used; nothing for FRFs."""
-    found, used = (sum(numbers) for numbers in zip(*counts, strict=True))
+    found, used = sum(count.found for count in counts), sum(count.used for count in counts)
     return [f"hits: {found} found, {used} used"] if found else []
 
 

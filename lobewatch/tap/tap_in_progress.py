@@ -3,6 +3,7 @@
 import errno
 import shutil
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -182,14 +183,11 @@ class TapInProgress:
             decision = HitDecision(number + 1, "accept", codes) if codes else HitDecision(number + 1, "undo")
         if accept != bool(self.decided_flags[number]):
             raise ValueError(f"hit {number + 1} is already {'accepted' if accept else 'rejected'}.")
-        decisions, hit = add_decisions(self.flags, self.decisions, [decision]), self.hits[number]
-        if accept:
-            self.mean.add(hit)
+        decisions, mean = add_decisions(self.flags, self.decisions, [decision]), copy(self.mean)
+        (mean.add if accept else mean.remove)(self.hits[number])
         entered = replace(decision, hit=self.numbers[number] + 1)
         self._store(partial(store_hit_decisions, self.folder, self.id, [entered]))
-        if not accept:
-            self.mean.remove(hit)
-        self.decisions = decisions
+        self.decisions, self.mean = decisions, mean
 
     def resume_mean(self) -> None:
         """Average the hits of the interrupted test, after the decisions on those that are left."""

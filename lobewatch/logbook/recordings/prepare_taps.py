@@ -106,7 +106,7 @@ def is_valid_draft(request: FileRequest, answer: Any) -> bool:
     return (
         isinstance(answer, TapDraft)
         and answer.digest == hashlib.sha256(request.content).hexdigest() == answer.entry.source_sha256
-        and tap.decisions == request.description.hit_decisions
+        and {*request.description.hit_decisions} <= {*tap.decisions}
         and answer.entry == TapEntry.of(tap, answer.content)
         and answer.created == tap.circumstances.created
         and is_fit_of(answer.fit, answer.entry)
@@ -178,7 +178,7 @@ def _make_draft(context: MachineContext, file: Path, description: Description, c
     defaults = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
     packed, digest = encode_tap(tap), hashlib.sha256(content).hexdigest()
     count = HitCount(recording.n_found, len(tap.accepted))
-    unused = format_unused_hits(tap.flags, tap.decisions, recording.places)
+    unused = format_unused_hits(tap.decided_flags, recording.places)
     entry, created = TapEntry.of(tap, packed), tap.circumstances.created
     return TapDraft(digest, packed, entry, created, fit, defaults, unused, count, recording.remarks)
 

@@ -27,7 +27,7 @@ from acquisition import (
 from acquisition.errors import join_sentences
 from acquisition.files.contents.contents import Origin, format_window
 from acquisition.files.readers.text_file import is_prose
-from acquisition.files.tap_file import has_all_hits
+from acquisition.files.tap_file import read_judged_tap
 from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
 from lobewatch.machine import Machine, MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine_file
@@ -171,8 +171,12 @@ def read_tap_test(
     about = _build_circumstances(context, recording, description, check_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_label_facts(about, description, recording)))
     source = SourceFile(f"{file.stem} and {len(description.hit_files)} more.zip" if is_joined else file.name, content)
-    source = source.without_content if not is_joined and has_all_hits(at, recording.hits) else source
-    return _build_tap_test(recording, about, source, description.hit_decisions), recording
+    tap = TapTest(acquisition.new_tap_id(about), about, recording.frf, recording.hits)
+    if not is_joined and (judged := read_judged_tap(at)) is not None:
+        is_live = judged.source is None and len(judged.hits) == len(recording.hits)
+        source = source.without_content if is_live else source
+        tap, recording = replace(judged, id=tap.id, circumstances=about), replace(recording, hits=judged.hits)
+    return _evaluate_tap_test(replace(tap, source=source), recording.path, description.hit_decisions), recording
 
 
 def _reject_windowed(recording: Recording) -> None:
@@ -228,19 +232,17 @@ def _find_origin(name: str, description: Description, recording: Recording) -> O
     return "option" if getattr(description, name) else "file" if getattr(recording, name) else "default"
 
 
-def _build_tap_test(
-    recording: Recording, about: Circumstances, source: SourceFile, decisions: Sequence[HitDecision]
-) -> TapTest:
-    tap = TapTest(acquisition.new_tap_id(about), about, recording.frf, recording.hits, source=source)
+def _evaluate_tap_test(tap: TapTest, path: Path, decisions: Sequence[HitDecision]) -> TapTest:
+    """Return a tap test with verdicts on its hits, the decisions, and the FRF of the hits that remain."""
     try:
         if decisions:
-            tap = replace(tap, flags=tuple(map(acquisition.check_hit, recording.hits)))
-            return decide_hits(tap, add_decisions(tap.flags, (), decisions))
-        if recording.frf is not None:
+            tap = tap if tap.flags else replace(tap, flags=tuple(map(acquisition.check_hit, tap.hits)))
+            return decide_hits(tap, add_decisions(tap.flags, tap.decisions, decisions))
+        if tap.flags or tap.frf is not None:
             return tap
-        frf, flags = acquisition.average_good_hits(recording.hits)
+        frf, flags = acquisition.average_good_hits(tap.hits)
     except ValueError as error:
-        raise DataError(f"{recording.path}: {error}") from error
+        raise DataError(f"{path}: {error}") from error
     return replace(tap, frf=frf, flags=flags)
 
 

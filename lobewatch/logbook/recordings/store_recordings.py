@@ -65,6 +65,8 @@ class ReplayOutcome:
     """Number of hits found and used in the new tap tests, by identity."""
     remarks: Sequence[Remark] = ()
     """Remarks on hits that are left out, and on tap tests of one hit each."""
+    decided_tap_ids: Sequence[str] = ()
+    """Tap tests that were stored already and got decisions on hits."""
 
 
 class ReplayPlan(NamedTuple):

@@ -7,6 +7,7 @@ time limit reads it.
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def read_unverified_tap(path: Path) -> TapEntry | None:
 
 def _read_tap_entry(path: Path) -> TapEntry | None:
     try:
-        return TapEntry.of(read_tap(path), read_regular_file(path))
+        return TapEntry.of(replace(read_tap(path), decisions=()), read_regular_file(path))
     except (ValueError, KeyError, TypeError, RuntimeError, OSError):
         return None
 

@@ -80,6 +80,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "LobeChart.source": "--source",
     "lobes.materials_by_name": "lobewatch materials",
     "Logbook.verdicts": "lobewatch check MACHINE",
+    "Logbook.decide_hits": "modes --accept-hit and --reject-hit",
     "MachineFolder.accept": "replay --accept",
     "MachineFolder.contents": "lobewatch history",
     "MaintenanceEvent.time": "--date",

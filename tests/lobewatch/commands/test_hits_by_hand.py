@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,28 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import Description, Hit, HitDecision, HitFlags, Structure, check_hit, estimate_frf, read_hits, read_tap
+from acquisition import (
+    Circumstances,
+    Description,
+    Hit,
+    HitDecision,
+    HitFlags,
+    Structure,
+    TapTest,
+    check_hit,
+    estimate_frf,
+    new_tap_id,
+    read_frf,
+    read_hits,
+    read_tap,
+    write_tap,
+)
 from lobewatch.cli import app
 from lobewatch.logbook.rebuild_history import TapFileBytes, fit_tap_bytes
 from lobewatch.machine import MachineFolder
 from lobewatch.measurement import fit_file_modes
+from lobewatch.measurement.hit_choice import format_unused_hits
+from modal import Mode, synthesize_frf
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -242,3 +260,122 @@ def test_the_report_and_the_replay_name_the_hits(shop: Shop, file: Path) -> None
         assert f"hit {number} (" in said.stderr
     assert run("report", shop.path).exit_code == 0
     assert f"reject {WIDER}" in (shop.path / "report.html").read_text("utf-8")
+
+
+def used(said: Result) -> list[int]:
+    return [hit["number"] for hit in json.loads(said.stdout)["hits"] if hit["used"]]
+
+
+def test_a_withdrawn_decision_of_the_replay_leaves_no_trace_in_the_result(shop: Shop, file: Path) -> None:
+    run("replay", shop.path, file, *DATED, "--reject-hit", WIDER, "--accept-hit", f"{CLIPPED}:overload-force")
+    (entry,) = shop.logbook.taps
+    run("modes", shop.path, entry.id, "--undo-hit", WIDER)
+    said = run("modes", shop.path, entry.id, "--undo-hit", CLIPPED, "--json")
+    assert used(said) == [1, 2, 4, 6]
+    expected = estimate_frf(chosen(file, 1, 2, 4, 6)).receptance
+    path = shop.path / entry.file
+    withdrawn = shop.folder.read(shop.logbook.taps[-1])
+    for frf in (withdrawn.required_frf, read_frf(path), fit_file_modes(path).frf):
+        assert frf is not None
+        assert frf.n_averages == 4
+        assert np.allclose(frf.receptance, expected, rtol=1e-12, atol=0)
+
+
+def test_a_rebuilt_journal_without_decisions_gives_the_result_of_the_verdicts(shop: Shop, file: Path) -> None:
+    run("replay", shop.path, file, *DATED, "--reject-hit", WIDER)
+    for path in shop.path.glob("journal*.jsonl"):
+        path.unlink()
+    run("rebuild", shop.path)
+    (entry,) = shop.logbook.taps
+    assert entry.hit_decisions == ()
+    expected = estimate_frf(chosen(file, 1, 2, 4, 6)).receptance
+    assert np.allclose(shop.folder.read(entry).required_frf.receptance, expected, rtol=1e-12, atol=0)
+    assert shop.logbook.measurement(entry.id).modes[0].n_hits == 4
+
+
+def test_a_tap_test_of_one_accepted_hit_opens_without_its_journal(shop: Shop, file: Path) -> None:
+    rows = file.read_text("utf-8").splitlines()
+    first = 1 + (CLIPPED - 1) * N
+    file.write_text("\n".join([rows[0], *rows[first : first + N]]), "utf-8")
+    run("replay", shop.path, file, *DATED, "--accept-hit", "1:overload-force")
+    for path in shop.path.glob("journal*.jsonl"):
+        path.unlink()
+    run("rebuild", shop.path)
+    tap = shop.folder.read(shop.logbook.taps[-1])
+    assert (tap.required_frf.n_averages, len(tap.accepted)) == (1, 1)
+    assert isinstance(run("modes", shop.path, tap.id, "--reject-hit", 1).exception, ValueError)
+
+
+@pytest.fixture
+def live(file: Path, tmp_path: Path) -> Path:
+    """Write a tap file of which hit 1 was undone and hit 4 is inconsistent, which its signals do not show."""
+    hits = tuple(read_hits(file))
+    flags = [*map(check_hit, hits)]
+    flags[0], flags[3] = HitFlags.UNDONE, HitFlags.INCONSISTENT
+    about = Circumstances("Mill 3", datetime(2026, 3, 2, 9, 30, tzinfo=UTC))
+    tap = TapTest(new_tap_id(about), about, estimate_frf([hits[WIDER - 1], hits[5]]), hits, tuple(flags))
+    write_tap(path := tmp_path / "live.h5", tap)
+    return path
+
+
+def test_all_commands_number_the_hits_of_a_tap_file_alike(shop: Shop, live: Path) -> None:
+    plain, decided = run("modes", live, "--json"), run("modes", live, "--reject-hit", 6, "--json")
+    assert (used(plain), used(decided)) == ([2, 6], [2])
+    assert [json.loads(said.stdout)["n_hits_found"] for said in (plain, decided)] == [6, 6]
+    said = json.loads(run("replay", shop.path, live, "--reject-hit", 6, "--json").stdout)
+    (tap_id,) = said["hits"]
+    assert said["hits"][tap_id] == {"found": 6, "used": 1}
+    (entry,) = shop.logbook.taps
+    assert used(run("modes", shop.path, entry.id, "--json")) == [2]
+    assert shop.folder.read(entry).flags == read_tap(live).flags
+
+
+def test_edits_that_do_not_fit_store_no_decision(shop: Shop, file: Path) -> None:
+    run("replay", shop.path, file, *DATED)
+    (entry,) = shop.logbook.taps
+    said = run("modes", shop.path, entry.id, "--reject-hit", WIDER, "--drop", 99999)
+    assert isinstance(said.exception, ValueError)
+    assert [line["kind"] for line in journal(shop)] == ["tap"]
+
+
+def test_decisions_on_an_frf_are_refused(tmp_path: Path) -> None:
+    frf = synthesize_frf([Mode(1713.0, 0.03, 3.5e7)], np.arange(1000.0, 2500.0))
+    table = np.column_stack([frf.frequency, frf.receptance.real, frf.receptance.imag])
+    path, header = tmp_path / "frf.csv", "frequency [Hz],real [m/N],imag [m/N]"
+    np.savetxt(path, table, delimiter=",", header=header, comments="")
+    assert run("modes", path).exit_code == 0
+    for option in (["--reject-hit", 1], ["--accept-hit", "1:double-hit"]):
+        assert isinstance(run("modes", path, *option).exception, ValueError)
+
+
+def test_hits_with_an_accepted_fault_count_as_averaged(file: Path) -> None:
+    said = run("modes", file, "--accept", "overload-(force)", "--json")
+    assert used(said) == [1, 2, 3, 4, 6]
+    assert json.loads(said.stdout)["n_averages"] == 5
+    assert f"hit {CLIPPED} (" not in run("modes", file, "--accept", "overload-(force)").stdout
+
+
+def test_the_unused_hits_are_named_once_and_without_a_second_count() -> None:
+    flags = HitFlags.OK, HitFlags.DOUBLE_HIT | HitFlags.UNDONE, HitFlags.UNDONE
+    assert format_unused_hits(flags[:1]) == ""
+    said = format_unused_hits(flags)
+    assert ("hit 1" in said, "hit 2" in said, "hit 3" in said) == (False, True, True)
+    assert " of " not in said
+    assert HitFlags.UNDONE.words not in said
+
+
+def test_a_stored_tap_test_with_a_new_decision_is_shown(shop: Shop, file: Path) -> None:
+    run("replay", shop.path, file, *DATED)
+    (entry,) = shop.logbook.taps
+    for expected in ([entry.id], []):
+        outcome = shop.logbook.replay_all([file], Description(hit_decisions=(HitDecision(WIDER, "reject"),)))
+        assert outcome.decided_tap_ids == expected
+    said = json.loads(run("replay", shop.path, file, *DATED, "--reject-hit", 1, "--json").stdout)
+    assert [measured["tap_id"] for measured in said["measurements"]] == [entry.id]
+
+
+def test_a_preview_of_a_stored_file_checks_the_decisions(shop: Shop, file: Path) -> None:
+    run("replay", shop.path, file, *DATED)
+    assert isinstance(run("replay", shop.path, file, "--reject-hit", 99, "--dry-run").exception, ValueError)
+    assert run("replay", shop.path, file, "--reject-hit", 1, "--dry-run").exit_code == 0
+    assert decisions(shop) == []

@@ -133,6 +133,7 @@ def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFo
     told = " ".join(rebuild_files(folder.path))
     lost = r"folder_updates\.add_event, exclude_entry, MachineFolder\.accept, folder_updates\.store_cut"
     assert re.search(rf"journal\.jsonl: .*line 4 .*{lost}", told)
+    assert "Logbook.decide_hits" in told
     assert MachineFolder(folder.path).contents().events == ()
     assert [entry.excluded for entry in MachineFolder(folder.path).taps()] == ["", "wrong tool", ""]
     remove_journals(folder)

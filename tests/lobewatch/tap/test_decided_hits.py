@@ -262,3 +262,31 @@ def test_nothing_is_shown_that_the_journal_does_not_have(
     monkeypatch.undo()
     assert not Script().run(start).decisions
     assert lines(folder) == []
+
+
+def test_a_decision_that_cannot_be_stored_leaves_the_mean_as_it_was(
+    folder: MachineFolder, structure: Structure, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signal = HammeredStructure(structure, RATE, np.random.default_rng(4), Hammering(double_hits=0.0, overloads=0.0))
+    source = SimulatedSource(signal, channels, RATE, 90_000)
+    hits = [*capture_hits(source, Trigger(20.0, 6400, 512))][:4]
+    tap = TapInProgress("ID", Circumstances("m", datetime.now(UTC)), folder, hits, 4 * [HitFlags.OK])
+    tap.flags[3], tap.numbers = HitFlags.TOO_HARD, [*range(4)]
+    for hit in hits[:3]:
+        tap.mean.add(hit)
+    assert tap.mean.frf is not None
+    before = tap.mean.frf.receptance
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.EIO, "Input/output error", "journal.jsonl")
+
+    monkeypatch.setattr("lobewatch.tap.tap_in_progress.store_hit_decisions", fail)
+    for number, accept in ((3, True), (0, False)):
+        with pytest.raises(OSError, match="journal"):
+            tap.decide(number, accept=accept)
+        assert tap.mean.frf is not None
+        assert np.array_equal(tap.mean.frf.receptance, before)
+        assert (len(tap.mean.hits), tap.decisions) == (3, ())
+    monkeypatch.undo()
+    tap.decide(3, accept=True)
+    assert len(tap.mean.hits) == 4

@@ -139,7 +139,8 @@ def test_a_deep_peak_outside_the_band_hides_none_inside() -> None:
     found = measure(
         TapTest("x", about, frf), machine("[mode]", "band_hz = [1200, 2200]"), None, ModeEdits(drop=(2100.0,))
     )
-    assert [remark.about for remark in found.uncovered] == ["2100 Hz"]
+    assert [round(peak.frequency, -2) for peak in found.unexplained] == [2100.0]
+    assert [remark.code for remark in found.uncovered] == ["peak-not-explained"]
     assert [remark.about for remark in found.remarks if remark.code == "peak-outside-band"] == ["1100 Hz"]
 
 

@@ -241,9 +241,10 @@ def test_the_chart_of_the_frf_is_that_of_the_fitted_frf(folder: MachineFolder) -
 def test_missing_pockets_have_the_reason_and_remedy_of_the_recommendation(folder: MachineFolder) -> None:
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
-    tap(folder, 900.0, days=30)
+    tap(folder, 1250.0, days=1)
     logbook = Logbook(folder)
     found = compare_lobes(logbook, None, "reference cut", DynamicsSource.MODES, LobeMethod.ZERO_ORDER)
+    assert found.now.assembly.directions == ("x", "y")
     question = find_open_question(found.now.table, found.now.assembly)
     assert question is not None
     (remark,) = [remark for remark in found.remarks if remark.code == "no-safe-pocket"]

@@ -19,6 +19,7 @@ from lobewatch.tool import lobe_chart
 from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.verdicts import Setting, Verdict, find_stable_pockets
 from lobewatch.verdicts.speed_pockets import SpeedPocket, find_speed_pockets
+from lobewatch.verdicts.verdict import find_open_question
 
 NO_POCKET_CODE = "no-safe-pocket"
 """Code of the remark on missing pockets."""
@@ -132,19 +133,20 @@ def _predict_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
 
 
 def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
-    """Read the FRF and shift it in frequency as the assembly has shifted the modes of an older tap test."""
+    """Read the fitted FRF and shift it in frequency as the assembly has shifted the modes of an older tap test."""
     tap_id = assembly.taps[direction]
     entry = next(tap for tap in logbook.taps if tap.id == tap_id)
-    frf = logbook.folder.read(entry).required_frf.in_band(logbook.machine.mode.band_hz)
-    now, then = (assembly.x, assembly.y)["xy".index(direction)], logbook.measurement(tap_id).at_tip
+    measurement = logbook.measurement(tap_id)
+    frf = (measurement.frf or logbook.folder.read(entry).required_frf).in_band(logbook.machine.mode.band_hz)
+    now, then = (assembly.x, assembly.y)["xy".index(direction)], measurement.at_tip
     ratio = now[0].frequency / then[0].frequency if now else 1.0
     band = None if frf.usable_band is None else (ratio * frf.usable_band[0], ratio * frf.usable_band[1])
     return replace(frf, frequency=ratio * frf.frequency, usable_band=band)
 
 
 def _no_pocket_remark(now: lobe_chart.LobeChart, machine: Machine) -> Remark:
-    if len(now.assembly.directions) == 1:
-        gap, cure = now.assembly.missing_direction
+    if open_question := find_open_question(now.table, now.assembly):
+        gap, cure = open_question
         return Remark(NO_POCKET_CODE, now.name, f"no stable pocket, because {gap}", cure)
     text = f"no stable pocket in {CutRange.of(machine, now.table).text}"
     return Remark(NO_POCKET_CODE, now.name, text, "Choose another tool or a smaller radial depth")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 import modal
-from acquisition import Frf, Remark
+from acquisition import Frf, Remark, merge_remarks
 from dsm import format_rounded
 from lobewatch.machine import Machine
 from lobewatch.measurement.hit_remarks import HIT_CHANGE_CODES
@@ -35,6 +35,23 @@ def label_direction(remark: Remark, direction: str) -> Remark:
     return replace(remark, about=f"{remark.about} in {direction}" if remark.about else f"direction {direction}")
 
 
+def describe_uncovered(remarks: Sequence[Remark]) -> tuple[str, str]:
+    """Return the first finding with the subjects of the others, and all remedies."""
+    first, *others = merge_remarks(remarks)
+    also = ", ".join(dict.fromkeys(remark.about for remark in others if remark.about))
+    cures = dict.fromkeys(remark.cure for remark in remarks if remark.cure)
+    return first.finding + (f", also {also}" if also else ""), ". ".join(cures)
+
+
+def peak_remark(peak: UnexplainedPeak, cure: str = PEAK_REMEDY) -> Remark:
+    """Return the remark on a measured peak that the modes do not explain."""
+    measured, explained = (f"{format_rounded(value, scale=1e-6, digits=2)} um/N" for value in peak[1:3])
+    found = f"most negative real part {measured} instead of {explained}"
+    return Remark(
+        PEAK_CODE, f"{peak.frequency:.0f} Hz", f"peak not explained by the modes used for lobes, {found}", cure
+    )
+
+
 def find_uncovered_peaks(
     frf: Frf | None, used: Sequence[Mode], machine: Machine
 ) -> tuple[tuple[UnexplainedPeak, ...], list[Remark]]:
@@ -43,23 +60,14 @@ def find_uncovered_peaks(
     A remark names each peak that they do not even explain within their errors. Peaks outside the band were left out on
     purpose: a remark names them, and no verdict depends on them. Without an FRF (no force) nothing is compared.
     """
-    peaks = () if frf is None else modal.find_unexplained_peaks(frf, used)
+    peaks = () if frf is None else modal.find_unexplained_peaks(frf, used, machine.mode.band_hz)
     low, high = machine.mode.band_hz or (0.0, np.inf)
     inside = tuple(peak for peak in peaks if low <= peak.frequency <= high)
     outside = [f"{peak.frequency:.0f} Hz" for peak in peaks if peak not in inside]
     cure = PEAK_REMEDY_BESIDE_TIP if machine.tap.position_mm else PEAK_REMEDY
-    remarks = [
-        Remark(PEAK_CODE, f"{peak.frequency:.0f} Hz", _peak_text(peak), cure)
-        for peak in inside
-        if not peak.is_within_errors
-    ]
+    remarks = [peak_remark(peak, cure) for peak in inside if not peak.is_within_errors]
     if outside:
         text = f"peak outside [mode] band_hz {low:g}..{high:g} Hz is not in the stability lobes"
         cure = "Widen [mode] band_hz if the peak belongs to the machine"
         remarks.append(Remark("peak-outside-band", ", ".join(outside), text, cure))
     return inside, remarks
-
-
-def _peak_text(peak: UnexplainedPeak) -> str:
-    measured, explained = (f"{format_rounded(value, scale=1e-6, digits=2)} um/N" for value in peak[1:3])
-    return f"peak not explained by the modes used for lobes, most negative real part {measured} instead of {explained}"

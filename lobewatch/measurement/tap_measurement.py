@@ -73,8 +73,10 @@ class Measurement(TapFit):
     """Modes at the tool tip for lobes, with one for each unexplained peak; empty without any."""
     cross: Sequence[Mode] | None = None
     """Signed modes of a cross FRF at the tool tip; None for other tests and away from the tip."""
+    used: Sequence[Mode] = ()
+    """Modes used for lobes, as measured; of either sign for a cross FRF."""
     unexplained: tuple[UnexplainedPeak, ...] = ()
-    """Measured peaks that the modes do not explain."""
+    """Measured peaks that the used modes do not explain."""
 
 
 @cache
@@ -173,7 +175,7 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
         at_tip += [peak.missing for peak in unexplained if is_at_tip]
     results: dict[str, Any] = {"followed": followed, "calibration": calibration, "at_tip": at_tip}
-    results |= {"unexplained": unexplained, "remarks": (*remarks, *about_peaks)}
+    results |= {"used": used, "unexplained": unexplained, "remarks": (*remarks, *about_peaks)}
     return Measurement(**vars(fit) | results)
 
 
@@ -192,7 +194,7 @@ def _interpret_cross_tap(fit: TapFit, machine: Machine, last: Mode | None) -> Me
     at_tip = cross if knows_size and not machine.tap.position_mm else None
     unexplained, _ = find_uncovered_peaks(fit.frf, cross, machine)
     results: dict[str, Any] = {"followed": followed, "cross": at_tip, "unexplained": unexplained}
-    results["remarks"] = (*remarks, *trusted.remarks)
+    results |= {"used": cross if knows_size else (), "remarks": (*remarks, *trusted.remarks)}
     return Measurement(**vars(fit) | results)
 
 

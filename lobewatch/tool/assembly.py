@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
-from itertools import chain
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from dsm import Calibration, calibrate, modes_at
 from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
-from lobewatch.measurement.coverage import label_direction
+from lobewatch.measurement.coverage import describe_uncovered, label_direction, peak_remark
 from lobewatch.measurement.hit_choice import HIT_DECISION_CODES
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
@@ -25,8 +24,8 @@ from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool import principal_directions as principal
 from lobewatch.tool.principal_directions import PrincipalDirections, TipModes
 from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, interpolate_frequency
-from modal import Mode
-from modal.quality.unexplained_peaks import MIN_LIMITING_SHARE
+from modal import Mode, UnexplainedPeak
+from modal.quality.unexplained_peaks import least_limiting_depth
 
 MAX_CROSS_FREQUENCY_DISTANCE = 0.01
 """Relative distance of a cross mode from all modes of x and y that proves another clamping; chosen."""
@@ -38,18 +37,23 @@ MIN_CROSS_PEAK_RATIO = 0.3
 """Peak of a checked cross mode over the largest peak."""
 
 
-def _check_cross_tap(x: TipModes, y: TipModes, tap: Measurement | None) -> tuple[TipModes, tuple[Remark, ...]]:
-    """Return the cross FRF modes if they fit those of x and y and cover the cross FRF; else None with a remark.
+CrossCheck = tuple[TipModes, tuple[Remark, ...], tuple[Remark, ...]]
+"""Signed modes if they are used, the remark if not, and the reasons why the modes do not cover the cross FRF."""
 
-    None without a remark if one of the three is missing.
-    """
+
+def _check_cross_tap(x: TipModes, y: TipModes, tap: Measurement | None) -> CrossCheck:
+    """Check that the cross FRF modes cover the cross FRF and fit those of x and y; nothing if one is missing."""
     if not x or not y or tap is None or tap.cross is None:
-        return None, ()
-    problem = next(chain(_find_cross_tap_problems(x, y, tap.cross), _find_missing_cross_peaks((*x, *y), tap)), None)
+        return None, (), ()
+    if uncovered := tuple(_find_uncovered_cross((*x, *y), tap)):
+        cure = describe_uncovered(uncovered)[1]
+        text = "cross tap not used, because its modes do not cover it"
+        return None, (Remark("cross-not-covered", "", text, cure),), uncovered
+    problem = next(_find_cross_tap_problems(x, y, tap.cross), None)
     if problem is None:
-        return tap.cross, ()
+        return tap.cross, (), ()
     cure = "Tap x, y and xy again without reclamping the tool"
-    return None, (Remark("cross-other-clamping", "", f"cross tap not used, because {problem}", cure),)
+    return None, (Remark("cross-other-clamping", "", f"cross tap not used, because {problem}", cure),), ()
 
 
 def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequence[Mode]) -> Iterator[str]:
@@ -68,13 +72,23 @@ def _find_cross_tap_problems(x: Sequence[Mode], y: Sequence[Mode], cross: Sequen
             yield f"its mode at {at:.0f} Hz is {share:.1f} times larger than possible (other sensors or clamping?)"
 
 
-def _find_missing_cross_peaks(modes: Sequence[Mode], tap: Measurement) -> Iterator[str]:
+def _find_uncovered_cross(modes: Sequence[Mode], tap: Measurement) -> Iterator[Remark]:
     """Yield the reasons why the modes of a cross tap do not cover it; peaks far below those of x and y do not count."""
-    deepest = min(-1 / (4 * mode.stiffness * mode.damping_ratio * (1 + mode.damping_ratio)) for mode in modes)
-    yield from (f"{remark.about} {remark.text}".strip() for remark in tap.uncovered)
-    for peak in tap.unexplained:
-        if peak.measured < MIN_LIMITING_SHARE * deepest and not peak.is_within_errors:
-            yield f"its modes do not explain its peak at {peak.frequency:.0f} Hz"
+    depths = [
+        (mode.frequency, -1 / (4 * mode.stiffness * mode.damping_ratio * (1 + mode.damping_ratio))) for mode in modes
+    ]
+    limiting = [
+        peak_remark(peak) for peak in tap.unexplained if not peak.is_within_errors and _may_limit(peak, depths, modes)
+    ]
+    for remark in (*tap.uncovered, *limiting):
+        yield label_direction(remark, tap.direction)
+
+
+def _may_limit(peak: UnexplainedPeak, depths: Sequence[tuple[float, float]], modes: Sequence[Mode]) -> bool:
+    def real_at(frequency: float) -> float:
+        return float(sum(mode.receptance(np.array(frequency)).real for mode in modes))
+
+    return peak.measured < least_limiting_depth(peak.frequency, depths, real_at)
 
 
 def _is_same_mode(mode: Mode, other: Mode) -> bool:
@@ -194,7 +208,7 @@ def assemble(
     moved = None if then is None else points[-1].frequency / then
     if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
-    signed, about_cross = _check_cross_tap(modes.get("x"), modes.get("y"), cross)
+    signed, about_cross, uncovered_cross = _check_cross_tap(modes.get("x"), modes.get("y"), cross)
     calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
     direct = {tap.direction: tap for tap in taps if tap.direction != CROSS_TAP}
     followed = {direction: tap.followed for direction, tap in direct.items() if tap.followed is not None}
@@ -209,7 +223,7 @@ def assemble(
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
         questions=tuple(label_question(tap.tap_id, own) for tap in taps for own in find_open_questions(tap.remarks)),
-        uncovered=tuple(label_direction(own, tap.direction) for tap in taps for own in tap.uncovered),
+        uncovered=(*(label_direction(own, tap.direction) for tap in taps for own in tap.uncovered), *uncovered_cross),
         hit_remarks=tuple(
             label_direction(own, tap.direction)
             for tap in (*taps, *([cross] if cross is not None else []))

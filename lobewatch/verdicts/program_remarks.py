@@ -9,6 +9,7 @@ import numpy as np
 from acquisition import Remark
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
 from lobewatch.machine.settings.drive_power import CutRange
+from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
@@ -165,8 +166,7 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
-    uncovered = assembly.uncovered
-    values |= {"uncovered": ", ".join(dict.fromkeys(remark.about for remark in uncovered))}
-    values |= {"uncovered_remedy": next((remark.cure for remark in uncovered), "")}
+    if assembly.uncovered:
+        values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
     values |= {"missing": missing, "missing_remedy": missing_remedy}
     return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))

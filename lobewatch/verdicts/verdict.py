@@ -13,6 +13,7 @@ from acquisition.errors import join_sentences
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
+from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
@@ -241,8 +242,7 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
         return f"a tap test has an open question ({', '.join(codes)})", cure
     if assembly.uncovered:
-        first = assembly.uncovered[0]
-        return f"{first.about}: {first.text}", first.cure
+        return describe_uncovered(assembly.uncovered)
     return None
 
 

@@ -66,6 +66,15 @@ class Resonance:
         return abs(self.frequency - other.frequency) < max(self.half_width, other.half_width)
 
 
+def check_line_count(frf: Frf) -> None:
+    """Raise ValueError for too few lines to find a mode."""
+    n = frf.frequency.size
+    if n < MIN_FRF_LINES:
+        raise ValueError(
+            f"{n} lines of the FRF are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines."
+        )
+
+
 def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = False) -> list[Resonance]:
     """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
@@ -79,11 +88,7 @@ def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = Fa
     Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
     ConjugateError.
     """
-    n = frf.frequency.size
-    if n < MIN_FRF_LINES:
-        raise ValueError(
-            f"{n} lines of the FRF are too few to find a mode. Widen the band to at least {MIN_FRF_LINES} lines."
-        )
+    check_line_count(frf)
     if not np.any(frf.receptance):
         raise ValueError("the FRF is zero on every line, so no response was measured. Check the sensor and its cable.")
     if frf.coherence is not None and not np.any(frf.coherence):

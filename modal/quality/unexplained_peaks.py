@@ -1,18 +1,18 @@
 """Find measured peaks that the modes used for lobes do not explain."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
 from acquisition import Frf, stiffness_remark
 from modal.arrays import Flags, Floats
-from modal.bands.find_resonances import Resonance, find_resonances, mobility_noise
+from modal.bands.find_resonances import Resonance, check_line_count, find_resonances, mobility_noise
 from modal.bands.frf_lines import remove_drift, usable_lines
-from modal.modes.mode import Mode, synthesize_frf
+from modal.modes.mode import Mode, change_covariances, synthesize_frf
 
 LOWEST_FREQUENCY_SHARE, MIN_LOW_PEAK_LINES = 0.5, 4.0
 """Frequency over the lowest natural frequency below which the half-width of a peak must span these lines; chosen.
@@ -27,8 +27,15 @@ MIN_LIMITING_SHARE = 0.1
 
 A cut in the best pocket of one mode is up to ten times as deep as its lowest limit.
 """
+HIGHEST_TOOTH_FREQUENCY = 2000.0
+"""Highest tooth frequency of a cut (Hz); chosen: 60 000 rpm with two teeth.
+
+The fastest lobe of a mode has chatter at half the tooth frequency or above. Far above the mode its receptance is small.
+"""
+LOWEST_LIMIT_TOOTH_RATIO = 4 / 3
+"""Tooth frequency over the natural frequency at the lowest limit of the fastest lobe (phase of 3/4 turn)."""
 MIN_MOBILITY_SHARE = 0.01
-"""Mobility of a peak over the largest, below which it is not searched; chosen. It saves a quarter of the time."""
+"""Mobility of a peak over the largest in the band, below which it is not searched; chosen to save time."""
 MAX_UNEXPLAINED_SHARE = 0.15
 """Share of the most negative real part that the modes may miss; chosen.
 
@@ -37,7 +44,7 @@ The default scatter between tap tests changes it by 13 %.
 NOISE_QUANTILE = 2.0
 """Standard errors of the noise that a measured real part may be too low by."""
 STEP_SHARE = 1e-3
-"""Steps of the values of a mode for its slopes, relative to its half-width, damping ratio and stiffness; in degrees."""
+"""Steps of the values of a mode for its slopes, relative to its damping ratio and stiffness; in degrees."""
 MAX_PEAK_DAMPING = 0.3
 """Largest damping ratio of the mode that stands for a peak."""
 
@@ -57,7 +64,9 @@ class UnexplainedPeak(NamedTuple):
     """Real mode that explains the rest: with it the sum of the modes is as negative as the measured FRF."""
 
 
-def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[UnexplainedPeak, ...]:
+def find_unexplained_peaks(
+    frf: Frf, modes: Sequence[Mode], band: tuple[float, float] | None = None
+) -> tuple[UnexplainedPeak, ...]:
     """Find the measured peaks whose most negative real part the modes do not explain.
 
     The limiting depth of a cut is inversely proportional to the most negative real part of the receptance. Compared
@@ -71,6 +80,8 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
         Measured FRF.
     modes : sequence of Mode
         Modes used for lobes, with stiffness; may be empty.
+    band : tuple of float, optional
+        Band of the modes (Hz): peaks inside are compared with one another only. None for all lines.
 
     Returns
     -------
@@ -80,7 +91,7 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
     Raises
     ------
     ValueError
-        As `fit_modes`.
+        As `fit_modes`, also for fewer than 8 lines.
 
     References
     ----------
@@ -98,6 +109,7 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
     >>> round(-1e6 / (4 * 5e7 * 0.03 * 1.03), 3)  # most negative real part of the mode at 900 Hz
     -0.162
     """
+    check_line_count(usable_lines(frf, None))
     lines = replace(remove_drift(usable_lines(frf, None)), coherence=None)  # low where hits differ, too
     noise = mobility_noise(lines) / (2 * np.pi * lines.frequency)
     counted = noise < np.abs(lines.receptance)
@@ -106,25 +118,71 @@ def find_unexplained_peaks(frf: Frf, modes: Sequence[Mode]) -> tuple[Unexplained
     compared = _Comparison(
         lowest, lines.frequency, lines.receptance.real, noise, counted, model, _model_error(lines, modes)
     )
-    measured = [compared.measure(peak) for peak in find_resonances(lines, MIN_MOBILITY_SHARE, is_checked=True)]
-    deepest = min((depth for depth, _ in measured), default=0.0)
-    return tuple(peak for _, peak in measured if peak is not None and peak.measured < MIN_LIMITING_SHARE * deepest)
+    resonances = find_resonances(lines, MIN_MOBILITY_SHARE * _mobility_share(lines, band), is_checked=True)
+    measured = [(peak.frequency, *compared.measure(peak)) for peak in resonances]
+    found = list[UnexplainedPeak]()
+    for frequency, depth, peak in measured:
+        beside = [(f, other) for f, other, _ in measured if _is_inside(f, band) or not _is_inside(frequency, band)]
+        if peak is not None and depth < least_limiting_depth(frequency, beside, compared.real_at):
+            found.append(peak._replace(missing=_with_errors_of_nearest(peak.missing, modes)))
+    return tuple(found)
+
+
+def _is_inside(frequency: float, band: tuple[float, float] | None) -> bool:
+    return band is None or band[0] <= frequency <= band[1]
+
+
+def _mobility_share(lines: Frf, band: tuple[float, float] | None) -> float:
+    """Return the largest mobility in a band over that of all lines; 1 without lines in it."""
+    size = np.abs(lines.mobility)
+    inside = size[[_is_inside(f, band) for f in lines.frequency.tolist()]]
+    return float(np.max(inside) / np.max(size)) if inside.size and np.any(size) else 1.0
+
+
+def least_limiting_depth(
+    frequency: float, peaks: Sequence[tuple[float, float]], real_at: Callable[[float], float]
+) -> float:
+    """Return the real part (m/N) below which a peak may limit a cut.
+
+    A tenth of the deepest peak, or less if that peak is far below: in a fast cut it hardly limits. peaks: frequency
+    (Hz) and real part (m/N) of all; real_at: real part at a frequency.
+    """
+    tooth = min(LOWEST_LIMIT_TOOTH_RATIO * frequency, HIGHEST_TOOTH_FREQUENCY)
+    deepest = min((depth for _, depth in peaks), default=0.0)
+    above = min((depth for f, depth in peaks if f >= tooth / 2), default=0.0)
+    return max(MIN_LIMITING_SHARE * deepest, min(MIN_LIMITING_SHARE * above, real_at(tooth / 2)))
+
+
+def _with_errors_of_nearest(missing: Mode, modes: Sequence[Mode]) -> Mode:
+    """Return a mode with the relative errors of the nearest mode; unchanged without any."""
+    if not modes:
+        return missing
+    nearest = min(modes, key=lambda mode: abs(mode.frequency - missing.frequency))
+    scale = np.array(
+        [getattr(missing, name) / getattr(nearest, name) for name in ("frequency", "damping_ratio", "stiffness")]
+    )
+    taken = change_covariances(nearest, lambda covariance: covariance * np.outer(scale, scale))
+    names = ("covariance", "degrees_of_freedom", "jackknife", "n_hits", "scatter_freedom", "phase_deg_std")
+    errors: dict[str, Any] = {name: getattr(taken, name) for name in (*names, "phase_correlation")}
+    return replace(missing, **errors)
 
 
 def _model_error(lines: Frf, modes: Sequence[Mode]) -> Floats:
-    """Return the 95 % error of the real part of the sum of modes on each line (m/N), to first order."""
+    """Return the 95 % error of the real part of the sum of modes on each line (m/N), to first order.
+
+    That of the frequency is left out: it moves a peak within the half-width that is searched, and deepens none.
+    """
     squares = np.zeros(lines.frequency.size)
     for mode in modes:
         slopes = np.array(list(_slopes(mode, lines.frequency)))
-        covariance = np.nan_to_num(mode.joint_covariance)
+        covariance = np.nan_to_num(mode.joint_covariance)[1:, 1:]
         squares += mode.quantile() ** 2 * np.einsum("in,ij,jn->n", slopes, covariance, slopes)
     return np.sqrt(np.maximum(squares, 0.0))
 
 
 def _slopes(mode: Mode, frequency: Floats) -> Iterator[Floats]:
-    """Yield the slopes of the real part of a mode by frequency, damping ratio, stiffness and phase (degrees)."""
+    """Yield the slopes of the real part of a mode by damping ratio, stiffness and phase (degrees)."""
     sizes = {
-        "frequency": mode.damping_ratio * mode.frequency,
         "damping_ratio": mode.damping_ratio,
         "stiffness": mode.stiffness,
         "phase_deg": -1.0 if mode.phase_deg > 0 else 1.0,
@@ -153,6 +211,10 @@ class _Comparison:
     """Real part of the modes."""
     error: Floats
     """95 % error of that real part."""
+
+    def real_at(self, frequency: float) -> float:
+        """Return the measured real part (m/N) at a frequency (Hz)."""
+        return float(np.interp(frequency, self.frequency, self.measured))
 
     def measure(self, peak: Resonance) -> tuple[float, UnexplainedPeak | None]:
         """Return the most negative real part near a peak (m/N), 0 without one, and the peak if it is unexplained."""

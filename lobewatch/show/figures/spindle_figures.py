@@ -101,6 +101,7 @@ def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> N
     is_frf = all(mode.has_stiffness for mode in modes)
     accepted = select_credible_modes(modes)
     peaks = find_unexplained_peaks(state.frf, [*accepted.modes, *accepted.opposed]) if is_frf else ()
+    peaks = tuple(peak for peak in peaks if not peak.is_within_errors)
     mark_unexplained(axes, peaks, f, np.abs(state.frf.accelerance))
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))
     for mode, place in zip(modes, places, strict=True):

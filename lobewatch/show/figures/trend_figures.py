@@ -116,7 +116,7 @@ def plot_frf(
 ) -> Figure:
     """Plot amplitude and phase of the receptance and the coherence, of the newest and of the first test.
 
-    modes: accepted modes of the newest test, whose sum is drawn as the fit; unexplained: peaks that they do not
+    modes: modes of the newest test for lobes, whose sum is drawn as the fit; unexplained: peaks that they do not
     explain.
     """
     newest = now.in_band(band)
@@ -124,7 +124,7 @@ def plot_frf(
     figure, axes = new_axes(rows, (FIGURE_WIDTH, RESPONSE_HEIGHT * (rows + AMPLITUDE_RATIO - 1)), AMPLITUDE_RATIO)
     curves = [(newest, "measured" if first is None else "newest", Paint.NEWEST, "-")]
     curves += [] if first is None else [(first.in_band(band), "first", Paint.FIRST, "--")]
-    curves += [(synthesize_frf(modes, newest.frequency), "fit: accepted modes", Paint.ALARM, ":")] if modes else []
+    curves += [(synthesize_frf(modes, newest.frequency), "fit: modes for lobes", Paint.ALARM, ":")] if modes else []
     for frf, label, colour, dashes in curves:
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
         size = np.where(frf.receptance == 0, np.nan, np.abs(frf.receptance))

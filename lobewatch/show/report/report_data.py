@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from acquisition import Frf, Remark, TapTest, merge_remarks
+from acquisition import CROSS_TAP, Frf, Remark, TapTest, merge_remarks
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.program_learning import compute_lobes_at_speed
 from lobewatch.history import HistoryRow
@@ -17,6 +17,7 @@ from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import Machine
+from lobewatch.measurement import Measurement
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
@@ -28,7 +29,7 @@ from lobewatch.tool import Assembly, compute_lobes
 from lobewatch.tool.assembly import compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import compute_limit_band
 from lobewatch.verdicts.setting_robustness import model_softening
-from modal import Mode, UnexplainedPeak, select_credible_modes
+from modal import Mode, UnexplainedPeak
 
 MAX_LOBE_DIAGRAMS = 24
 """Largest number of tap tests with a lobe diagram."""
@@ -113,20 +114,27 @@ class ReportData:
         return measure_excluded_taps(self.analysis.folder, self.analysis.files.excluded, self.rows)
 
     @cached_property
-    def accepted_modes(self) -> Sequence[Mode]:
-        """Accepted modes of the newest tap test, of either sign for a cross FRF."""
-        measurement = self.analysis.measurement(self.last.tap_id)
-        if measurement.cross is not None:
-            return measurement.cross
-        low, high = self.machine.mode.band_hz or (0.0, math.inf)
-        modes = select_credible_modes([mode for mode in measurement.modes if low <= mode.frequency <= high]).modes
-        return modes if all(mode.has_stiffness for mode in modes) else ()
+    def measurement(self) -> Measurement:
+        """Measurement of the newest tap test."""
+        return self.analysis.measurement(self.last.tap_id)
+
+    @cached_property
+    def frfs(self) -> tuple[Frf | None, Frf | None]:
+        """FRFs of the first and of the newest tap test as fitted, or as stored if the fit failed; None without one."""
+        first = None if self.first is None else self.analysis.measurement(self.rows[0].tap_id).frf or self.first.frf
+        return first, self.measurement.frf or self.newest.frf
+
+    @property
+    def tap_place(self) -> str:
+        """Point of excitation and response, as text."""
+        distance = self.machine.tap.position_mm
+        return f"{distance:g} mm from the tool tip" if distance else "at the tool tip"
 
     @property
     def unexplained_peaks(self) -> Sequence[UnexplainedPeak]:
-        """Measured peaks that the modes used for lobes do not explain; none of a cross FRF."""
-        measurement = self.analysis.measurement(self.last.tap_id)
-        return () if measurement.cross is not None else measurement.unexplained
+        """Measured peaks that the used modes do not explain within their errors; none of a cross FRF."""
+        peaks = () if self.measurement.direction == CROSS_TAP else self.measurement.unexplained
+        return [peak for peak in peaks if not peak.is_within_errors]
 
     @cached_property
     def lobe_diagram(self) -> LobeDiagram | None:

@@ -206,13 +206,13 @@ def make_lobe_figure(data: ReportData) -> list[Section]:
 
 def make_frequency_response(data: ReportData, style: str) -> list[Section]:
     """Make the receptance of the newest test and of the first; nothing if no force was measured."""
-    first, newest = data.first, data.newest.frf
+    first, newest = data.frfs
     if newest is None:
         return []
     band = data.response_band(newest)
-    figure = plot_frf(None if first is None else first.frf, newest, band, data.accepted_modes, data.unexplained_peaks)
+    figure = plot_frf(first, newest, band, data.measurement.used, data.unexplained_peaks)
     drawing = Drawing.of(figure, NumberTable.from_response(newest.in_band(band)))
-    text = "Receptance at the tool tip. Fit: sum of accepted modes. Triangles: peaks that they do not explain."
+    text = f"Receptance {data.tap_place}. Fit: sum of the modes for lobes. Triangles: peaks that they do not explain."
     return [Section("Frequency response", [Paragraph(text, is_small=True), drawing], style)]
 
 

@@ -13,12 +13,12 @@ from acquisition import Circumstances, Frf, Remark, TapDirection, TapTest
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement import Measurement, measure
-from lobewatch.measurement.coverage import UNCOVERED_CODES, find_uncovered
+from lobewatch.measurement.coverage import UNCOVERED_CODES, describe_uncovered, find_uncovered
 from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.verdicts import Stability, advise
 from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import find_stable_pockets, recommend
-from lobewatch.verdicts.verdict import evaluate_program
+from lobewatch.verdicts.verdict import evaluate_program, find_open_question
 from modal import Mode, ModeEdits, synthesize_frf
 
 LINES = np.arange(1.0, 4000.0, 1.0)
@@ -120,8 +120,50 @@ def test_a_cross_tap_is_used_if_its_modes_cover_it_up_to_what_hardly_counts(
     cross = break_it(replace(tapped("xy"), cross=half))
     tool = assemble(tapped("y"), tapped("x"), {}, cross)
     assert (tool.cross is not None) is is_used
-    assert tool.uncovered == ()
+    assert [remark.about for remark in tool.uncovered if not remark.about.endswith("xy")] == []
+    assert [remark.code for remark in tool.remarks if remark.code.startswith("cross")] == ["cross-not-covered"] * (
+        not is_used
+    )
+    verdict = evaluate_program(PROGRAM, tool, machine())
+    assert verdict.stability is (Stability.STABLE if is_used else Stability.DOUBTFUL)
+    assert any(remark in verdict.remarks for remark in tool.uncovered) is not is_used
 
 
 def weak(tap: Measurement) -> tuple[object, ...]:
     return tuple(peak._replace(measured=peak.measured / 100) for peak in tap.unexplained)
+
+
+def test_a_deep_peak_outside_the_band_hides_none_inside() -> None:
+    about = Circumstances("m", datetime(2026, 1, 15, tzinfo=UTC), "T", "x")
+    frf = Frf(LINES, synthesize_frf([Mode(1100.0, 8e-4, 4e7), OTHER, Mode(2100.0, 0.02, 4e7)], LINES).receptance)
+    found = measure(
+        TapTest("x", about, frf), machine("[mode]", "band_hz = [1200, 2200]"), None, ModeEdits(drop=(2100.0,))
+    )
+    assert [round(peak.frequency, -2) for peak in found.unexplained] == [2100.0]
+    assert [remark.code for remark in found.uncovered] == ["peak-not-explained"]
+    assert [remark.about for remark in found.remarks if remark.code == "peak-outside-band"] == ["1100 Hz"]
+
+
+def test_the_used_modes_are_those_that_are_compared() -> None:
+    assert [round(mode.frequency) for mode in tapped().used] == [900, 1700]
+    aside = tapped(on=machine("[tap]", "position_mm = 20"))
+    assert [mode.frequency for mode in aside.used] == [aside.followed.frequency if aside.followed else 0.0]
+    assert [round(mode.frequency) for mode in tapped("xy").used] == [900, 1700]
+
+
+def test_all_reasons_and_all_remedies_are_named() -> None:
+    remarks = [
+        Remark("hits-drift", "900 Hz in y", "f1 falls", "Wait"),
+        Remark("hits-drift", "901 Hz in x", "f1 falls", "Wait"),
+        Remark("hits-two-states", "1700 Hz in x", "f1 jumps", "Clamp"),
+    ]
+    found, cure = describe_uncovered(remarks)
+    assert [found.index(word) for word in ("900 Hz in y", "901 Hz in x", "f1 falls", "1700 Hz in x")] == sorted(
+        found.index(word) for word in ("900 Hz in y", "901 Hz in x", "f1 falls", "1700 Hz in x")
+    )
+    assert cure == "Wait. Clamp"
+    tool = replace(assembled(), uncovered=tuple(remarks))
+    verdict = evaluate_program(PROGRAM, tool, machine())
+    (advice,) = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
+    assert (found in advice.text, advice.cure) == (True, cure)
+    assert find_open_question(PROGRAM, tool) == (found, cure)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from acquisition import Frf
 from modal import Mode, find_unexplained_peaks, synthesize_frf
-from modal.quality.unexplained_peaks import MAX_UNEXPLAINED_SHARE, MIN_LIMITING_SHARE
+from modal.quality.unexplained_peaks import HIGHEST_TOOTH_FREQUENCY, MAX_UNEXPLAINED_SHARE, MIN_LIMITING_SHARE
 
 pytestmark = pytest.mark.quick
 
@@ -106,3 +106,51 @@ def test_a_softer_machine_has_the_same_peaks(factor: float) -> None:
     (peak,) = find_unexplained_peaks(frf_of(STRONG, OTHER), [OTHER])
     (same,) = find_unexplained_peaks(frf_of(scaled(STRONG), scaled(OTHER)), [scaled(OTHER)])
     assert same[:3] == pytest.approx((peak.frequency, peak.measured / factor, peak.explained / factor), rel=1e-6)
+
+
+@pytest.mark.parametrize(("band", "found"), [(None, [1100.0]), ((1300.0, 2500.0), [1100.0, 1700.0])])
+def test_a_peak_in_the_band_is_compared_with_peaks_in_the_band(
+    band: tuple[float, float] | None, found: list[float]
+) -> None:
+    peaks = find_unexplained_peaks(frf_of(Mode(1100.0, 0.003, 8e6), OTHER), [], band)
+    assert [peak.frequency for peak in peaks] == pytest.approx(found, rel=0.03)
+
+
+def test_a_deep_peak_hides_no_peak_far_above_it() -> None:
+    deep, tip = Mode(30.0, 0.04, 1.2e6), Mode(1500.0, 0.02, 3.5e7)
+    assert least_real_part(tip) > MIN_LIMITING_SHARE * least_real_part(deep)
+    found = find_unexplained_peaks(frf_of(deep, tip), [deep])
+    assert [peak.frequency for peak in found] == pytest.approx([tip.frequency], rel=0.01)
+
+
+def test_far_above_a_deep_peak_its_flank_hides_what_limits_less() -> None:
+    deep = Mode(30.0, 0.04, 1.2e6)
+    flank = abs(deep.receptance(np.array([HIGHEST_TOOTH_FREQUENCY / 2])).real[0])
+    for share, is_found in ((0.5, False), (2.0, True)):
+        weak = Mode(1600.0, 0.02, 1 / (4 * 0.02 * 1.02 * share * flank))
+        assert bool(find_unexplained_peaks(frf_of(deep, weak), [deep])) is is_found
+
+
+@pytest.mark.parametrize("half_widths", [0.1, 0.3, 0.5])
+def test_an_uncertain_frequency_deepens_no_peak(half_widths: float) -> None:
+    used = replace(STRONG, stiffness=1.5 * STRONG.stiffness)
+    errors = np.array([half_widths * used.frequency * used.damping_ratio, 1e-4, 0.01 * used.stiffness])
+    (peak,) = find_unexplained_peaks(frf_of(STRONG), [replace(used, covariance=np.diag(errors**2))])
+    assert not peak.is_within_errors
+
+
+def test_the_missing_mode_has_the_relative_errors_of_the_nearest_mode() -> None:
+    errors = {STRONG: np.array([1.0, 2e-3, 1e6]), OTHER: np.array([2.0, 1e-3, 4e6])}
+    used = [replace(mode, covariance=np.diag(error**2), phase_deg_std=2.0) for mode, error in errors.items()]
+    (peak,) = find_unexplained_peaks(frf_of(*used, Mode(2400.0, 0.02, 3e7)), used)
+    missing = peak.missing
+    relative = missing.standard_error / [missing.frequency, missing.damping_ratio, missing.stiffness]
+    assert relative == pytest.approx([2 / 1700, 1e-3 / 0.03, 4e6 / 3e7])
+    assert missing.phase_deg_std == 2.0
+
+
+@pytest.mark.parametrize("count", [2, 7])
+def test_too_few_lines_are_an_error(count: int) -> None:
+    frf = frf_of(STRONG)
+    with pytest.raises(ValueError, match=f"^{count} lines"):
+        find_unexplained_peaks(Frf(frf.frequency[:count], frf.receptance[:count]), [])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, radial_lobes, stability_boundary
 from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
@@ -17,7 +18,8 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.figures.lobe_figures import BAND_LABEL, plot_radial_map, plot_waterfall
 from lobewatch.tool import DynamicsSource, LobeMethod, compute_lobe_chart, compute_lobes, speed_grid
 from lobewatch.verdicts.monte_carlo import compute_limit_band
-from modal import Mode
+from lobewatch.verdicts.verdict import find_open_question
+from modal import Mode, synthesize_frf
 from tests.lobewatch.commands.conftest import Run
 from tests.lobewatch.commands.lobes.conftest import START, edit, tap
 
@@ -217,3 +219,34 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
     axes = plot_radial_map(found, 0.02, 0.75).axes[0]
     assert axes.get_ylim() == pytest.approx((10.0, 20.0))
     assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(15.0)
+
+
+def test_the_chart_of_the_frf_is_that_of_the_fitted_frf(folder: MachineFolder) -> None:
+    lines, modes = np.arange(1.0, 4000.0), [Mode(1400.0, 0.02, 3e7), Mode(1800.0, 0.02, 6e7)]
+    exact = synthesize_frf(modes, lines).accelerance
+    for days, delay in enumerate([0.0, 1e-4]):
+        when = START + timedelta(days=days)
+        about = Circumstances("m", when, "reference", "x", "", folder.toml.read_text("utf-8"))
+        measured = exact * np.exp(-2j * np.pi * lines * delay)
+        folder.commit(TapTest(new_tap_id(about), about, from_accelerance(lines, measured)))
+    logbook = Logbook(folder)
+    measurement = logbook.measurement(logbook.assembly().taps["x"])
+    assert "response-delay-removed" in {remark.code for remark in measurement.remarks}
+    found = compare_lobes(logbook, None, "reference cut", DynamicsSource.FRF, LobeMethod.ZERO_ORDER)
+    assert found.then is not None
+    assert found.now.lobes.minimum.depth == pytest.approx(found.then.lobes.minimum.depth, rel=1e-3)
+    assert found.now.lobes.depth == pytest.approx(found.then.lobes.depth, rel=0.02)
+
+
+def test_missing_pockets_have_the_reason_and_remedy_of_the_recommendation(folder: MachineFolder) -> None:
+    tap(folder, 1541.7)
+    tap(folder, 1560.0, days=0.2, direction="y")
+    tap(folder, 1250.0, days=1)
+    logbook = Logbook(folder)
+    found = compare_lobes(logbook, None, "reference cut", DynamicsSource.MODES, LobeMethod.ZERO_ORDER)
+    assert found.now.assembly.directions == ("x", "y")
+    question = find_open_question(found.now.table, found.now.assembly)
+    assert question is not None
+    (remark,) = [remark for remark in found.remarks if remark.code == "no-safe-pocket"]
+    assert found.pockets == []
+    assert (question[0] in remark.text, remark.cure) == (True, question[1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from html import unescape
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import Frf
+from acquisition import Circumstances, Frf, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import app
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.show.report.page import GAUGE_WIDTH, make_gauge, render_page
@@ -22,6 +23,8 @@ from lobewatch.show.report.report import render_fleet, render_report, spark_poin
 from lobewatch.show.report.report_data import collect_report_data
 from lobewatch.show.report.sections import DATE_HEADS
 from lobewatch.show.terminal.option_names import with_option_names
+from modal import Mode, UnexplainedPeak, synthesize_frf
+from tests.lobewatch.conftest import START
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -226,3 +229,29 @@ def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
 def test_dashboard_and_report_show_the_same_status(shop: Shop, tmp_path: Path, seed: int) -> None:
     dashboard, *reports = lights(shop, tmp_path / "folder", seed)
     assert reports == [dashboard, dashboard]
+
+
+def test_the_response_is_the_fitted_frf_with_the_modes_for_lobes(shop: Shop) -> None:
+    """Test that curve and fit belong to one FRF, without delay, for the first and for the newest test."""
+    lines, modes = np.arange(1.0, 4000.0), [Mode(1400.0, 0.02, 3e7), Mode(1800.0, 0.02, 6e7)]
+    exact = synthesize_frf(modes, lines)
+    for days, delay in enumerate([0.0, 1e-4]):
+        when = START + timedelta(days=days)
+        about = Circumstances("m", when, "reference", "x", "", shop.folder.toml.read_text("utf-8"))
+        measured = exact.accelerance * np.exp(-2j * np.pi * lines * delay)
+        shop.folder.commit(TapTest(new_tap_id(about), about, from_accelerance(lines, measured)))
+    data = shop.logbook.query(collect_report_data, "reference", "x", None)
+    largest = np.max(np.abs(exact.receptance))
+    for frf in data.frfs:
+        assert np.max(np.abs(frf.receptance - synthesize_frf(modes, frf.frequency).receptance)) < 0.02 * largest
+        fit = synthesize_frf(data.measurement.used, frf.frequency).receptance
+        assert np.max(np.abs(frf.receptance - fit)) < 0.02 * largest
+
+
+@pytest.mark.parametrize(("is_within", "count"), [(True, 0), (False, 1)])
+def test_a_peak_within_the_errors_has_no_mark(shop: Shop, is_within: bool, count: int) -> None:
+    shop.tap(0, 1713.0)
+    data = shop.logbook.query(collect_report_data, "reference", "x", None)
+    peak = UnexplainedPeak(900.0, -2e-7, -1e-7, is_within, Mode(900.0, 0.02, 2e7))
+    data.__dict__["measurement"] = replace(data.measurement, unexplained=(peak,))
+    assert len(data.unexplained_peaks) == count

@@ -7,7 +7,6 @@ import numpy as np
 from modal.arrays import Complexes, Flags, Floats
 from modal.bands.extraction import Extraction, FittedBand
 from modal.fitting.band_fit import residual_powers, split_complex
-from modal.modes.mode import Mode
 
 FREE_HALF_WIDTHS = 1.0
 """Half-power half-widths from the outermost mode from which lines show the tail of a mode beyond; chosen."""
@@ -58,8 +57,8 @@ def _fit_tail(f: Floats, left: Complexes, weight: Floats, use: Flags, beyond: Fl
     """Return the tail on all lines of the mode that fits best to what is left on some lines."""
     lines = np.flatnonzero(use)
     lines = lines[:: -(-lines.size // MAX_TAIL_LINES)]
-    candidates = [Mode(float(fn), zeta, 1.0) for fn in beyond for zeta in TAIL_DAMPING_RATIOS]
-    columns = np.array([mode.receptance(f[lines]) for mode in candidates]) * weight[lines]
+    fn, zeta = (grid.reshape(-1, 1) for grid in np.meshgrid(beyond, TAIL_DAMPING_RATIOS, indexing="ij"))
+    columns = _unit_tails(f[lines] / fn, zeta) * weight[lines]
     terms, _ = np.linalg.qr((residual_powers(f[lines], TAIL_RESIDUAL_TERMS) * weight[lines]).T)
     columns, values = (rows - (rows @ terms) @ terms.T for rows in (columns, left[lines] * weight[lines]))
     size = np.sum(np.abs(columns) ** 2, axis=1)
@@ -68,4 +67,9 @@ def _fit_tail(f: Floats, left: Complexes, weight: Floats, use: Flags, beyond: Fl
     best = int(np.argmax(gains))
     remaining = (np.sum(np.abs(values) ** 2) - gains[best]) / (lines.size - TAIL_RESIDUAL_TERMS - 1)
     is_seen = gains[best] > MIN_TAIL_GAIN * remaining
-    return np.asarray(is_seen * along[best] / size[best] * candidates[best].receptance(f))
+    return np.asarray(is_seen * along[best] / size[best] * _unit_tails(f / fn[best], zeta[best]))
+
+
+def _unit_tails(ratio: Floats, zeta: Floats) -> Complexes:
+    """Return the receptances of modes with K of 1 N/m at frequencies relative to fn."""
+    return np.asarray(1 / (1 - ratio**2 + 2j * zeta * ratio))

@@ -332,7 +332,8 @@ class MachineFolder:
         path = self.path / "taps" / f"{tap.id}.h5"
         make_folder(path.parent)
         content = write_tap(path, tap)
-        entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
+        entry = TapEntry.of(tap, content)
+        entry = msgspec.structs.replace(entry, asked=(*entry.asked, *asked))
         known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
         counting = {decision.hit for decision in tap.decisions}
         changes = [HitDecision(decision.hit, "undo") for decision in known if decision.hit not in counting]

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Circumstances, DataError, DeviceIdentity, Frf, Hit, Remark
+from acquisition import Circumstances, DataError, DeviceIdentity, Frf, Remark
 from acquisition.files.tap_file import read_circumstances
 from dsm import format_rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
+from lobewatch.machine.journal.tap_entry import ONE_HIT_CODE
 from lobewatch.measurement import clock_questions as clock
 from modal import Mode
 
@@ -78,7 +79,7 @@ WRONG_QUANTITY = RecordingQuestion("wrong-quantity")
 WRONG_UNIT = RecordingQuestion("wrong-unit")
 """Asked if the modes show a wrong unit or sensitivity."""
 ONE_HIT = RecordingQuestion(
-    "one-hit", sentence="only one hit was averaged, so nothing shows that it repeats: is the clamping firm?"
+    ONE_HIT_CODE, sentence="only one hit was averaged, so nothing shows that it repeats: is the clamping firm?"
 )
 """Asked of a tap test of a single hit."""
 EMULATED_DEVICE = RecordingQuestion(
@@ -94,9 +95,9 @@ MODE_QUESTIONS = (
     STIFFNESS_OFF_MODEL,
     WRONG_QUANTITY,
     WRONG_UNIT,
-    ONE_HIT,
 )
-RECORDING_QUESTIONS = (*(question.code for question in MODE_QUESTIONS), *clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code)
+RECORDING_QUESTIONS = tuple(question.code for question in MODE_QUESTIONS)
+RECORDING_QUESTIONS += (*clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code, ONE_HIT.code)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
 
@@ -149,11 +150,6 @@ def check_quantity(modes: Iterable[Mode]) -> Remark | None:
     return next((replace(remark, about="") for remark in asked), None)
 
 
-def check_hit_count(hits: Sequence[Hit]) -> Remark | None:
-    """Return the question about a tap test with a single averaged hit, or None; hits: those averaged."""
-    return ONE_HIT.ask() if len(hits) == 1 else None
-
-
 def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:
     """Return the question about a recording that does not cover [mode] band_hz, or None."""
     if machine.mode.band_hz is None:
@@ -174,7 +170,8 @@ def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...
 
 
 def _question_at_commit(code: str, tap: TapEntry) -> Remark:
-    return EMULATED_DEVICE.ask() if code == EMULATED_DEVICE.code else clock.clock_question(code, tap.time)
+    asked = {question.code: question.ask() for question in (EMULATED_DEVICE, ONE_HIT)}
+    return asked[code] if code in asked else clock.clock_question(code, tap.time)
 
 
 def find_open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:

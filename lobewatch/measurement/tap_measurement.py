@@ -116,8 +116,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
     about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
-    asked = filter(None, [band, questions.check_hit_count(tap.accepted)])
-    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *asked)
+    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:

@@ -17,6 +17,8 @@ NO_MODE_EDITS = ModeEdits()
 """No mode edits."""
 FIELDS_OF_OTHER_LINES = ("accepted", "excluded", "by_hand", "hit_decisions")
 """Fields of a tap test that come from other journal lines."""
+ONE_HIT_CODE = "one-hit"
+"""Code of the question about a tap test of a single hit, asked when the test is stored."""
 TAP_LINE_PREFIX = b'{"kind": "tap", '
 """Beginning of the line of a tap test."""
 
@@ -87,7 +89,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
-        known = about.conditions, (), about.operator
+        asked = (ONE_HIT_CODE,) if len(tap.accepted) == 1 else ()
+        known = about.conditions, asked, about.operator
         return cls(tap.id, digest, len(content), *labels, source, *known, hit_decisions=tap.decisions)
 
     @classmethod

@@ -23,7 +23,6 @@ from modal import (
     assess_trust,
     candidate_frequencies,
     find_unexplained_peaks,
-    select_credible_modes,
     stabilisation_charts,
 )
 
@@ -99,8 +98,8 @@ def _draw_accelerance(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> N
         axes.semilogy(part, np.abs(left) * size, color=Paint.ALARM, lw=0.6, label=labels[1])
         labels = "", ""
     is_frf = all(mode.has_stiffness for mode in modes)
-    accepted = select_credible_modes(modes)
-    peaks = find_unexplained_peaks(state.frf, [*accepted.modes, *accepted.opposed]) if is_frf else ()
+    accepted = [mode for mode in modes if assess_trust(mode) is not Trust.REJECTED]
+    peaks = find_unexplained_peaks(state.frf, accepted) if is_frf else ()
     peaks = tuple(peak for peak in peaks if not peak.is_within_errors)
     mark_unexplained(axes, peaks, f, np.abs(state.frf.accelerance))
     places = _spread_labels([mode.frequency for mode in modes], MIN_LABEL_SPACING * (f[-1] - f[0]))

@@ -241,7 +241,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
             "": "The response in its loudest tenth is {ratio:.2g} times its noise (limit {noise_ratio:g})",
             "constant": "The response is constant",
         },
-        {"noise_ratio": 1.5},
+        {"noise_ratio": 1.15},
     ),
     HitFlags.SURPLUS: HitFault("surplus", "Enough other hits agree better with each other."),
 }
@@ -249,7 +249,7 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
 
 The limits are chosen. A peak below 2 % of the force range shows the steps of the converter. Above 90 % the sensor may
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
-noise. The loudest tenth of mere noise is below 1.5 times its rms before the hit. A hit 30 % away from the mean would
+noise. The loudest tenth of mere noise is below 1.15 times its rms before the hit. A hit 30 % away from the mean would
 move a mean of ten hits by 3 %. Its distance must also be 4 times what the scatter of the hits would give. A pulse whose
 first 10 % of the peak are missing has lost 1 % of its impulse.
 """

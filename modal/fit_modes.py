@@ -113,7 +113,8 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     state = merge_scattered_pairs(state, pairs)
     modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
     rising = sorted(modes, key=lambda mode: mode.frequency)
-    return add_quantity_remarks(state.frf, add_smoothing_remarks(state, add_phase_remarks(rising)))
+    checked = add_smoothing_remarks(state, add_phase_remarks(rising), has_hits=any(hits))
+    return add_quantity_remarks(state.frf, checked)
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:

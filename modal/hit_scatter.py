@@ -1,6 +1,7 @@
 """Estimate errors of modes from single hits: hammer noise, jackknife, linearity check."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -115,7 +116,12 @@ def jackknife_covariance(
 
 def hit_peaks(hits: Sequence[Hit]) -> Floats:
     """Return the largest force of each hit (N), shape (n,)."""
-    return np.array([np.max(hit.force) - np.median(hit.force) for hit in hits])
+    return np.array([_hit_peak(hit) for hit in hits])
+
+
+@lru_cache(maxsize=64)
+def _hit_peak(hit: Hit) -> float:
+    return float(np.max(hit.force) - np.median(hit.force))
 
 
 def single_hit_factors(power: Floats) -> Floats:

@@ -188,13 +188,17 @@ def _add_phase_remark(mode: Mode, expected: float) -> Mode:
     return add_remark(mode, "complex-mode", text, cure)
 
 
-def add_smoothing_remarks(state: Extraction, modes: Sequence[Mode]) -> list[Mode]:
-    """Add a remark to narrow modes if the lines were smoothed, and an error of zeta under a Hann window."""
+def add_smoothing_remarks(state: Extraction, modes: Sequence[Mode], *, has_hits: bool = False) -> list[Mode]:
+    """Add a remark to narrow modes if the lines were smoothed, and an error of zeta under a Hann window.
+
+    has_hits: the FRF was averaged from hits, which no window has changed.
+    """
     frf, step = state.frf, float(np.mean(np.diff(state.frf.frequency)))
     lines = [mode.damping_ratio * mode.frequency / step for mode in modes]
     if min(lines, default=np.inf) >= MIN_SMOOTHED_HALF_WIDTH_LINES:
         return [*modes]
-    has_window = has_hann_shape(frf, [resonance for band in state.bands for resonance in band.resonances])
+    resonances = [resonance for band in state.bands for resonance in band.resonances]
+    has_window = not has_hits and has_hann_shape(frf, resonances)
     if not has_window and not is_smoothed(frf):
         return [*modes]
     cause = "a record under a Hann window" if has_window else "a smoothed FRF"

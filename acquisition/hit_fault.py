@@ -89,7 +89,7 @@ class HitFlags(enum.Flag):
         Raises
         ------
         ValueError
-            Where a code names no flag.
+            If a code names no flag.
         """
         by_code, flags = {code: flag for flag in cls for code in flag.codes}, cls.OK
         for code in codes:

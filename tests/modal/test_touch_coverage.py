@@ -17,7 +17,7 @@ N_HITS = 10
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What the force of a hit has besides its main pulse."""
+    """Disturbances of the force of a hit besides its main pulse."""
 
     touches: int = 1
     """Number of further touches of 1 to 30 % of the main pulse, 0.5 to 20 ms after it."""

@@ -123,7 +123,7 @@ def resolve_recording(path: Path, title: str, contents: Contents, description: D
 
 
 class _Resolved(NamedTuple):
-    """What contents are found to hold."""
+    """FRF or hits found in the contents of a file."""
 
     signals: Sequence[Signal]
     """Signals with the roles and units of the description."""

@@ -93,7 +93,7 @@ def test_behind_a_high_pass_the_force_is_that_before_it(corner: float) -> None:
 
 
 def test_without_touches_noise_outside_the_window_is_out() -> None:
-    """Of 0.5 N rms, the window of one pulse width on either side and two tapers has 3 + 2 * 3/8 widths."""
+    """Noise of 0.5 N rms: the window of one pulse width on either side and two tapers has 3 + 2 * 3/8 widths."""
     clean, random = touched(25600.0, 0.7e-3, []), np.random.default_rng(3)
     powers = []
     for _ in range(300):
@@ -111,7 +111,7 @@ def test_zeros_behind_a_recorder_s_own_window_make_no_touches() -> None:
 
 
 def test_noise_of_two_impulses() -> None:
-    """Of impulses A and B samples apart: both windows count, over |A + B exp(-2 pi j f t)|^2.
+    """Two impulses A and B samples apart: both windows count, over |A + B exp(-2 pi j f t)|^2.
 
     The window of A has squares that add up to 23: 18 samples of weight 1, 7 on either side of cos^2(pi k / 16).
     That of B has 7 samples more, because B was found in averages of 8 samples.

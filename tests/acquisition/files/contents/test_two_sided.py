@@ -1,4 +1,4 @@
-"""Of a two-sided FRF only the lower half is used."""
+"""The lower half of a two-sided FRF is used, the mirror image is not."""
 
 from __future__ import annotations
 

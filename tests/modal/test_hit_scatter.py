@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -13,6 +14,7 @@ from acquisition import Frf, Hit, Structure, estimate_frf, from_accelerance
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tap.emulated_spindle import EMULATED_SAMPLE_RATE, build_structure
 from modal import Mode, extract_modes, fit_common_modes, fit_modes, synthesize_frf
+from modal.hit_scatter import jackknife_covariance, leave_one_out_frfs
 
 STRONG, WEAK = Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)
 RECORD, PRE_TRIGGER = 6400, 512
@@ -112,6 +114,21 @@ def test_jackknife_is_that_of_refitted_frfs() -> None:
     refitted = np.sqrt(0.9 * np.sum(spread**2, axis=0))
     assert mode.standard_error[1:] == pytest.approx(refitted[1:], rel=0.1)
     assert refitted[0] < mode.standard_error[0] < 2 * refitted[0]
+
+
+@pytest.mark.parametrize(("hard", "gain"), [(1.0, 10.0), (2.0, 15.625)])
+def test_noise_of_a_single_hit_is_above_that_of_the_mean_by_the_powers(hard: float, gain: float) -> None:
+    """Ten equal hits: 10. Five of power 1 and five of power 4: 25 for the mean, 0.625 for the inverse."""
+    softest = tap(1)[0]
+    force = softest.force - np.median(softest.force)
+    scale = [1.0, hard] * 5
+    hits = [
+        replace(softest, force=force * size, acceleration=softest.acceleration * size, codes=None) for size in scale
+    ]
+    frf = estimate_frf(hits)
+    state = extract_modes([frf])
+    found = jackknife_covariance(state, state.bands[0], 0, hits, leave_one_out_frfs(hits, frf))
+    assert found.noise_gain == pytest.approx(gain, rel=1e-9)
 
 
 @pytest.mark.parametrize("n_hits", [0, 1, 2])

@@ -65,3 +65,14 @@ def test_modes_under_a_window_are_doubtful_and_their_zeta_is_covered(noise: floa
     for true in SLENDER:
         near = [mode for mode in modes if abs(mode.frequency - true.frequency) < 1]
         assert all(low <= true.damping_ratio <= high for low, high in (mode.interval()[1] for mode in near))
+
+
+@pytest.mark.parametrize("half_width", [4.0, 8.0])
+def test_error_of_zeta_under_a_window_is_its_own_size(half_width: float) -> None:
+    """The convolution with the window adds 0.65 / half_width^2 to zeta, half_width in lines."""
+    f, step = 400.0, 1 / RECORD
+    modes = (Mode(f, half_width * step / f, 3e7), Mode(600.0, half_width * step / 600, 1e8))
+    found = min(fit_modes(measured(RECORD / 2, 1e-5, modes=modes)), key=lambda mode: abs(mode.frequency - f))
+    excess = found.damping_ratio / modes[0].damping_ratio - 1
+    assert excess == pytest.approx(0.65 / half_width**2, rel=0.3)
+    assert float(found.standard_error[1]) / found.damping_ratio == pytest.approx(excess, rel=0.6)

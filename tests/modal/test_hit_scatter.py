@@ -120,11 +120,8 @@ def test_jackknife_is_that_of_refitted_frfs() -> None:
 def test_noise_of_a_single_hit_is_above_that_of_the_mean_by_the_powers(hard: float, gain: float) -> None:
     """Ten equal hits: 10. Five of power 1 and five of power 4: 25 for the mean, 0.625 for the inverse."""
     softest = tap(1)[0]
-    force = softest.force - np.median(softest.force)
-    scale = [1.0, hard] * 5
-    hits = [
-        replace(softest, force=force * size, acceleration=softest.acceleration * size, codes=None) for size in scale
-    ]
+    plain = replace(softest, force=softest.force - np.median(softest.force), codes=None)
+    hits = [replace(plain, force=plain.force * k, acceleration=plain.acceleration * k) for k in [1.0, hard] * 5]
     frf = estimate_frf(hits)
     state = extract_modes([frf])
     found = jackknife_covariance(state, state.bands[0], 0, hits, leave_one_out_frfs(hits, frf))

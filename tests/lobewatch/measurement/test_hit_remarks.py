@@ -52,6 +52,21 @@ def test_each_change_has_its_code_its_mode_and_a_remedy(code: str) -> None:
     assert remark.cure
 
 
+@pytest.mark.parametrize(
+    ("code", "figures"),
+    [
+        ("hits-drift", ("falls", "0.1 %", "1.2 %", "10 hits")),
+        ("hits-two-states", ("1.2 %", "5 of 10 hits")),
+        ("hits-follow-force", ("falls", "1.1 %")),
+    ],
+)
+def test_the_size_of_a_change_is_in_the_text(code: str, figures: Sequence[str]) -> None:
+    """A change of one damping ratio, 1.2 %, and a ninth of it from hit to hit."""
+    (remark,) = find_hit_remarks(tap(SHARES[code]))
+    assert remark.code == code
+    assert all(figure in remark.text for figure in figures)
+
+
 def test_a_mode_in_some_hits_and_undisturbed_hits() -> None:
     some = tap_structure([LOOSE if number % 3 else SPINDLE for number in range(10)], seed=5)
     assert codes(some) == ["mode-in-some-hits"]

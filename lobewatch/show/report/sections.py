@@ -212,7 +212,7 @@ def make_frequency_response(data: ReportData, style: str) -> list[Section]:
     band = data.response_band(newest)
     figure = plot_frf(first, newest, band, data.measurement.used, data.unexplained_peaks)
     drawing = Drawing.of(figure, NumberTable.from_response(newest.in_band(band)))
-    text = f"Receptance {data.tap_place}. Fit: sum of the modes for lobes. A triangle marks a peak that they do not explain."
+    text = f"Receptance {data.tap_place}. Fit: sum of the modes for lobes. Triangle: a peak that they do not explain."
     return [Section("Frequency response", [Paragraph(text, is_small=True), drawing], style)]
 
 

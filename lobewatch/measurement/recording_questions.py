@@ -95,6 +95,13 @@ STIFFNESS_OFF_MODEL = RecordingQuestion(
 """Limit: ratio of K of the first test of a series to that of the model, or the inverse.
 
 A real spindle is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
+TOOL_COMPLIANCE = RecordingQuestion(
+    "tool-compliance",
+    3.0,
+    "static stiffness {measured} N/um at the tip is {agreement} for its tool, which alone has {alone} N/um: "
+    "wrong sensitivity, gain or [[tool]]?",
+)
+"""Limit: ratio of the compliance at the tip to the largest plausible one; a stiffer tip than its tool is asked, too."""
 WRONG_QUANTITY = RecordingQuestion("wrong-quantity")
 """Asked if the modes show another quantity than stated."""
 WRONG_UNIT = RecordingQuestion("wrong-unit")
@@ -116,6 +123,7 @@ MODE_QUESTIONS = (
     STIFFNESS_OFF_MODEL,
     DIRECTION_STIFFNESS,
     SAME_DIRECTION,
+    TOOL_COMPLIANCE,
     WRONG_QUANTITY,
     WRONG_UNIT,
 )

@@ -21,6 +21,7 @@ from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference, check_same_direction, check_series
+from lobewatch.measurement.tool_compliance import check_tool_compliance
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
@@ -185,6 +186,9 @@ def interpret_fit(
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
         is_at_tip = machine.tap.position_mm == 0
+        if at_tip and is_at_tip and fit.frf is not None:
+            highest = float(fit.frf.frequency[-1])
+            remarks += filter(None, [check_tool_compliance(modes, machine, fit.tool, highest)])
         used = trusted.modes if is_at_tip or followed is None else (followed,)
         unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
         at_tip += [peak.missing for peak in unexplained if is_at_tip]

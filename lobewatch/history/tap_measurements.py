@@ -10,25 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
-import numpy as np
-
 from acquisition import CROSS_TAP, DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
+from lobewatch.history.series_reference import find_reference, find_series_questions
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
-from lobewatch.measurement.series_questions import (
-    MAX_DAY,
-    NEW_LEVEL_CODES,
-    EarlierTest,
-    SeriesReference,
-    check_same_direction,
-    check_series,
-)
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.tool.assembly import MAX_DIRECTION_AGE, Assembly, assemble, predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, TapOrder, TapPlace, iterate_earlier
@@ -74,10 +65,9 @@ class UsableTaps:
 
     def refuse_excluded(self, tap_id: str) -> None:
         """Raise DataError for an excluded tap test."""
-        for tap in self.excluded:
-            if tap.id == tap_id:
-                cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use the test again."
-                raise DataError(f"{tap_id}: tap test stored already, but excluded ({tap.excluded!r}). {cure}")
+        for tap in [tap for tap in self.excluded if tap.id == tap_id]:
+            cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use the test again."
+            raise DataError(f"{tap_id}: tap test stored already, but excluded ({tap.excluded!r}). {cure}")
 
     def list_until(self, tap_id: str | None) -> list[TapPlace]:
         """Return the tap tests up to one of them since its baseline; None: up to now."""
@@ -210,37 +200,6 @@ def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
     return ground_of_row == (tap.id, place.baseline, place.series, *by_person)
 
 
-def find_reference(place: TapPlace, among: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> SeriesReference:
-    """Return the earlier tests of the series of a tap test, those in question not included."""
-    own = [rows[number] for number in iterate_earlier(place, among)]
-    if place.other_direction is None:
-        return SeriesReference(_to_earlier_tests(own))
-    other = among[place.other_direction]
-    across, newest = [rows[number] for number in iterate_earlier(other, among)], rows[other.number]
-    same_day = place.entry.created - other.entry.created <= MAX_DAY
-    frequencies = tuple(mode[0] for mode in newest.modes) if same_day else ()
-    return SeriesReference(_to_earlier_tests(own), _to_earlier_tests([newest, *across]), frequencies)
-
-
-def _to_earlier_tests(rows: Sequence[HistoryRow]) -> tuple[EarlierTest, ...]:
-    """Return the tests of rows, newest first, in order of time."""
-    known = [row for row in reversed(rows) if row.frequency.is_known and not row.questions]
-    return tuple(
-        EarlierTest(row.time, row.frequency.value, row.stiffness.value, not NEW_LEVEL_CODES.isdisjoint(row.accepted))
-        for row in known
-    )
-
-
-def _find_asked(row: HistoryRow, reference: SeriesReference) -> tuple[Remark, ...]:
-    """Return the questions that the followed mode of a row raises in its series."""
-    if row.mode is None:
-        return ()
-    errors = [value.std for value in (row.frequency, row.damping_ratio, row.stiffness)]
-    mode = replace(row.mode, covariance=np.diag(np.square(errors)))
-    same = check_same_direction(mode, [mode], reference)
-    return (*check_series(mode, reference), *(() if same is None else (same,)))
-
-
 _RowBasis = tuple[str, str, ModeValues | None, tuple[Remark, ...], tuple[FollowedMode, ...]]
 """Inputs of a result besides its own file: tap test of the other direction and cross FRF (empty without one), followed
 mode before it, remarks on its mounting and in its series, and modes that shift an older direction."""
@@ -254,11 +213,10 @@ class _RowArchive:
         self._followed = FollowedModeIndex()
 
     def basis_of(self, place: TapPlace, row: HistoryRow) -> _RowBasis:
-        """Return the inputs of a row at a place."""
         before = (self.rows[number] for number in iterate_earlier(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
-        remarks = (*place.remarks, *_find_asked(row, find_reference(place, self.places, self.rows)))
+        remarks = (*place.remarks, *find_series_questions(row, find_reference(place, self.places, self.rows)))
         if place.other_direction is None:
             return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry
@@ -344,13 +302,14 @@ class TapMeasurements:
             before = (rows[number] for number in iterate_earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             fit, machine = self._fits.get(place.entry.id), self._folder.machine
-            reference = find_reference(place, self._places, rows)
+            reference, by_hand = find_reference(place, self._places, rows), place.entry.by_hand
             if fit is None:
-                measurement = measure(self._folder.read(place.entry), machine, last, place.entry.by_hand, reference)
+                measurement = measure(self._folder.read(place.entry), machine, last, by_hand, reference)
             else:
                 measurement = interpret_fit(fit, machine, last, reference)
-            remarks = mark_accepted((*measurement.remarks, *place.remarks), place.entry)
-            measurement = replace(measurement, remarks=remarks)
+            measurement = replace(
+                measurement, remarks=mark_accepted((*measurement.remarks, *place.remarks), place.entry)
+            )
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > MAX_MEASUREMENTS_IN_MEMORY:
             del self._measurements[next(iter(self._measurements))]

@@ -79,7 +79,8 @@ def ask_all(sessions: list[Session], error: float) -> list[list[str]]:
     tests: dict[str, list[EarlierTest]] = {"x": [], "y": []}
     asked = []
     for number, session in enumerate(sessions):
-        codes, day = [], ()
+        codes: list[str] = []
+        day: tuple[float, ...] = ()
         for direction, across, values in (("x", "y", session.x), ("y", "x", session.y)):
             f, k = values
             std = np.diag([error * f, 1e-4, 3e-3 * k])

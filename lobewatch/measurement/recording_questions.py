@@ -58,8 +58,8 @@ NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
 STIFFNESS_JUMP = RecordingQuestion(
     "stiffness-jump",
     0.12,
-    "stiffness K {now} N/um is {ratio:.3g} times the {expected} N/um that {count} earlier tests lead to expect at this "
-    "frequency (limit {limit:.0f} %): gain, range, sensitivity, hit point or tool changed?",
+    "stiffness K {now} N/um is {ratio:.3g} times the {expected} N/um expected from {count} earlier test{s} "
+    "(limit {limit:.0f} %): gain, range, sensitivity, hit point or tool changed?",
 )
 """Limit: smallest relative difference from the expected stiffness that is asked about (`series_questions`); chosen.
 
@@ -67,7 +67,7 @@ A larger scatter of the series raises it."""
 FREQUENCY_RISE = RecordingQuestion(
     "frequency-jump",
     0.05,
-    "frequency {now:.1f} Hz is {percent:.0f} % above the median of the last {count} tests ({before:.1f} Hz): "
+    "frequency {now:.1f} Hz is {percent:.0f} % above the {before:.1f} Hz of the last {count} test{s}: "
     "which tool is in the spindle?",
 )
 """Limit: smallest relative rise that is asked about; chosen: warmth raises by up to 3 %, wear never."""

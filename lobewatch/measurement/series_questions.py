@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -85,7 +86,12 @@ class SeriesReference:
     @property
     def level(self) -> tuple[EarlierTest, ...]:
         """Tests of the same direction since the newest accepted jump, which is included."""
-        return _newest_level(self.own)
+        return _split_levels(self.own)[-1]
+
+    @property
+    def levels(self) -> list[tuple[EarlierTest, ...]]:
+        """Tests of each level of both directions."""
+        return _split_levels(self.own) + _split_levels(self.across)
 
 
 NO_REFERENCE = SeriesReference()
@@ -128,13 +134,13 @@ def _check_rise(now: Mode, reference: SeriesReference) -> Remark | None:
     recent = np.array([test.frequency for test in reference.level[-N_RECENT_TESTS:]])
     if not recent.size:
         return None
-    std = _robust_std([[test.frequency for test in side] for side in (reference.own, reference.across)], FREQUENCY_STD)
+    std = _robust_std([[test.frequency for test in level] for level in reference.levels], FREQUENCY_STD)
     limit = max(math.log1p(FREQUENCY_RISE.limit), N_STD_ASKED * std * math.sqrt(1 + math.pi / 2 / recent.size))
     before = float(np.median(recent))
     if math.log(now.frequency / before) <= limit:
         return None
     percent, count = 100 * (now.frequency / before - 1), recent.size
-    asked = {"now": now.frequency, "percent": percent, "before": before, "count": count}
+    asked = {"now": now.frequency, "percent": percent, "before": before, "count": count, "s": "s" * (count > 1)}
     return FREQUENCY_RISE.ask(f"{now.frequency:.0f} Hz", **asked)
 
 
@@ -144,9 +150,9 @@ def _check_level_stiffness(now: Mode, reference: SeriesReference) -> Remark | No
     if expected is None or not expected.is_beyond(now.stiffness):
         return None
     here, there = (format_rounded(value, scale=1e6, digits=3) for value in (now.stiffness, expected.value))
-    asked = {"now": here, "expected": there, "ratio": now.stiffness / expected.value}
-    asked |= {"count": len(reference.level), "limit": 100 * math.expm1(expected.limit)}
-    return STIFFNESS_JUMP.ask(f"{now.frequency:.0f} Hz", **asked)
+    count, limit = len(reference.level), 100 * math.expm1(expected.limit)
+    asked = {"now": here, "expected": there, "ratio": now.stiffness / expected.value, "s": "s" * (count > 1)}
+    return STIFFNESS_JUMP.ask(f"{now.frequency:.0f} Hz", count=count, limit=limit, **asked)
 
 
 def expect_stiffness(reference: SeriesReference, frequency: float) -> ExpectedValue | None:
@@ -171,7 +177,7 @@ def expect_stiffness(reference: SeriesReference, frequency: float) -> ExpectedVa
     if not tests:
         return None
     at, mass = np.log([test.frequency for test in tests]), _log_masses(tests)
-    std = _robust_std([np.exp(_log_masses(side)) for side in (reference.own, reference.across)], STIFFNESS_STD)
+    std = _robust_std([np.exp(_log_masses(level)) for level in reference.levels], STIFFNESS_STD)
     distance, new_distance = at - np.median(at), math.log(frequency) - float(np.median(at))
     weight = float(distance @ distance) + (std / STIFFNESS_EXPONENT_STD) ** 2
     slope = float(distance @ (mass - np.median(mass))) / weight
@@ -202,7 +208,7 @@ def _robust_std(series: Sequence[Sequence[float] | Floats], prior: float) -> flo
 
 def _check_other_direction(now: Mode, reference: SeriesReference) -> Remark | None:
     """Return the question about the first stiffness of a direction that is far from that of the other, or None."""
-    level = [test for test in _newest_level(reference.across) if math.isfinite(test.stiffness)]
+    level = [test for test in _split_levels(reference.across)[-1] if math.isfinite(test.stiffness)]
     if not level:
         return None
     frequency, stiffness = (float(np.median(values)) for values in np.transpose([test[1:3] for test in level]))
@@ -214,9 +220,10 @@ def _check_other_direction(now: Mode, reference: SeriesReference) -> Remark | No
     return DIRECTION_STIFFNESS.ask(f"{now.frequency:.0f} Hz", now=here, ratio=ratio, other=there)
 
 
-def _newest_level(tests: Sequence[EarlierTest]) -> tuple[EarlierTest, ...]:
-    first = next((i for i in reversed(range(len(tests))) if tests[i].is_new_level), 0)
-    return tuple(tests[first:])
+def _split_levels(tests: Sequence[EarlierTest]) -> list[tuple[EarlierTest, ...]]:
+    """Split tests at each accepted jump; one empty level without tests."""
+    firsts = [0, *(i for i, test in enumerate(tests) if i and test.is_new_level), len(tests)]
+    return [tuple(tests[first:last]) for first, last in pairwise(firsts)]
 
 
 def check_same_direction(now: Mode, modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:

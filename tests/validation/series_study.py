@@ -58,7 +58,7 @@ class Machine:
         self.exponent = rng.uniform(0.1, 3.8)
         operators = rng.standard_normal(3)
         self.operators = 0.5 * self.stiffness_std * operators
-        self.error = 10 ** rng.uniform(-5, -4)
+        self.error = rng.uniform(5e-6, 3e-5)
 
     def sessions(self) -> list[Session]:
         """Draw the sessions of an honest series; a quarter of the variance of K is that of the operators."""
@@ -96,44 +96,90 @@ def ask_all(sessions: list[Session], error: float) -> list[list[str]]:
     return asked
 
 
-def gain_error(ratios: tuple[float, ...], at: tuple[int, ...], directions: str = "xy") -> Error:
-    """Return gains that change at these sessions."""
+def gain_error(rng: np.random.Generator) -> tuple[int, Error]:
+    """Return a gain of 1.3 to 3 or its inverse, and the first session with all of it.
+
+    In one step, in two steps, or slowly over three to eight sessions.
+    """
+    ratio = float(np.exp(rng.uniform(np.log(1.3), np.log(3)) * rng.choice([-1, 1])))
+    first, slowly = int(rng.integers(4, N_TESTS - 1)), int(rng.integers(3, 9))
+    ways = [[first], [first, int(rng.integers(first + 1, N_TESTS))], [*range(first, min(first + slowly, N_TESTS))]]
+    steps = np.array(ways[rng.integers(3)])
+    directions = ("x", "y") if rng.random() < 0.7 else ("y",)
 
     def change(number: int, session: Session) -> Session:
-        gain = float(np.prod([r for r, first in zip(ratios, at, strict=True) if number >= first]))
-        wrong = {d: (getattr(session, d)[0], getattr(session, d)[1] * gain) for d in directions}
-        return session._replace(**wrong)
+        gain = ratio ** float(np.mean(steps <= number))
+        return session._replace(**{d: (getattr(session, d)[0], getattr(session, d)[1] * gain) for d in directions})
 
-    return change
-
-
-def tool_error(ratio: float, at: int) -> Error:
-    """Return a tool whose length is that many times as long: f as L^-1, K as L^-3, as in the report."""
-
-    def change(number: int, session: Session) -> Session:
-        if number < at:
-            return session
-        return Session(*((f / ratio, k / ratio**3) for f, k in session))
-
-    return change
+    return int(steps[-1]), change
 
 
-def sensor_left_error(at: int, rng: np.random.Generator, error: float, stiffness_std: float) -> Error:
-    """Return a y that repeats x, within its errors of measurement."""
+def shorter_tool(rng: np.random.Generator) -> tuple[int, Error]:
+    """Return a tool shorter by 6 to 15 % under the old name, f as 1/L and K as 1/L^3, and its first session."""
+    first, ratio = int(rng.integers(4, N_TESTS)), float(rng.uniform(0.85, 0.94))
 
     def change(number: int, session: Session) -> Session:
-        if number < at:
+        return session if number < first else Session(*((f / ratio, k / ratio**3) for f, k in session))
+
+    return first, change
+
+
+def sensor_left(rng: np.random.Generator, first: int, error: float) -> tuple[int, Error]:
+    """Return y that repeats x within its errors of measurement, and its first session."""
+
+    def change(number: int, session: Session) -> Session:
+        if number < first:
             return session
         f, k = session.x
-        return session._replace(
-            y=(f * (1 + error * np.sqrt(2) * rng.standard_normal()), k * (1 + 0.01 * rng.standard_normal()))
-        )
+        noise = rng.standard_normal(2)
+        return session._replace(y=(f * (1 + error * np.sqrt(2) * noise[0]), k * (1 + 0.01 * noise[1])))
 
-    return change
+    return first, change
+
+
+class Counts(NamedTuple):
+    """Machines on which nothing was asked."""
+
+    at_once: int
+    """In the first session with the whole error."""
+    ever: int
+    """In no session with it."""
 
 
 def run(machine: Machine, change: Error | None = None) -> list[list[str]]:
+    """Return the codes asked in each session of a machine."""
     sessions = machine.sessions()
     if change is not None:
         sessions = [change(number, session) for number, session in enumerate(sessions)]
     return ask_all(sessions, machine.error)
+
+
+def count_questions(machines: int, stiffness_std: float, seed: int) -> list[int]:
+    """Return the number of questions in each honest series."""
+    rng = np.random.default_rng(seed)
+    return [sum(map(len, run(Machine(rng, stiffness_std)))) for _ in range(machines)]
+
+
+def make_error(kind: str, machine: Machine, rng: np.random.Generator) -> tuple[int, Error]:
+    """Return a human error of a kind, and its first session."""
+    if kind == "gain":
+        return gain_error(rng)
+    if kind == "shorter tool":
+        return shorter_tool(rng)
+    return sensor_left(rng, 0 if kind.endswith("at once") else int(rng.integers(4, N_TESTS)), machine.error)
+
+
+def count_silent(kind: str, machines: int, stiffness_std: float, seed: int) -> Counts:
+    """Return on how many machines an error of this kind is silent.
+
+    Machines that are round within 0.2 % do not count for a sensor left in x: y is like x.
+    """
+    rng, silent = np.random.default_rng(seed), []
+    while len(silent) < machines:
+        machine = Machine(rng, stiffness_std)
+        if kind.startswith("sensor") and abs(machine.frequency[1] / machine.frequency[0] - 1) < 0.002:
+            continue
+        first, change = make_error(kind, machine, rng)
+        asked = run(machine, change)
+        silent.append((not asked[first], not any(asked[first:])))
+    return Counts(*np.sum(silent, axis=0).tolist())

@@ -174,7 +174,7 @@ def count_silent(kind: str, machines: int, stiffness_std: float, seed: int) -> C
 
     Machines that are round within 0.2 % do not count for a sensor left in x: y is like x.
     """
-    rng, silent = np.random.default_rng(seed), []
+    rng, silent = np.random.default_rng(seed), list[tuple[bool, bool]]()
     while len(silent) < machines:
         machine = Machine(rng, stiffness_std)
         if kind.startswith("sensor") and abs(machine.frequency[1] / machine.frequency[0] - 1) < 0.002:

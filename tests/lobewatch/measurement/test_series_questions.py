@@ -69,6 +69,13 @@ def test_the_median_of_the_series_counts_and_not_the_newest_test() -> None:
 
 
 @pytest.mark.quick
+def test_a_single_test_moves_nothing() -> None:
+    expected = expect_stiffness(SeriesReference(series(*[(F, K)] * 9, (F, 1.1 * K))), F)
+    assert expected is not None
+    assert expected.value == pytest.approx(K, rel=1e-12)
+
+
+@pytest.mark.quick
 @pytest.mark.parametrize("exponent", [0.1, 2.0, 3.8])
 def test_worn_bearings_change_the_stiffness_and_ask_nothing(exponent: float) -> None:
     worn = [(F * w, K * w**exponent) for w in np.linspace(1, 0.9, 24)]
@@ -104,7 +111,7 @@ def test_a_rise_asks_for_the_tool_and_a_fall_does_not(rise: float, is_asked: boo
 
 @pytest.mark.quick
 def test_a_rise_is_one_beyond_the_recent_tests() -> None:
-    worn = [(F * w, K) for w in (1.0, 1.0, 0.9, 0.9, 0.9, 0.9)]
+    worn = [(F * w, K) for w in [1.0] * 6 + [0.9] * 5]
     assert asked(F * 0.97, K, series(*worn)) == ["frequency-jump"]
     assert asked(F * 0.94, K, series(*worn)) == []
 
@@ -171,6 +178,8 @@ def same_direction(change: float, own: list[float], *others: float, error: float
         (3e-5, [0.001], False),
         (3e-5, [0.001, -0.0013, 0.0002, -0.0004, 0.002], False),
         (0.0134, [0.013, 0.014, 0.013, 0.0135], False),
+        (4e-5, [2.8e-4] * 22, False),
+        (-4e-5, [2.8e-4] * 22, True),
     ],
 )
 def test_y_that_repeats_x_is_asked_about_unless_both_are_always_alike(

@@ -71,8 +71,9 @@ class UffFunction:
     @property
     def points(self) -> FrfPoints | None:
         """Points of response and hit; None if the file numbers none."""
-        _, *response, _, node, direction = self.place
-        return FrfPoints(*response, node, direction) if response[0] or node else None
+        _, response_node, response_direction, _, hit_node, hit_direction = self.place
+        points = FrfPoints(response_node, response_direction, hit_node, hit_direction)
+        return points if response_node or hit_node else None
 
     @property
     def averages(self) -> int | None:

@@ -1,0 +1,115 @@
+"""Shares of the parts of a spindle in the compliance of a mode at the tool tip."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modal.arrays import Floats
+
+MAX_STRAIGHT_RESIDUAL = 2.0
+"""Distance of a point from the line of its part, in standard errors, up to which the part is straight; 95 %."""
+MIN_POINT_ERROR = 1e-3
+"""Least error of a point, over the largest motion of its part: exact shapes have no error; chosen."""
+
+
+class PartShare(NamedTuple):
+    """Share of one part, or of several parts that the points cannot separate."""
+
+    parts: tuple[str, ...]
+    """Names of the parts, from the tip on."""
+    share: float
+    """Share of the tip motion and of the compliance 1/K (-); negative if the part moves the tip backwards."""
+    standard_error: float
+    """Standard error of the share (-)."""
+
+
+def compliance_shares(
+    position: ArrayLike, part: Sequence[str], motion: ArrayLike, relative_error: ArrayLike
+) -> list[PartShare]:
+    """Divide the motion of the tool tip in a mode, and so its compliance 1/K there, into shares of the parts.
+
+    A straight line through the front points of a part says how the tip would move if everything between this part and
+    the tip were rigid. The difference of the tip motions of two neighbouring parts is the deformation of the part in
+    front, with its clamping in the part behind. The last part has the rest: its motion as a rigid body.
+
+    These shares s of all modes and parts divide the static compliance of the tip: the sum of s/K over all modes is
+    d C / d ln f, f the flexibility of the part (Castigliano: the tip moves by the deformation of each part under a
+    force at the tip). For one mode it is the change of the tip motion with f under unchanged inertia forces. The share
+    in the strain energy of a mode is another figure: it weights the deformation by the moment of the inertia forces.
+
+    Parameters
+    ----------
+    position : array_like, shape (p,)
+        Distances from the tool tip along the axis (m); the smallest is the tip.
+    part : sequence of str
+        Part of each point.
+    motion : array_like, shape (p,)
+        Motion of each point in phase with the tip, over that of the tip (-).
+    relative_error : array_like, shape (p,)
+        Relative standard errors of the modal constants (-).
+
+    Returns
+    -------
+    list of PartShare
+        Shares from the tip on, which add up to 1. A part with a single point has no slope: it shares a row with the
+        part in front.
+
+    Raises
+    ------
+    ValueError
+        For two points of a part at one position.
+
+    References
+    ----------
+    Rivin, Stiffness and Damping in Mechanical Design (breakdown of the deformation at the tool).
+
+    Examples
+    --------
+    A rigid spindle turns about a point 0.3 m behind the tip, and a tool bends by a quarter of the tip motion:
+
+    >>> shares = compliance_shares([0.0, 0.1, 0.2], ["tool", "spindle", "spindle"], [1.0, 0.5, 0.25], [0.0, 0.0, 0.0])
+    >>> [(*row.parts, round(row.share, 3)) for row in shares]
+    [('tool', 0.25), ('spindle', 0.75)]
+    """
+    z, w, error = (np.asarray(values, dtype=np.float64) for values in (position, motion, relative_error))
+    tip, rows = int(np.argmin(z)), list[tuple[list[str], Floats]]()
+    for name in dict.fromkeys(part[i] for i in np.argsort(z)):
+        own = [int(i) for i in np.argsort(z) if part[i] == name]
+        if not rows:
+            rows.append(([name], np.eye(z.size)[tip]))
+        elif len(own) == 1:
+            rows[-1][0].append(name)
+        else:
+            rows.append(([name], _extrapolate_to_tip(z - z[tip], w, error, own)))
+    behind = [row for _, row in rows[1:]] + [np.zeros(z.size)]
+    pairs = [(tuple(names), row - other) for (names, row), other in zip(rows, behind, strict=True)]
+    return [PartShare(names, float(row @ w), _share_error(row, w, error, tip)) for names, row in pairs]
+
+
+def _extrapolate_to_tip(z: Floats, w: Floats, error: Floats, own: Sequence[int]) -> Floats:
+    """Return the weights of the points in the tip motion of the line through the front points of a part.
+
+    The line has as many points as are straight within their errors, at least two.
+    """
+    sigma = np.maximum(np.abs(w) * error, MIN_POINT_ERROR * np.max(np.abs(w[[*own]])))
+    weights = np.zeros(z.size)
+    for count in range(len(own), 1, -1):
+        front = [*own[:count]]
+        if np.ptp(z[front]) <= 0:
+            raise ValueError(f"two points of a part are at {z[front[0]]:g} m. Measure at two positions.")
+        columns = np.stack([np.ones(count), z[front]]) / sigma[front]
+        line = np.linalg.pinv(columns.T) / sigma[front]
+        residual = w[front] - np.stack([np.ones(count), z[front]]).T @ line @ w[front]
+        if count == 2 or np.all(np.abs(residual) <= MAX_STRAIGHT_RESIDUAL * sigma[front]):
+            weights[front] = line[0]
+            break
+    return weights
+
+
+def _share_error(row: Floats, w: Floats, error: Floats, tip: int) -> float:
+    """Return the standard error of row @ w, whose motions are divided by that of the tip."""
+    by_point = row * w * error
+    by_point[tip] = (row @ w - row[tip] * w[tip]) * error[tip]
+    return float(np.linalg.norm(by_point))

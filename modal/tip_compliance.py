@@ -1,5 +1,6 @@
 """Shares of the parts of a spindle in the compliance of a mode at the tool tip."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,6 +13,10 @@ MAX_STRAIGHT_RESIDUAL = 2.0
 """Distance of a point from the line of its part, in standard errors, up to which the part is straight; 95 %."""
 MIN_POINT_ERROR = 1e-3
 """Least error of a point, over the largest motion of its part: exact shapes have no error; chosen."""
+
+
+BENDING_ERROR = 0.02
+"""Standard error of a share because parts bend between their points (docs/studies/shapes.md)."""
 
 
 class PartShare(NamedTuple):
@@ -85,7 +90,9 @@ def compliance_shares(
             rows.append(([name], _extrapolate_to_tip(z - z[tip], w, error, own)))
     behind = [row for _, row in rows[1:]] + [np.zeros(z.size)]
     pairs = [(tuple(names), row - other) for (names, row), other in zip(rows, behind, strict=True)]
-    return [PartShare(names, float(row @ w), _share_error(row, w, error, tip)) for names, row in pairs]
+    bending = BENDING_ERROR if len(pairs) > 1 else 0.0
+    errors = [math.hypot(_share_error(row, w, error, tip), bending) for _, row in pairs]
+    return [PartShare(names, float(row @ w), std) for (names, row), std in zip(pairs, errors, strict=True)]
 
 
 def _extrapolate_to_tip(z: Floats, w: Floats, error: Floats, own: Sequence[int]) -> Floats:

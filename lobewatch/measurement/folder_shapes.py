@@ -7,8 +7,6 @@ from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 
-import numpy as np
-
 import modal
 from acquisition import DataError, Description, Frf, Remark
 from lobewatch.arrays import Complexes, Floats
@@ -22,7 +20,7 @@ MAX_SCALE_DIFFERENCE = 0.1
 """Relative difference in size of two FRFs between the same points from which a check fails; chosen."""
 MIN_FRAC = 0.9
 """Least FRAC of two FRFs between the same points; chosen, as for a MAC of one mode measured twice."""
-MAX_AUTO_MAC = 0.8
+MAX_AUTO_MAC = 0.95
 """MAC of two modes above which the points hardly distinguish them; chosen."""
 MIN_PHASE_COLLINEARITY = 0.8
 """Least MPC of a mode of a lightly damped structure; chosen."""
@@ -93,22 +91,6 @@ class FolderShapes:
         """Return the motions of some points in each accepted mode, shape (p,) each."""
         places = [[point.name for point in self.points].index(name) for name in names]
         return [self.shapes[i].motion[places] for i in self.accepted]
-
-    @property
-    def static_shares(self) -> tuple[PartShare, ...]:
-        """Shares of the parts in the sum of 1/K over the accepted modes; empty without a mode."""
-        if not self.accepted:
-            return ()
-        compliance = np.array([self.shapes[i].mode.constant.real for i in self.accepted])
-        weight = compliance / np.sum(compliance)
-        return tuple(
-            PartShare(
-                rows[0].parts,
-                float(weight @ [row.share for row in rows]),
-                float(np.linalg.norm(weight * [row.standard_error for row in rows])),
-            )
-            for rows in zip(*(self.shares[i] for i in self.accepted), strict=True)
-        )
 
 
 def measure_folder_shapes(

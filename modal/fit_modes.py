@@ -110,9 +110,10 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
 
 
 def fit_constants(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[tuple[Mode, Complexes, Floats]]:
-    """Return the modes of an extraction by rising frequency, each with its modal constants and their errors.
+    """Return the modes of an extraction by rising frequency, each with its modal constants and their covariance.
 
-    Constants (m/N) and relative errors of the fit (-) have the shape (p,). Arguments as `modes_from_extraction`.
+    Constants (m/N) have the shape (p,), the covariance of their relative sizes in the fit (p, p). Arguments as
+    `modes_from_extraction`.
     """
     if hits and len(hits) != len(state.frfs):
         found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
@@ -120,14 +121,14 @@ def fit_constants(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     state = merge_scattered_pairs(state, pairs)
     found_modes = [
-        (mode, band.fit.constant[:, i], band.fit.size_error[:, i])
+        (mode, band.fit.constant[:, i], band.fit.size_covariance(i))
         for band in state.bands
         for i, mode in enumerate(_modes_with_scatter(state, band, pairs))
     ]
     rising = sorted(found_modes, key=lambda fitted: fitted[0].frequency)
     modes = add_phase_remarks([mode for mode, _, _ in rising])
     checked = add_quantity_remarks(state.frf, add_smoothing_remarks(state, modes, has_hits=any(hits)))
-    return [(mode, constants, errors) for mode, (_, constants, errors) in zip(checked, rising, strict=True)]
+    return [(mode, constants, covariance) for mode, (_, constants, covariance) in zip(checked, rising, strict=True)]
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:

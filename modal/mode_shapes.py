@@ -13,6 +13,7 @@ from modal.bands.extract_modes import extract_modes
 from modal.fit_modes import fit_constants
 from modal.modes.match_modes import mac
 from modal.modes.mode import Mode
+from modal.tip_compliance import relative_motion_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +22,7 @@ class ModeShape:
 
     Examples
     --------
-    >>> shape = ModeShape(Mode(500.0, 0.02, 2e7), np.array([1.0, -0.5 + 0j]), np.array([0.01, 0.02]))
+    >>> shape = ModeShape(Mode(500.0, 0.02, 2e7), np.array([1.0, -0.5 + 0j]), np.diag([1e-4, 4e-4]))
     >>> (shape.mass_normalized.real * np.sqrt(2e7) / (2 * np.pi * 500)).round(3).tolist()  # phi = w_n / sqrt(K) there
     [1.0, -0.5]
     >>> round(shape.phase_collinearity, 3)  # all points move in phase or in opposition
@@ -32,14 +33,13 @@ class ModeShape:
     """Mode, with its stiffness at the driving point."""
     motion: Complexes
     """Motion of each point over that of the driving point (-), shape (p,)."""
-    relative_error: Floats
-    """Relative standard errors of the modal constants of the points (-), shape (p,)."""
+    size_covariance: Floats
+    """Covariance of the relative errors of the modal constants of the points (-), shape (p, p)."""
 
     @property
     def motion_error(self) -> Floats:
         """Standard errors of the motions, 0 for the driving point (-), shape (p,)."""
-        error = np.abs(self.motion) * np.hypot(self.relative_error, self.relative_error[0])
-        return np.asarray(np.where(np.arange(error.size) == 0, 0.0, error))
+        return np.abs(self.motion) * relative_motion_error(self.size_covariance, 0)
 
     @property
     def mass_normalized(self) -> Complexes:
@@ -87,8 +87,8 @@ def fit_mode_shapes(
     Returns
     -------
     list of ModeShape
-        Mode shapes by rising frequency; may be empty. The errors of all points are scaled as that of the stiffness
-        at the driving point, which the hits give if there are three or more.
+        Mode shapes by rising frequency; may be empty. All points have the errors of the fit. If the stiffness at
+        the driving point scatters more over the hits, all are larger by its factor.
 
     Raises
     ------
@@ -107,9 +107,9 @@ def fit_mode_shapes(
     return [_make_shape(*fitted) for fitted in fit_constants(extract_modes(frfs, band), hits)]
 
 
-def _make_shape(mode: Mode, constants: Complexes, errors: Floats) -> ModeShape:
-    of_stiffness = mode.standard_error[2] / abs(mode.stiffness)
-    return ModeShape(mode, constants / constants[0], errors * max(float(of_stiffness / errors[0]), 1.0))
+def _make_shape(mode: Mode, constants: Complexes, covariance: Floats) -> ModeShape:
+    over_hits = float(mode.standard_error[2] / mode.fit_error[2])
+    return ModeShape(mode, constants / constants[0], covariance * max(over_hits, 1.0) ** 2)
 
 
 def average_points(shape: ModeShape, groups: Sequence[Sequence[int]]) -> ModeShape:
@@ -127,14 +127,21 @@ def average_points(shape: ModeShape, groups: Sequence[Sequence[int]]) -> ModeSha
     ModeShape
         Mode shape over points, 1 at the driving point. Its errors include the scatter of the measurements.
     """
-    mean, error = np.empty(len(groups), dtype=complex), np.empty(len(groups))
+    share = np.zeros((len(groups), shape.motion.size))
     for place, group in enumerate(groups):
-        values, own = shape.motion[[*group]], shape.relative_error[[*group]]
-        mean[place] = np.mean(values)
-        scatter = np.std(values, ddof=1) / np.sqrt(len(group)) if len(group) > 1 else 0.0
-        error[place] = np.hypot(np.linalg.norm(own * np.abs(values)) / len(group), scatter)
-    size = np.maximum(np.abs(mean), np.finfo(float).tiny)
-    return replace(shape, motion=mean / mean[0], relative_error=error / size)
+        share[place, [*group]] = 1 / len(group)
+    mean = share @ shape.motion
+    steps = share * np.abs(shape.motion) / np.maximum(np.abs(mean), np.finfo(float).tiny)[:, np.newaxis]
+    scatter = [_relative_scatter(shape.motion[[*group]]) for group in groups]
+    covariance = steps @ shape.size_covariance @ steps.T + np.diag(np.square(scatter))
+    return replace(shape, motion=mean / mean[0], size_covariance=covariance)
+
+
+def _relative_scatter(values: Complexes) -> float:
+    """Return the relative standard error of a mean by its values; 0 for a single one."""
+    if values.size == 1:
+        return 0.0
+    return float(np.std(values, ddof=1) / np.sqrt(values.size) / max(abs(np.mean(values)), np.finfo(float).tiny))
 
 
 def mac_matrix(first: Sequence[ArrayLike], second: Sequence[ArrayLike]) -> Floats:

@@ -12,7 +12,7 @@ from modal.arrays import Floats
 MAX_STRAIGHT_RESIDUAL = 2.0
 """Distance of a point from the line of its part, in standard errors, up to which the part is straight; 95 %."""
 MIN_POINT_ERROR = 1e-3
-"""Least error of a point, over the largest motion of its part: exact shapes have no error; chosen."""
+"""Least error of a point, over the motion of the tip: exact shapes have no error; chosen."""
 
 
 BENDING_ERROR = 0.02
@@ -31,7 +31,7 @@ class PartShare(NamedTuple):
 
 
 def compliance_shares(
-    position: ArrayLike, part: Sequence[str], motion: ArrayLike, relative_error: ArrayLike
+    position: ArrayLike, part: Sequence[str], motion: ArrayLike, size_covariance: ArrayLike
 ) -> list[PartShare]:
     """Divide the motion of the tool tip in a mode, and so its compliance 1/K there, into shares of the parts.
 
@@ -52,8 +52,8 @@ def compliance_shares(
         Part of each point.
     motion : array_like, shape (p,)
         Motion of each point in phase with the tip, over that of the tip (-).
-    relative_error : array_like, shape (p,)
-        Relative standard errors of the modal constants (-).
+    size_covariance : array_like, shape (p, p)
+        Covariance of the relative errors of the modal constants (-).
 
     Returns
     -------
@@ -74,12 +74,13 @@ def compliance_shares(
     --------
     A rigid spindle turns about a point 0.3 m behind the tip, and a tool bends by a quarter of the tip motion:
 
-    >>> shares = compliance_shares([0.0, 0.1, 0.2], ["tool", "spindle", "spindle"], [1.0, 0.5, 0.25], [0.0, 0.0, 0.0])
+    >>> shares = compliance_shares([0.0, 0.1, 0.2], ["tool", "spindle", "spindle"], [1, 0.5, 0.25], np.zeros((3, 3)))
     >>> [(*row.parts, round(row.share, 3)) for row in shares]
     [('tool', 0.25), ('spindle', 0.75)]
     """
-    z, w, error = (np.asarray(values, dtype=np.float64) for values in (position, motion, relative_error))
+    z, w, covariance = (np.asarray(values, dtype=np.float64) for values in (position, motion, size_covariance))
     tip, rows = int(np.argmin(z)), list[tuple[list[str], Floats]]()
+    sigma = np.maximum(np.abs(w) * relative_motion_error(covariance, tip), MIN_POINT_ERROR)
     for name in dict.fromkeys(part[i] for i in np.argsort(z)):
         own = [int(i) for i in np.argsort(z) if part[i] == name]
         if not rows:
@@ -87,20 +88,19 @@ def compliance_shares(
         elif len(own) == 1:
             rows[-1][0].append(name)
         else:
-            rows.append(([name], _extrapolate_to_tip(z - z[tip], w, error, own)))
+            rows.append(([name], _extrapolate_to_tip(z - z[tip], w, sigma, own)))
     behind = [row for _, row in rows[1:]] + [np.zeros(z.size)]
     pairs = [(tuple(names), row - other) for (names, row), other in zip(rows, behind, strict=True)]
     bending = BENDING_ERROR if len(pairs) > 1 else 0.0
-    errors = [math.hypot(_share_error(row, w, error, tip), bending) for _, row in pairs]
+    errors = [math.hypot(_share_error(row * w, covariance, tip), bending) for _, row in pairs]
     return [PartShare(names, float(row @ w), std) for (names, row), std in zip(pairs, errors, strict=True)]
 
 
-def _extrapolate_to_tip(z: Floats, w: Floats, error: Floats, own: Sequence[int]) -> Floats:
+def _extrapolate_to_tip(z: Floats, w: Floats, sigma: Floats, own: Sequence[int]) -> Floats:
     """Return the weights of the points in the tip motion of the line through the front points of a part.
 
     The line has as many points as are straight within their errors, at least two.
     """
-    sigma = np.maximum(np.abs(w) * error, MIN_POINT_ERROR * np.max(np.abs(w[[*own]])))
     weights = np.zeros(z.size)
     for count in range(len(own), 1, -1):
         front = [*own[:count]]
@@ -115,8 +115,13 @@ def _extrapolate_to_tip(z: Floats, w: Floats, error: Floats, own: Sequence[int])
     return weights
 
 
-def _share_error(row: Floats, w: Floats, error: Floats, tip: int) -> float:
-    """Return the standard error of row @ w, whose motions are divided by that of the tip."""
-    by_point = row * w * error
-    by_point[tip] = (row @ w - row[tip] * w[tip]) * error[tip]
-    return float(np.linalg.norm(by_point))
+def _share_error(parts: Floats, covariance: Floats, tip: int) -> float:
+    """Return the standard error of a sum of motions (p,), each of which is divided by that of the tip."""
+    slope = parts - np.sum(parts) * (np.arange(parts.size) == tip)
+    return math.sqrt(max(float(slope @ covariance @ slope), 0.0))
+
+
+def relative_motion_error(size_covariance: Floats, tip: int) -> Floats:
+    """Return the relative standard error of each motion over that of the tip; 0 for the tip, shape (p,)."""
+    own, common = np.diag(size_covariance), size_covariance[tip]
+    return np.asarray(np.sqrt(np.maximum(own + own[tip] - 2 * common, 0.0)))

@@ -9,7 +9,7 @@ from lobewatch.commands.shared_options import FileOptions, add_file_options
 from lobewatch.show.terminal.output import Json, emit
 
 
-@add_file_options(without=["averages", "one_test", "force"])
+@add_file_options(without=["averages", "force"])
 def shapes(
     folder: Annotated[Path, Argument(help="Folder with points.csv and the recorded files.")],
     band: Annotated[tuple[float, float] | None, Option(help="Frequency band (Hz).")] = None,

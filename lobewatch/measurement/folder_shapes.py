@@ -152,7 +152,7 @@ def _describe_point(measured: Sequence[PointFrf], name: str, group: Sequence[int
 
 def _divide_tip_motion(points: Sequence[MeasuredPoint], shape: ModeShape) -> tuple[PartShare, ...]:
     position, parts = [point.position for point in points], [point.part for point in points]
-    return tuple(modal.compliance_shares(position, parts, shape.motion.real, shape.relative_error))
+    return tuple(modal.compliance_shares(position, parts, shape.motion.real, shape.size_covariance))
 
 
 def _compare_repeated(
@@ -183,11 +183,7 @@ def _find_remarks(found: FolderShapes) -> Iterator[Remark]:
     if not modes:
         yield Remark("no-mode", "", "no mode found", "Check the frequency band, and hit harder")
     yield from check_modes_together(modes)
-    for check in found.checks:
-        if not check.is_passed:
-            text = f"{check.kind}: FRAC {check.frac:.2f}, second over first measurement {check.scale:+.2f}"
-            cure = "Check sign, position and direction of hammer and sensor, then measure this point again"
-            yield Remark(f"no-{check.kind}", f"point {check.point}", text, cure)
+    yield from (_make_check_remark(check) for check in found.checks if not check.is_passed)
     for i, j in combinations(range(len(modes)), 2):
         if found.auto_mac[i, j] > MAX_AUTO_MAC:
             about, text = f"{modes[i].frequency:.0f} Hz, {modes[j].frequency:.0f} Hz", "these points hardly distinguish"
@@ -200,6 +196,15 @@ def _find_remarks(found: FolderShapes) -> Iterator[Remark]:
             cure = "Check for close modes, and sample all channels at the same time"
             yield Remark("complex-shape", f"{shape.mode.frequency:.0f} Hz", text, cure)
     yield from _find_part_remarks(found.points)
+
+
+def _make_check_remark(check: PointCheck) -> Remark:
+    about, figures = f"point {check.point}", f"(FRAC {check.frac:.2f}, size ratio {check.scale:+.2f})"
+    if check.kind == "repeatability":
+        cure = "Check sensor mounting, hit position and direction, then measure this point again"
+        return Remark("not-repeatable", about, f"two measurements of the point differ {figures}", cure)
+    cure = "Check position, direction and sensitivity of hammer and sensor at both points"
+    return Remark("not-reciprocal", about, f"FRFs differ with hammer and sensor exchanged {figures}", cure)
 
 
 def _find_part_remarks(points: Sequence[MeasuredPoint]) -> Iterator[Remark]:

@@ -24,6 +24,8 @@ MATCHES_NOTE = "matches: number of other measurements with the mode within 0.5 %
 """Line below a table with the column "matches"."""
 ORIGIN_WORDS = {"file": "from the file", "option": "by option", "default": "assumed"}
 """Words for the origin of a fact on a file."""
+ALL_MODES_HINT = " (all modes and remarks: --all)"
+"""Hint behind the number of modes of a folder."""
 FILE_REMARK_CODES = "hit-left-out", "units-differ"
 """Codes of remarks on single hits and files, each of which is shown in full."""
 NON_FILE_ORIGINS = "option", "default"
@@ -121,13 +123,18 @@ def grouped_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> li
 
 
 def trust_summary(modes: Sequence[Mode], *, everything: bool) -> str:
-    """Return how many modes are trusted, doubtful and rejected."""
-    count = Counter(assess_trust(mode) for mode in modes)
-    counts = ", ".join(f"{count[trust]} {trust}" for trust in Trust)
-    looked = not count[Trust.DOUBTFUL] or any(mode.match_count for mode in modes)
+    """Return how many modes are trusted, doubtful and rejected, and how to see more of them."""
+    has_doubtful = any(assess_trust(mode) is Trust.DOUBTFUL for mode in modes)
+    looked = not has_doubtful or any(mode.match_count for mode in modes)
     hints = [] if looked else ["compare with other files: --beside"]
     hints = hints if everything or not modes else ["all modes and remarks: --all", *hints]
-    return counts + (f" ({', '.join(hints)})" if hints else "")
+    return count_by_trust(modes) + (f" ({', '.join(hints)})" if hints else "")
+
+
+def count_by_trust(modes: Sequence[Mode]) -> str:
+    """Return how many modes are trusted, doubtful and rejected."""
+    count = Counter(assess_trust(mode) for mode in modes)
+    return ", ".join(f"{count[trust]} {trust}" for trust in Trust)
 
 
 def trust_reasons(modes: Sequence[Mode]) -> list[str]:
@@ -272,11 +279,13 @@ def folder_shapes_texts(
     texts: Texts = [
         f"{found.folder.name}: {count_noun(len(found.points), 'point')} ({by_part}), {count_noun(n, 'measurement')}",
         mode_table(modes),
-        trust_summary([shape.mode for shape in found.shapes], everything=everything),
+        count_by_trust([shape.mode for shape in found.shapes])
+        + ("" if everything else " (all modes and remarks: --all)"),
     ]
     if shapes:
         texts += ["motion over that of the tip", _shape_table(found.points, shapes, headings)]
-        texts += ["share of the compliance 1/K at the tip (%)", _share_table(shares, headings)]
+        if len(shares[0]) > 1:
+            texts += ["share of the compliance 1/K at the tip (%)", _share_table(shares, headings)]
         texts += ["MAC of the modes", _mac_table(_list_frequencies(found), _list_headings(found), found.auto_mac)]
     if reference is not None:
         names, values = compare_shapes(found, reference)

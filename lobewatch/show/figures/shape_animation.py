@@ -25,8 +25,8 @@ WIDTH, LEFT, RIGHT = 900, 24, 600
 """Width of the figure, and ends of the axis in it (px)."""
 HEADER, PANEL, SWING = 64, 150, 46
 """Height of the header and of the panel of a mode, and largest motion in it (px)."""
-BAR_LEFT, BAR_WIDTH = 640, 236
-"""Place and width of the shares (px)."""
+BAR_LEFT, BAR_WIDTH, BAR_LABEL = 620, 260, 150
+"""Place and width of the shares with their labels, and width of the labels (px)."""
 
 
 def save_shape_animation(found: FolderShapes, path: Path) -> None:
@@ -62,15 +62,15 @@ def _draw_header(points: Sequence[MeasuredPoint], name: str) -> Iterator[str]:
     """Yield the title, and the name and place of each point."""
     yield f'<text x="{LEFT}" y="18" font-weight="bold" font-size="14">{name}</text>'
     yield f'<text x="{BAR_LEFT}" y="18" font-weight="bold">share of 1/K at the tip</text>'
-    last = -np.inf
+    end = -np.inf
     for point, x in zip(points, _place(points), strict=True):
         label = _text(point.name)
-        if x - last >= 7 * len(label) + 6:  # room for its letters
+        if x - end >= 7 * len(label) + 6:  # room for its letters
             yield f'<text x="{x:.1f}" y="40" text-anchor="middle" fill="{PART_PAINTS[point.part]}">{label}</text>'
-            last = x
-    span = f"{points[0].position * 1e3:g} mm"
-    yield f'<text x="{LEFT}" y="56" fill="#555">{span}</text>'
-    yield f'<text x="{RIGHT}" y="56" fill="#555" text-anchor="end">{points[-1].position * 1e3:g} mm from the tip</text>'
+            end = x
+    first, last = (f"{points[i].position * 1e3:.4g} mm" for i in (0, -1))
+    yield f'<text x="{LEFT}" y="56" fill="#555">{first}</text>'
+    yield f'<text x="{RIGHT}" y="56" fill="#555" text-anchor="end">{last} from the tip</text>'
 
 
 def _draw_mode(
@@ -100,12 +100,12 @@ def _draw_mode(
 def _draw_shares(shares: Sequence[PartShare], top: float) -> Iterator[str]:
     """Yield a bar for each share, to the left of the zero line if it is negative."""
     low, high = min(0.0, *(row.share for row in shares)), max(1.0, *(row.share for row in shares))
-    scale = (BAR_WIDTH - 110) / (high - low)
-    zero = BAR_LEFT + 110 - low * scale
+    scale = (BAR_WIDTH - BAR_LABEL) / (high - low)
+    zero = BAR_LEFT + BAR_LABEL - low * scale
     for number, row in enumerate(shares):
         y, end = top + 24 * number, zero + row.share * scale
-        label = f"{'+'.join(row.parts)} {100 * row.share:.0f} %"
-        yield f'<text x="{BAR_LEFT + 104}" y="{y + 12}" text-anchor="end">{label}</text>'
+        label = f"{' + '.join(row.parts)} {round(100 * row.share)} %"
+        yield f'<text x="{BAR_LEFT + BAR_LABEL - 6}" y="{y + 12}" text-anchor="end">{label}</text>'
         place = f'x="{min(zero, end):.1f}" y="{y}" width="{abs(end - zero):.1f}" height="16"'
         yield f'<rect {place} fill="{PART_PAINTS[row.parts[0]]}"/>'
     yield f'<line x1="{zero:.1f}" x2="{zero:.1f}" y1="{top - 4}" y2="{top + 24 * len(shares)}" stroke="#222"/>'

@@ -16,7 +16,10 @@ MIN_POINT_ERROR = 1e-3
 
 
 BENDING_ERROR = 0.02
-"""Standard error of a share because parts bend between their points (docs/studies/shapes.md)."""
+"""Standard error of a share because parts bend between their points, if all shares are positive.
+
+It grows with the square of the sum of their sizes, measured on simulated spindles (docs/studies/shapes.md).
+"""
 
 
 class PartShare(NamedTuple):
@@ -90,10 +93,12 @@ def compliance_shares(
         else:
             rows.append(([name], _extrapolate_to_tip(z - z[tip], w, sigma, own)))
     behind = [row for _, row in rows[1:]] + [np.zeros(z.size)]
-    pairs = [(tuple(names), row - other) for (names, row), other in zip(rows, behind, strict=True)]
-    bending = BENDING_ERROR if len(pairs) > 1 else 0.0
+    pairs = [(tuple(parts), row - other) for (parts, row), other in zip(rows, behind, strict=True)]
+    shares = [float(row @ w) for _, row in pairs]
+    bending = BENDING_ERROR * float(np.sum(np.abs(shares))) ** 2 if len(pairs) > 1 else 0.0
     errors = [math.hypot(_share_error(row * w, covariance, tip), bending) for _, row in pairs]
-    return [PartShare(names, float(row @ w), std) for (names, row), std in zip(pairs, errors, strict=True)]
+    names = [parts for parts, _ in pairs]
+    return [PartShare(*row) for row in zip(names, shares, errors, strict=True)]
 
 
 def _extrapolate_to_tip(z: Floats, w: Floats, sigma: Floats, own: Sequence[int]) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,8 +13,13 @@ import pytest
 
 from acquisition import Structure
 from dsm import receptance
+from modal import Mode, synthesize_frf
 from tests.lobewatch.commands.conftest import Run
 from tests.modal.simulated_parts import SPINDLE, place_points, true_motion, true_shares
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import pyuff
 
 POINTS = place_points(SPINDLE)
 LINES = np.arange(60.0, 2400.0, 3.0)
@@ -152,6 +158,31 @@ def test_universal_file_of_another_program_is_read_by_its_nodes(run: Run, tmp_pa
     assert answer["modes"][0]["shares"] == [
         {"parts": ["tool", "holder", "spindle"], "share": pytest.approx(1.0), "share_std": pytest.approx(0.0, abs=1e-9)}
     ]
+
+
+def write_uff(path: Path, frfs: Sequence[tuple[int, int, int, int, float]]) -> None:
+    """Write FRFs of response node and direction, hit node and direction, and motion of one mode, by pyuff."""
+    for response, response_direction, hit, hit_direction, motion in frfs:
+        sign = np.sign(response_direction * hit_direction)
+        values = sign * synthesize_frf([Mode(700.0, 0.02, 2e7 / motion)], LINES).accelerance
+        fields = {"type": 58, "func_type": 4, "data": values, "x": LINES, "abscissa_spacing": 1, "binary": 0}
+        fields |= {"rsp_node": response, "rsp_dir": response_direction, "ref_node": hit, "ref_dir": hit_direction}
+        fields |= {"abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12, "orddenom_spec_data_type": 13}
+        fields |= {"ordinate_axis_units_lab": "m/s^2", "orddenom_axis_units_lab": "N"}
+        pyuff.UFF(str(path)).write_sets(fields, "add")
+
+
+def test_nodes_say_what_was_hit_and_in_which_direction(run: Run, tmp_path: Path) -> None:
+    in_x = [(1, 1, 1, 1, 1.0), (2, 1, 1, 1, 0.5), (1, 1, 2, 1, 0.51), (3, -1, 1, 1, -0.3)]
+    write_uff(tmp_path / "all.uff", [*in_x, (2, 2, 1, 2, 0.9), (2, 2, 1, 1, 0.2)])
+    rows = [f"n{node},{40 * node},tool,all.uff,{node}" for node in (1, 2, 3)]
+    write_table(tmp_path, rows, f"{HEAD},node")
+    assert run("shapes", tmp_path).code == 2  # node 2 has x and y
+    write_table(tmp_path, [f"{row},x" for row in rows], f"{HEAD},node,direction")
+    answer = run("shapes", tmp_path, "--json").json
+    assert answer["modes"][0]["shape"]["real"] == pytest.approx([1.0, 0.505, -0.3], abs=1e-3)
+    (check,) = answer["checks"]
+    assert (check["point"], check["kind"], check["scale"]) == ("n2", "reciprocity", pytest.approx(1.02, abs=1e-3))
 
 
 def test_hits_that_ring_at_the_end_have_one_window_at_all_points(run: Run, tmp_path: Path) -> None:

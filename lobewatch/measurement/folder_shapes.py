@@ -10,7 +10,7 @@ from pathlib import Path
 import modal
 from acquisition import DataError, Description, Frf, Remark
 from lobewatch.arrays import Complexes, Floats
-from lobewatch.measurement.file_modes import check_modes_together
+from lobewatch.measurement.file_modes import check_modes_together, make_no_mode_remark
 from lobewatch.measurement.point_frfs import PointFrf, read_point_frfs, treat_windows
 from lobewatch.measurement.point_table import MIN_POINTS, PARTS, read_point_table
 from lobewatch.step_times import time_step
@@ -181,7 +181,7 @@ def _list_file_remarks(measured: Sequence[PointFrf]) -> Iterator[Remark]:
 def _find_remarks(found: FolderShapes) -> Iterator[Remark]:
     modes = [found.shapes[i].mode for i in found.accepted]
     if not modes:
-        yield Remark("no-mode", "", "no mode found", "Check the frequency band, and hit harder")
+        yield make_no_mode_remark()
     yield from check_modes_together(modes)
     yield from (_make_check_remark(check) for check in found.checks if not check.is_passed)
     for i, j in combinations(range(len(modes)), 2):

@@ -232,7 +232,7 @@ def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGIN_WORD
 def folder_shapes_json(found: FolderShapes, reference: FolderShapes | None = None) -> JsonObject:
     """Return the mode shapes of a folder, with the MAC of the accepted modes; reference: an earlier set to compare."""
     shares = zip(found.shapes, found.shares, strict=True)
-    answer = {
+    answer: JsonObject = {
         "folder": str(found.folder),
         "points": [_point_json(point) for point in found.points],
         "modes": [mode_json(shape.mode) | _shape_json(shape, rows) for shape, rows in shares],

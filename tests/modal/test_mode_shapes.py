@@ -35,7 +35,7 @@ def test_shapes_of_two_masses_have_unit_modal_mass() -> None:
     assert [shape.mode.frequency for shape in found] == pytest.approx([f for f, _ in modes], rel=1e-6)
     normalized = np.array([shape.mass_normalized for shape in found])
     assert mass * normalized @ normalized.T == pytest.approx(np.eye(2), abs=1e-6)
-    assert mac_matrix(normalized, normalized) == pytest.approx(np.eye(2), abs=1e-6)
+    assert mac_matrix([*normalized], [*normalized]) == pytest.approx(np.eye(2), abs=1e-6)
 
 
 def test_phases_of_the_points_are_fitted() -> None:

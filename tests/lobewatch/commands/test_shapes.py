@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from acquisition import Structure
 from dsm import receptance
@@ -28,7 +29,7 @@ UFF = Path(__file__).parents[2] / "data" / "pyuff_roving_hammer"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def write_frf(path: Path, values: Sequence[complex], unit: str = "m/N", lines: Sequence[float] = LINES) -> None:
+def write_frf(path: Path, values: ArrayLike, unit: str = "m/N", lines: ArrayLike = LINES) -> None:
     """Write receptances."""
     table = np.column_stack([lines, np.real(values), np.imag(values)])
     np.savetxt(path, table, delimiter=",", header=f"frequency [Hz],real [{unit}],imag [{unit}]", comments="")

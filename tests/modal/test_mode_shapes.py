@@ -10,7 +10,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from acquisition import Frf
-from modal import Mode, ModeShape, average_points, compare_frfs, fit_mode_shapes, mac, mac_matrix, synthesize_frf
+from modal import (
+    Mode,
+    ModeShape,
+    average_points,
+    compare_frfs,
+    extract_modes,
+    fit_mode_shapes,
+    mac,
+    mac_matrix,
+    synthesize_frf,
+)
 
 LINES = np.arange(5.0, 2000.0, 5.0)
 COMPLEX = st.complex_numbers(min_magnitude=0.1, max_magnitude=3, allow_nan=False)
@@ -65,6 +75,18 @@ def test_errors_of_the_motions_are_those_of_many_noisy_measurements() -> None:
     assert len(found) == 40
     assert stated[0] == 0
     assert stated[1:] == pytest.approx(scatter[1:], rel=0.3)
+
+
+def test_covariance_of_the_sizes_has_their_errors() -> None:
+    rng = np.random.default_rng(3)
+    exact = [synthesize_frf([Mode(500.0, 0.02, 2e7 / ratio), Mode(540.0, 0.03, 3e7)], LINES) for ratio in (1.0, -0.4)]
+    noise = 1e-8 * (rng.normal(size=(2, LINES.size)) + 1j * rng.normal(size=(2, LINES.size)))
+    state = extract_modes([Frf(LINES, frf.receptance + part) for frf, part in zip(exact, noise, strict=True)])
+    (band,) = state.bands
+    for i in range(2):
+        covariance = band.fit.size_covariance(i)
+        assert np.sqrt(np.diag(covariance)) == pytest.approx(band.fit.size_error[:, i], rel=1e-9)
+        assert covariance[0, 1] > 0.1 * np.sqrt(covariance[0, 0] * covariance[1, 1])  # by the common damping ratio
 
 
 @given(st.lists(COMPLEX, min_size=3, max_size=6), COMPLEX)

@@ -97,7 +97,6 @@ def fit_mode_shapes(
 
     Examples
     --------
-    >>> from modal import synthesize_frf
     >>> line = np.arange(1.0, 1001.0)
     >>> frfs = [synthesize_frf([Mode(500.0, 0.02, stiffness)], line) for stiffness in (2e7, -4e7, 8e7)]
     >>> (shape,) = fit_mode_shapes(frfs)
@@ -200,8 +199,9 @@ def compare_frfs(first: Frf, second: Frf, band: tuple[float, float] | None = Non
 
     Examples
     --------
-    >>> frf = Frf(np.array([100.0, 200.0]), np.array([1e-8, -3e-8 + 1e-8j]))
-    >>> agreement = compare_frfs(frf, replace(frf, receptance=-1.1 * frf.receptance))
+    >>> line = np.arange(1.0, 1001.0)
+    >>> tip, other = (synthesize_frf([Mode(500.0, 0.02, stiffness)], line) for stiffness in (2.2e7, -2e7))
+    >>> agreement = compare_frfs(tip, other)
     >>> round(agreement.frac, 3), round(agreement.scale, 3)
     (1.0, -1.1)
     """

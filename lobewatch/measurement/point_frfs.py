@@ -83,10 +83,14 @@ def _find_measurements(row: PointRow, tip: PointRow) -> list[tuple[int | None, s
     return [(number, ROLES[points.response_node != row.node]) for number, points in same]
 
 
+_AXES = {0: "", 1: "x", 2: "y", 3: "z"}
+"""Axis by the number in a universal file, without rotations."""
+
+
 def _is_between(points: FrfPoints, row: PointRow, tip_node: int) -> bool:
     """Return whether an FRF is between a point and the tip, with hammer and sensor along the direction of the line."""
-    axis = abs(points.hit_direction)
-    is_along = axis == abs(points.response_direction) and (not row.direction or "xyz"[axis - 1] == row.direction[-1])
+    axis, wanted = _AXES.get(abs(points.hit_direction)), row.direction[-1:]
+    is_along = axis is not None and axis == _AXES.get(abs(points.response_direction)) and wanted in ("", axis)
     return is_along and sorted((points.response_node, points.hit_node)) == sorted((row.node or 0, tip_node))
 
 

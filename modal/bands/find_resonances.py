@@ -85,8 +85,8 @@ def find_resonances(frf: Frf, least_share: float = 0.0, *, noise: Floats | None 
     them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
     mobility are ignored, which saves time.
 
-    noise: noise rms of the mobility (m/s/N), shape (n,), of an FRF without drift whose modes were fitted before, so that
-    a rising phase is that of a disturbance.
+    noise: noise rms of the mobility (m/s/N), shape (n,), of an FRF without drift whose modes were fitted before. A
+    rising phase is then that of a disturbance.
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
     ConjugateError.

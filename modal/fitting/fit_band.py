@@ -17,14 +17,17 @@ MIN_CURVE_SEPARATION = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class ProjectedBand:
-    """Weighted FRFs of a band without residual terms."""
+    """Weighted FRFs of a band without residual terms.
+
+    FRFs with the same weights share one set of rows: s is then 1, otherwise p.
+    """
 
     root: Complexes
     """Values i f, (n,)."""
     weight: Floats
-    """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
+    """Weights of real, then of imaginary parts, (s, 1, 2 n)."""
     bases: Floats
-    """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (p, n, terms)."""
+    """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (s, n, terms)."""
     data: Floats
     """Weighted FRFs without residual terms, (p, 1, 2 n)."""
     free: Flags
@@ -38,9 +41,8 @@ class ProjectedBand:
         part = self.data @ q
         left = self.data - part @ q.mT
         linear = part @ inverse.mT
-        unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
-        squares = rows[:, 2 * m :].reshape(len(rows), 2, m, -1)
-        return FixedPoleFit(poles, self.free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
+        unknowns = linear.size + 2 * len(linear) * self.bases.shape[2]
+        return FixedPoleFit(poles, self.free, q, inverse, linear[:, 0], left[:, 0], unknowns, rows[:, 2 * m :])
 
 
 def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: Flags) -> ProjectedBand:
@@ -48,10 +50,11 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
 
     frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,).
     """
-    bases = _term_bases(frequency, weight, terms)
+    shared = weight[:1] if np.all(weight == weight[0]) else weight
+    bases = _term_bases(frequency, shared, terms)
     values = _project_out(bases, split_complex(weight * receptance)[:, np.newaxis])
     root = np.asarray(1j * frequency)
-    return ProjectedBand(root, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
+    return ProjectedBand(root, np.tile(shared, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
 
 
 def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
@@ -83,7 +86,7 @@ def _term_bases(frequency: Floats, weight: Floats, terms: int) -> Floats:
 
 
 def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
-    """Return orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse triangle, (p, c, c).
+    """Return orthonormal columns, (s, 2 n, c), that span rows (s, c, 2 n), and the inverse triangle, (s, c, c).
 
     By Cholesky, in half the time, if no row is nearly a sum of the others, which makes it as exact.
     """
@@ -114,7 +117,7 @@ def _model_rows(root: Complexes, poles: Floats) -> Floats:
 
 
 def _project_out(bases: Floats, values: Floats) -> Floats:
-    """Subtract from values (p, k, 2 n) their part in orthonormal bases (p, n, terms) of real and imaginary parts."""
+    """Subtract from values (p, k, 2 n) their part in orthonormal bases (s, n, terms) of real and imaginary parts."""
     parts = values.reshape(len(bases), -1, bases.shape[1])
     taken = parts @ bases @ bases.mT
     return np.subtract(parts, taken, out=taken).reshape(values.shape)

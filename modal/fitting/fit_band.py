@@ -140,6 +140,8 @@ NEARBY_FIT_STEPS = 2
 
 With five steps, sensors of the same measured hits agree no more often.
 """
+MAX_DROP_RATIO = 10.0
+"""Largest drop of the cost by all further steps over that predicted for the next one, hardly damped; chosen."""
 MIN_WORTHWHILE_GAIN = 1e-3
 """Least cost drop of a step over that by chance of one unknown: a thirtieth of an error."""
 
@@ -184,8 +186,9 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         band = project_band(frequency, receptance, weight, terms, fit.held)
         starts = _poles_for_real_constants(fit)
-        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS)
-        if has_converged and state.cost - fit.sum_of_squares <= allowed:
+        most = fit.sum_of_squares + allowed
+        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS, most=most)
+        if has_converged and state.cost <= most:
             across = fit.constant / state.constant
             return replace(_band_fit(state, fit.complex_fit), phase_if_complex=np.angle(across * np.sign(across.real)))
     return fit
@@ -225,8 +228,13 @@ def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, real, held)
 
 
-def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:
-    """Run a number of evaluations and return the state and whether it has converged."""
+def _descend(
+    band: ProjectedBand, starts: Floats, is_complex: bool, trials: int, most: float = np.inf
+) -> tuple[FixedPoleFit, bool]:
+    """Run a number of evaluations and return the state and whether it has converged.
+
+    A descent that will not reach a cost of at most `most` ends.
+    """
     state, damping = band.at(starts, is_complex), INITIAL_FIT_DAMPING
     for _ in range(trials):
         if not np.isfinite(state.cost):
@@ -235,6 +243,8 @@ def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int)
         size = float(np.abs(step).max(initial=0.0))
         if gain < MIN_WORTHWHILE_GAIN * state.cost / state.degrees_of_freedom or size < FIT_STEP_TOLERANCE:
             return state, True
+        if damping <= INITIAL_FIT_DAMPING and state.cost - MAX_DROP_RATIO * promise > most:
+            break
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             kept = (state.cost - trial.cost) / promise

@@ -243,7 +243,7 @@ def _descend(
         size = float(np.abs(step).max(initial=0.0))
         if gain < MIN_WORTHWHILE_GAIN * state.cost / state.degrees_of_freedom or size < FIT_STEP_TOLERANCE:
             return state, True
-        if damping <= INITIAL_FIT_DAMPING and state.cost - MAX_DROP_RATIO * promise > most:
+        if damping <= MIN_EFFECTIVE_FIT_DAMPING and state.cost - MAX_DROP_RATIO * promise > most:
             break
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:

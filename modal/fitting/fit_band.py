@@ -7,6 +7,7 @@ import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from modal.arrays import Complexes, Flags, Floats
 from modal.fitting.band_fit import BandFit, FixedPoleFit, residual_powers, split_complex
@@ -91,12 +92,12 @@ def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
     By Cholesky, in half the time, if no row is nearly a sum of the others, which makes it as exact.
     """
     gram = rows @ rows.mT
-    with contextlib.suppress(np.linalg.LinAlgError):
-        lower = np.linalg.cholesky(gram)
-        apart = lower.diagonal(axis1=1, axis2=2) ** 2 > MIN_CURVE_SEPARATION**2 * gram.diagonal(axis1=1, axis2=2)
-        if apart.all():
-            inverse = np.linalg.inv(lower).mT
-            return rows.mT @ inverse, inverse
+    lapack = scipy.linalg.lapack  # numpy takes as long for its checks as for a small matrix
+    lower, failed = zip(*(lapack.dpotrf(each, lower=1) for each in gram), strict=True)
+    lowest = np.array([each.diagonal() for each in lower]) ** 2 / gram.diagonal(axis1=1, axis2=2)
+    if not any(failed) and lowest.min() > MIN_CURVE_SEPARATION**2:
+        inverse = np.array([lapack.dtrtri(each, lower=1)[0].T for each in lower])
+        return rows.mT @ inverse, inverse
     q, triangle = np.linalg.qr(rows.mT)
     return q, np.linalg.inv(triangle)
 
@@ -263,6 +264,9 @@ def _damped_step(state: FixedPoleFit, damping: float) -> tuple[Floats, float, fl
     norm = np.sqrt(gram.diagonal())
     scaled = gram / (norm[:, np.newaxis] * norm)
     scaled.flat[:: norm.size + 1] += damping
-    step = np.linalg.solve(scaled, -gradient / norm) / norm
+    _, _, solution, failed = scipy.linalg.lapack.dgesv(scaled, -gradient / norm)
+    if failed:
+        raise np.linalg.LinAlgError("the unknowns of the mode fit are linearly dependent")
+    step = solution / norm
     gain = float(step @ gram @ step)
     return step, gain, float(-2 * step @ gradient) - gain

@@ -261,6 +261,8 @@ def _descend(
 def _damped_step(state: FixedPoleFit, damping: float) -> tuple[Floats, float, float]:
     """Return the damped Gauss-Newton step (k,), its squared model change (first order), and the predicted cost drop."""
     gram, gradient = state.gram, state.gradient
+    if not gradient.size:
+        return gradient, 0.0, 0.0
     norm = np.sqrt(gram.diagonal())
     scaled = gram / (norm[:, np.newaxis] * norm)
     scaled.flat[:: norm.size + 1] += damping

@@ -218,7 +218,7 @@ def _has_low_saddles(size: Floats, tops: Indices, limit: Floats) -> Flags:
     """
     sides = [(size, tops), (size[::-1], size.size - 1 - tops)]
     near = [_lowest_near(*side) for side in sides]
-    low = np.all([is_open | (lowest < limit) for lowest, is_open in near], axis=0)
+    low: Flags = np.all([is_open | (lowest < limit) for lowest, is_open in near], axis=0)
     for (values, places), (_, is_open) in zip(sides, near, strict=True):
         for i in np.flatnonzero(low & is_open).tolist():
             low[i] = _lowest_before_higher_value(values, int(places[i])) < limit[i]

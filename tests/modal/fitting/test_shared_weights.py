@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from modal import Mode
-from modal.fitting.band_fit import BandFit
-from modal.fitting.fit_band import fit_band, fit_real_constants, refit_nearby
+from modal.fitting.band_fit import BandFit, FixedPoleFit
+from modal.fitting.fit_band import ProjectedBand, fit_band, fit_real_constants, refit_nearby
 from modal.poles import fit_lscf_poles
 
 LINES = np.arange(400.0, 600.0)
@@ -68,3 +69,17 @@ def test_real_constants_are_fitted_unless_a_phase_is_seen() -> None:
     plain, turned = fitted(weight), fitted(weight, 0.7)
     assert not np.any(fit_real_constants(plain, LINES, receptances(0.0), weight, 4).constant.imag)
     assert fit_real_constants(turned, LINES, receptances(0.7), weight, 4) is turned
+
+
+def test_a_fit_of_real_constants_ends_as_soon_as_it_cannot_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    weight, evaluate, evaluated = weights()[0], ProjectedBand.at, list[float]()
+
+    def count(band: ProjectedBand, poles: NDArray[np.float64], is_complex: bool) -> FixedPoleFit:
+        state = evaluate(band, poles, is_complex)
+        evaluated.append(state.cost)
+        return state
+
+    turned = fitted(weight, 1.2)
+    monkeypatch.setattr(ProjectedBand, "at", count)
+    assert fit_real_constants(turned, LINES, receptances(1.2), weight, 4) is turned
+    assert len(evaluated) <= 2

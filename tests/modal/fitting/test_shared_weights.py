@@ -60,8 +60,8 @@ def test_trial_fits_and_poles_are_those_with_separate_columns() -> None:
         changed.append(np.concatenate([part.ravel() for part in trial]))
         chart = fit_lscf_poles(LINES, values, weight, 3)
         poles.append(np.column_stack([chart.frequency, chart.damping_ratio, chart.flexibility]))
-    assert np.allclose(*changed, rtol=1e-7)
-    assert np.allclose(*poles, rtol=1e-6)
+    assert np.allclose(changed[0], changed[1], rtol=1e-7)
+    assert np.allclose(poles[0], poles[1], rtol=1e-6)
 
 
 def test_real_constants_are_fitted_unless_a_phase_is_seen() -> None:

@@ -13,7 +13,6 @@ from acquisition.errors import join_sentences
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
-from lobewatch.measurement.chain_check import CHAIN_CODE
 from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
@@ -24,8 +23,6 @@ from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
-SHOWN_ASSEMBLY_CODES = (*DIRECTION_CODES, "predicted", CHAIN_CODE)
-"""Codes of the remarks on a tool that a verdict repeats."""
 
 
 class Stability(StrEnum):
@@ -185,6 +182,9 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     """Build the verdict on a program from its Monte Carlo result."""
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
+    if stability is Stability.STABLE:
+        unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
+        remarks += dict.fromkeys(filter(None, unrecorded))
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -250,7 +250,7 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
-    yield from (remark for remark in case.assembly.remarks if remark.code in SHOWN_ASSEMBLY_CODES)
+    yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
     assembly = case.assembly
     yield from (*assembly.questions, *assembly.uncovered, *assembly.unchecked, *assembly.hit_remarks)

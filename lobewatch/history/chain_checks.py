@@ -10,8 +10,8 @@ from acquisition import CROSS_TAP, Remark
 from lobewatch.history.history import HistoryRow
 from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
-from lobewatch.machine.settings.sensor_models import fits_sensor_models
 from lobewatch.measurement.chain_check import ChainCheck, ChainEvidence, not_recorded_remark, unchecked_remark
+from lobewatch.measurement.sensor_models import fits_sensor_models
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.measurement.tool_compliance import find_tool_beam, has_plausible_size
 from lobewatch.tool import Assembly

@@ -5,11 +5,13 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from lobewatch.cuts.learning.program_learning import evaluate_at_speed
+from lobewatch.history.chain_checks import ChainChecks
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.measurement.chain_check import ChainCheck
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
@@ -136,7 +138,24 @@ class Analysis:
         assembly = self.measurements.assembly_of(tool, places, rows)
         is_now = places[-1] is self.files.places[-1]
         damage = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
-        return replace(assembly, questions=(*assembly.questions, *damage))
+        return self.chain_checks.attach(replace(assembly, questions=(*assembly.questions, *damage)))
+
+    @property
+    def chain_checks(self) -> ChainChecks:
+        """Checks of the sensors behind the tap tests."""
+        files, rows = self.files, self.history.rows
+        of_files = files.by_id, files.contents.mass_checks, self.folder.path
+        return ChainChecks(self.machine, rows, *of_files, self.measurement)
+
+    def chain_check(self, tap_id: str) -> ChainCheck:
+        """Return the check of the sensors behind one tap test.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+        """
+        return self.chain_checks.check(tap_id)
 
     def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
         """Return the assembly of a tool, or the reason why there is none.
@@ -286,4 +305,6 @@ class Analysis:
         """
         files, time = self.files, now or datetime.now(UTC)
         acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
-        return assess_status(self.machine, self.history, time, self.folder.path, files.remarks, acknowledged, scatter)
+        chain = [*self.chain_checks.newest_remarks(self.history.current)]
+        of_files = files.remarks, acknowledged, scatter, chain
+        return assess_status(self.machine, self.history, time, self.folder.path, *of_files)

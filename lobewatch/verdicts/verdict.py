@@ -182,6 +182,9 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     """Build the verdict on a program from its Monte Carlo result."""
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
+    if stability is Stability.STABLE:
+        unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
+        remarks += dict.fromkeys(filter(None, unrecorded))
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -227,7 +230,7 @@ def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Return whether the compliance is known: both directions tapped and covered, no open question, no thin wall."""
+    """Return whether the compliance is known: both directions tapped and checked, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
@@ -241,16 +244,16 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         codes = dict.fromkeys(question.code for question in assembly.questions)
         cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
         return f"a tap test has an open question ({', '.join(codes)})", cure
-    if assembly.uncovered:
-        return describe_uncovered(assembly.uncovered)
-    return None
+    remarks = assembly.uncovered or assembly.unchecked
+    return describe_uncovered(remarks) if remarks else None
 
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
     yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
-    yield from (*case.assembly.questions, *case.assembly.uncovered, *case.assembly.hit_remarks)
+    assembly = case.assembly
+    yield from (*assembly.questions, *assembly.uncovered, *assembly.unchecked, *assembly.hit_remarks)
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark(

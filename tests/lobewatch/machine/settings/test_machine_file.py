@@ -14,7 +14,7 @@ from acquisition import DataError
 from dsm import MATERIALS
 from lobewatch.machine.settings.cut_tables import UncertaintyTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine_file, read_machine_file
-from lobewatch.machine.settings.setting_questions import hash_programs
+from lobewatch.machine.settings.setting_questions import find_all_questions, hash_programs
 from lobewatch.verdicts.uncertainty import DEFAULT_TAP_SCATTER
 
 pytestmark = pytest.mark.quick
@@ -94,6 +94,37 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
     assert short.bearings[0].position == pytest.approx(0.150)
     with pytest.raises(DataError, match=r"'end mill 13' .*'reference', 'end mill 12'"):
         machine.model("end mill 13")
+
+
+def with_elastic_constants(lines: str) -> str:
+    """Return the example without its material, and with these lines in [spindle]."""
+    return EXAMPLE.replace("youngs_modulus_gpa = 210.0\n", lines)
+
+
+def test_an_orthotropic_shaft_has_a_poisson_ratio_of_its_own() -> None:
+    carbon = with_elastic_constants("youngs_modulus_gpa = 120\nshear_modulus_gpa = 5\naxial_poisson_ratio = 0.3\n")
+    machine = parse_machine_file(carbon)
+    material = machine.model("reference").material
+    assert (material.youngs_modulus, material.shear_modulus, material.poisson_ratio) == (120e9, 5e9, 0.3)
+    assert not [question for question in find_all_questions(machine) if question.location == "[spindle]"]
+    assert b"axial_poisson_ratio" not in msgspec.json.encode(parse_machine_file(EXAMPLE).spindle)
+    assert machine.settings_hash != parse_machine_file(carbon.replace("= 0.3\n", "= 0.2\n", 1)).settings_hash
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("shear_modulus_gpa = 300\n", r"Poisson's ratio -0\.65.*theory"),
+        ("shear_modulus_gpa = 60\n", r"Poisson's ratio 0\.75.*axial_poisson_ratio"),
+        ("axial_poisson_ratio = -0.1\n", "spindle axial_poisson_ratio"),
+        ("axial_poisson_ratio = 0.6\n", "spindle axial_poisson_ratio"),
+    ],
+)
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_impossible_elastic_constants_are_rejected(lines: str, message: str, theory: str) -> None:
+    text = with_elastic_constants("youngs_modulus_gpa = 210\n" + lines)
+    with pytest.raises(DataError, match=message):
+        parse_machine_file(text.replace('theory = "euler-bernoulli"', f'theory = "{theory}"'))
 
 
 def test_measured_coefficients_next_to_a_material_count_and_leave_it_its_group() -> None:

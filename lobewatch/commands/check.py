@@ -13,7 +13,7 @@ def check(
     machine: shared.TappedMachine,
     program: Annotated[list[str] | None, Option(help="Program name, repeatable. Default: all programs.")] = None,
     speed: Annotated[
-        float | None, Option(parser=shared.number, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
+        float | None, Option(parser=shared.rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
     ] = None,
     depth: Annotated[float | None, Option(parser=shared.number, help="Axial depth of cut ap (mm).")] = None,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,

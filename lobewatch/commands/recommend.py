@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
+from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number, rpm
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
@@ -20,7 +20,7 @@ def recommend(
         Literal["up", "down"] | None, Option(help="Up or down milling. Default: the direction with the lower limit.")
     ] = None,
     depth: Annotated[float | None, Option(parser=number, help="Required axial depth of cut ap (mm).")] = None,
-    speed: Annotated[float | None, Option(parser=number, help="Present spindle speed (rpm).")] = None,
+    speed: Annotated[float | None, Option(parser=rpm, help="Present spindle speed (rpm).")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
     feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth (mm).")] = None,

@@ -80,6 +80,10 @@ EMULATED_SERIALS = (EMULATED_SERIAL, "EMU-1")
 """Serial numbers of emulated devices, with that of the TAPS/1 emulator."""
 
 
+RECORDING_MODEL_PREFIX = "replay of "
+"""Beginning of the model of a recording that is read like a device."""
+
+
 @dataclass(frozen=True)
 class DeviceIdentity:
     """Identity that a device reports."""
@@ -95,6 +99,11 @@ class DeviceIdentity:
     def is_emulated(self) -> bool:
         """True if the device says that it is emulated."""
         return self.serial in EMULATED_SERIALS
+
+    @property
+    def is_recording(self) -> bool:
+        """True if it is a recording that is read like a device."""
+        return self.model.startswith(RECORDING_MODEL_PREFIX)
 
 
 @dataclass(frozen=True)

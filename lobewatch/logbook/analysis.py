@@ -5,6 +5,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from lobewatch.cuts.learning.program_learning import evaluate_at_speed
+from lobewatch.history.chain_checks import ChainChecks
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
@@ -136,7 +137,13 @@ class Analysis:
         assembly = self.measurements.assembly_of(tool, places, rows)
         is_now = places[-1] is self.files.places[-1]
         damage = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
-        return replace(assembly, questions=(*assembly.questions, *damage))
+        return self.chain_checks.attach(replace(assembly, questions=(*assembly.questions, *damage)))
+
+    @property
+    def chain_checks(self) -> ChainChecks:
+        """Checks of the sensors behind the tap tests."""
+        files = self.files
+        return ChainChecks(self.machine, self.history.rows, files.by_id, files.contents.mass_checks, self.folder.path)
 
     def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
         """Return the assembly of a tool, or the reason why there is none.
@@ -286,4 +293,6 @@ class Analysis:
         """
         files, time = self.files, now or datetime.now(UTC)
         acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
-        return assess_status(self.machine, self.history, time, self.folder.path, files.remarks, acknowledged, scatter)
+        chain = [*self.chain_checks.newest_remarks(self.history.current)]
+        of_files = files.remarks, acknowledged, scatter, chain
+        return assess_status(self.machine, self.history, time, self.folder.path, *of_files)

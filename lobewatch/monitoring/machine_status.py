@@ -166,11 +166,12 @@ def assess_status(
     files: Sequence[Remark] = (),
     acknowledgements: Sequence[Acknowledgement] = (),
     scatter: FleetScatter | None = None,
+    chain: Sequence[Remark] = (),
 ) -> MachineStatus:
     """Assess the status of a machine at a time; the last row has the verdict on every program.
 
     path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first;
-    scatter: that of other machines.
+    scatter: that of other machines; chain: on newest tap tests whose sensors nothing has checked.
     """
     rows = history.current
     if not rows and files:
@@ -186,6 +187,7 @@ def assess_status(
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
     remarks += question_remarks({row.tap_id: row.questions for row in history.rows}, path, [row.tap_id for row in rows])
+    remarks += chain
     programs = [*_program_remarks(rows, machine)]
     raised += [_trigger_program_alarm(remark, rows) for remark in programs if rules.is_alarm(remark)]
     remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]

@@ -218,6 +218,7 @@ STATUS_RULES = (
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future"),
+    *_rules_of("chain-not-checked"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""

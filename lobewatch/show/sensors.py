@@ -114,6 +114,8 @@ def mass_check_json(check: MassCheck) -> JsonObject:
         "force_sensitivity_v_per_n": result.force_sensitivity,
         "acceleration_sensitivity_v_per_m_s2": result.acceleration_sensitivity,
         "remarks": result.remarks,
+        "journal": check.entry and check.entry.id,
+        "passed": check.entry and check.entry.passed,
     }
 
 
@@ -163,7 +165,7 @@ def mass_check_texts(check: MassCheck) -> list[str]:
     """Return the result of the mass check, and the change to make."""
     ratio = check.calibration.ratio
     if check.calibration.sizes_agree:
-        return [str(check.calibration)]
+        return [str(check.calibration), *_journal_lines(check)]
     force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
     if check.place is not None:
         force, acceleration = (
@@ -172,7 +174,17 @@ def mass_check_texts(check: MassCheck) -> list[str]:
         )
         place = check.place.place
     change = f"In {place}, multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}"
-    return [str(check.calibration), change]
+    return [str(check.calibration), change, *_journal_lines(check)]
+
+
+def _journal_lines(check: MassCheck) -> list[str]:
+    """Return what the check means for tap tests."""
+    if check.entry is None:
+        return ["Not stored, because the result is no measure of the sensitivities. Repeat the check."]
+    counts = "counts for all tap tests with this DAQ and these sensitivities"
+    if not check.entry.passed:
+        counts = "tap tests with this DAQ and these sensitivities since the last good check do not count as checked"
+    return [f"Stored as {check.entry.id}: {counts}"]
 
 
 def skew_check_texts(check: SkewCheck) -> list[str]:

@@ -13,6 +13,7 @@ from acquisition.errors import join_sentences
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
+from lobewatch.measurement.chain_check import CHAIN_CODE
 from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
@@ -23,6 +24,8 @@ from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
+SHOWN_ASSEMBLY_CODES = (*DIRECTION_CODES, "predicted", CHAIN_CODE)
+"""Codes of the remarks on a tool that a verdict repeats."""
 
 
 class Stability(StrEnum):
@@ -227,7 +230,7 @@ def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Return whether the compliance is known: both directions tapped and covered, no open question, no thin wall."""
+    """Return whether the compliance is known: both directions tapped and checked, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
@@ -241,16 +244,16 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         codes = dict.fromkeys(question.code for question in assembly.questions)
         cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
         return f"a tap test has an open question ({', '.join(codes)})", cure
-    if assembly.uncovered:
-        return describe_uncovered(assembly.uncovered)
-    return None
+    remarks = assembly.uncovered or assembly.unchecked
+    return describe_uncovered(remarks) if remarks else None
 
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
-    yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
+    yield from (remark for remark in case.assembly.remarks if remark.code in SHOWN_ASSEMBLY_CODES)
     yield from case.at_speed.remarks
-    yield from (*case.assembly.questions, *case.assembly.uncovered, *case.assembly.hit_remarks)
+    assembly = case.assembly
+    yield from (*assembly.questions, *assembly.uncovered, *assembly.unchecked, *assembly.hit_remarks)
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark(

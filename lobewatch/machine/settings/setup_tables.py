@@ -176,6 +176,7 @@ class ChannelTable(TomlTable, frozen=True):
     gain: Annotated[Positive, Plausible(0.2, 199)] = 1.0
     iepe: bool = True
     direction: TapDirection | Literal[""] = ""
+    model: str = ""
     serial_number: str = ""
     calibration_date: date | None = None
     skew_us: Annotated[float, Meta(ge=-1e6, le=1e6), Plausible(0.05, 49)] = 0.0

@@ -7,7 +7,7 @@ from typing import Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import Machine
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, show_address
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, print_remarks, show_address
 
 
 def tap(
@@ -55,6 +55,7 @@ def tap(
       lobewatch tap trial --port file:taps/ID.h5
     """
     from acquisition import Conditions, TapDirection, parse_direction
+    from lobewatch.fleet.copied_folders import find_copies
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status
@@ -65,6 +66,7 @@ def tap(
     from lobewatch.tap.visit import TapVisit, choose_first_direction
 
     folder, finished = MachineFolder(machine), list[TapSession]()
+    print_remarks(find_copies({machine.resolve().name: machine}).values())
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     is_single = bool(direction or as_json or port.startswith("file:"))
     is_guided = (screen or (notes.is_terminal and sys.stdin.isatty())) and not is_single

@@ -123,9 +123,11 @@ class MachineSummary(
         """File of the newest tap test in the folder, or empty."""
         return f"taps/{self.newest_tap_id}.h5" if self.newest_tap_id else ""
 
-    def status_at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> DatedStatus:
-        """Return the status at a time, with damage found since. `path` is that of the folder."""
-        left, remarks = None, self.remarks
+    def status_at(
+        self, now: datetime, path: Path | str, damage: Sequence[Remark] = (), copies: Sequence[Remark] = ()
+    ) -> DatedStatus:
+        """Return the status at a time, with damage found since and copies of the folder, whose path is `path`."""
+        left, remarks = None, status_rules.sort_by_severity([*self.remarks, *copies])
         if self.time is not None:
             left = status_rules.count_days_left(self.time, self.interval_days, now)
             dated = status_rules.date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)

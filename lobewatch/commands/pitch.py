@@ -4,7 +4,16 @@ from typing import Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import Flutes, Material, MillingDirection, TappedMachine, cut_fields, number, rpm
+from lobewatch.commands.shared_options import (
+    Flutes,
+    Material,
+    MillingDirection,
+    Now,
+    TappedMachine,
+    cut_fields,
+    number,
+    rpm,
+)
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
@@ -21,6 +30,7 @@ def pitch(
     diameter: Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")] = None,
     radial: Annotated[float | None, Option(parser=number, help="Radial depth of cut ae (mm).")] = None,
     direction: MillingDirection = None,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Propose unequal pitches for a cutter at one speed.
@@ -39,7 +49,7 @@ def pitch(
     from lobewatch.show.programs.recommendations import pitches_json, pitches_texts
 
     cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     with show_progress("comparing pitches"), time_step("lobes"):
         proposal = propose_requested_pitch(logbook, cut)
     remarks = logbook.remarks

@@ -58,6 +58,13 @@ AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
 CutDepth = Annotated[float | None, Option(parser=number, help="Axial depth of cut ap (mm). Default: from the program.")]
+Now = Annotated[
+    datetime | None,
+    Option(
+        callback=lambda value: value and value.astimezone(),
+        help="Date that the age of tap tests is counted to, for tests and scripts (local time). Default: now.",
+    ),
+]
 CutDate = Annotated[datetime | None, Option(help="Date of the cut (local time). Default: now.")]
 Seed = Annotated[int, Option(help="Seed of the random numbers.")]
 ReclampingScatter = Annotated[float, Option(help="Reclamping repeatability of f1: standard deviation (%), 0 to 5.")]

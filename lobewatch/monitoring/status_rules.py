@@ -16,6 +16,7 @@ import msgspec
 from acquisition import Remark
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, format_alarm_id
 from lobewatch.measurement.clock_questions import CLOCK_QUESTIONS, future_tap_remarks
+from lobewatch.measurement.tap_age import TOO_OLD_CODE
 
 
 class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "triggered_at": "raised"}):
@@ -220,7 +221,7 @@ STATUS_RULES = (
     MODE_LOST,
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
-    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future"),
+    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future", TOO_OLD_CODE),
     *_rules_of("chain-not-checked"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )

@@ -15,16 +15,18 @@ from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.measurement.chain_check import CHAIN_CODE
 from lobewatch.measurement.coverage import describe_uncovered
+from lobewatch.measurement.tap_age import OLD_CODE, TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
+from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
-SHOWN_ASSEMBLY_CODES = (*DIRECTION_CODES, "predicted", CHAIN_CODE)
+SHOWN_ASSEMBLY_CODES = (*DIRECTION_CODES, "predicted", CHAIN_CODE, OLD_CODE)
 """Codes of the remarks on a tool that a verdict repeats."""
 
 
@@ -210,6 +212,18 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         samples=result.samples,
         remarks=tuple(remarks),
     )
+
+
+def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
+    """Return a verdict as of now: at most doubtful if its tap tests are too old. aged: its tool with the age."""
+    found = [remark for remark in (*aged.remarks, *aged.unchecked) if remark.code in (OLD_CODE, TOO_OLD_CODE)]
+    verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *found))
+    is_limited = any(remark.code == TOO_OLD_CODE for remark in found) and verdict.is_stable
+    if not is_limited or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
+        return verdict
+    others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
+    advice = Remark("doubt-decides", verdict.program.name, *describe_uncovered(aged.unchecked))
+    return replace(verdict, stability=Stability.DOUBTFUL, decisive_cause=UNCHECKED.name, remarks=(*others, advice))
 
 
 def _unknown_verdict(

@@ -52,6 +52,17 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
 
 
+def tap_age_json(assembly: Assembly | None) -> int | None:
+    """Return the age of the newest tap test in whole days; None if unknown."""
+    return None if assembly is None or assembly.age_days is None else math.floor(assembly.age_days)
+
+
+def tap_age_text(assembly: Assembly) -> str:
+    """Return date and age of the newest tap test."""
+    age = tap_age_json(assembly)
+    return f"Newest tap test: {assembly.time.astimezone():%Y-%m-%d}" + ("" if age is None else f", {age} days old")
+
+
 def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """Return the notes below a table of verdicts: the state of the spindle, then the uncertainty, one cause each."""
     named, evaluated, learned = dict[tuple[str, ...], list[str]](), 0, list[Verdict]()
@@ -61,7 +72,10 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             named.setdefault(tuple(parts), []).append(verdict.program.name)
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
-    lines = [*NOT_ROTATING_TEXTS] if len(learned) < evaluated else []
+    aged = {verdict.assembly.tool: verdict.assembly for verdict in verdicts if verdict.assembly is not None}
+    tools = {tool: tap_age_text(assembly) for tool, assembly in aged.items()}
+    lines = [f"{tool}: {text}" if len(tools) > 1 else text for tool, text in tools.items()]
+    lines += [*NOT_ROTATING_TEXTS] if len(learned) < evaluated else []
     lines += [at_speed_text(learned)] if learned else []
     for causes, names in named.items():
         about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
@@ -177,6 +191,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "depth_mm": program.depth_mm,
         "feed": program.feed,
         "tap_id": assembly.tap_id if assembly else "",
+        "tap_age_days": tap_age_json(assembly),
         "stable": verdict.is_stable,
         "verdict": verdict.stability,
         "measured": verdict.is_measured,

@@ -232,7 +232,7 @@ class Analysis:
         """
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows, is_now = self.history.rows, until is None
-        until = rows[-1].tap_id if until is None and self.history.current else until
+        until = self._newest_id if is_now else until
         verdicts = self._cached_verdicts(until)
         missing = [table for table in tables if table.name not in verdicts]
         tools = {tool: self.assembly_or_reason(tool, until) for tool in {table.tool for table in missing}}
@@ -253,7 +253,13 @@ class Analysis:
         table
             Program to evaluate.
         """
-        return evaluate_at_speed(table, self.assembly_or_reason(table.tool), self.machine, self.cuts)
+        tool = self.assembly_or_reason(table.tool, self._newest_id)
+        return self._as_of_now(evaluate_at_speed(table, tool, self.machine, self.cuts))
+
+    @property
+    def _newest_id(self) -> str | None:
+        """Identity of the newest tap test; None without one since the baseline."""
+        return self.history.rows[-1].tap_id if self.history.current else None
 
     def _cached_verdicts(self, tap_id: str | None) -> dict[str, Verdict]:
         """Return the cached verdicts after a tap test, by program."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -94,6 +94,8 @@ class DeviceIdentity:
     """Serial number; empty if it has none."""
     firmware: str = ""
     """Version; empty if it has none."""
+    knows_sensors: bool = field(default=False, compare=False)
+    """True if it is emulated and says that its sensitivities are the true ones of its signals."""
 
     @property
     def is_emulated(self) -> bool:

@@ -19,8 +19,8 @@ def sensors(
 ) -> None:
     """Check hammer, accelerometer and DAQ.
 
-    Without options: channels, calibration dates, implausible values, and the sample rate against the clock. The journal keeps a check
-    with a known mass: it counts for all tap tests with the same DAQ and sensitivities, before and after it.
+    Without options: channels, calibration dates, implausible values, and the sample rate against the clock.
+    The journal keeps the check with a known mass. It counts for all tap tests with the same DAQ and sensitivities.
 
     Examples
     --------

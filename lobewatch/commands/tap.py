@@ -96,3 +96,7 @@ def tap(
             notes.print(f"stopped with {visit.state.good} good hits. Run the same command again to continue the test.")
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)
+    if is_guided and not screen:
+        from lobewatch.show.terminal.mass_check_offer import offer_mass_check
+
+        offer_mass_check(folder, finished[-1].saved[0], port, operator)

@@ -1,5 +1,6 @@
 """Evidence for the sensors behind tap tests: known mass, spindle model, another tool, or printed sensitivities."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
@@ -17,6 +18,10 @@ MAX_MODEL_STIFFNESS_RATIO = 1.2
 """Ratio of K to that of the calibrated model, or the inverse, up to which both agree; chosen.
 
 An error by a factor of 3 then needs a model that is wrong by a factor of 2.5 the other way."""
+MAX_DRAWING_STIFFNESS_RATIO = 2.0
+"""Ratio of K to that of the calibrated model, or the inverse, above which they contradict each other; chosen.
+
+A real spindle is not twice as stiff as its drawing says. Only a known mass counts then."""
 MAX_OTHER_TOOL_AGE = timedelta(hours=24)
 """Longest time between a tap test and that of another tool which is evidence for its chain; chosen."""
 
@@ -42,41 +47,47 @@ class ChainChecks:
         if entry.chain is None:
             return ChainCheck(tap_id, remark=not_recorded_remark(entry.tool), is_recorded=False)
         decides = find_deciding_check(entry.chain, entry.created, self._mass_checks)
-        if decides is not None and decides.passed:
+        is_measured = decides is not None and decides.mass_kg is not None
+        if decides is not None and decides.passed and is_measured:
             return ChainCheck(tap_id, ChainEvidence.MASS, decides.date)
-        if decides is None:
-            for found in self._find_other_evidence(entry, entry.chain):
-                return found
-        counting = [check for check in self._mass_checks if not check.excluded]
-        remark = unchecked_remark(entry.direction, self._path, decides, next(reversed(counting), None))
+        other = None if is_measured else next(self._find_other_evidence(entry, entry.chain, decides), None)
+        if other is not None:
+            return other
+        counting = [check for check in self._mass_checks if check.mass_kg is not None and not check.excluded]
+        remark = unchecked_remark(entry.direction, self._path, decides if is_measured else None, counting)
         return ChainCheck(tap_id, remark=remark)
 
-    def _find_other_evidence(self, entry: TapEntry, chain: SensorChain) -> Iterator[ChainCheck]:
+    def _find_other_evidence(
+        self, entry: TapEntry, chain: SensorChain, emulator: MassCheckEntry | None
+    ) -> Iterator[ChainCheck]:
+        """Yield all evidence but a mass, the strongest first; emulator: check that the emulated device brings."""
         row = self._rows.get(entry.id)
-        if row is not None and self._agrees_with_model(row):
-            yield ChainCheck(entry.id, ChainEvidence.MODEL, row.time)
+        ratio = math.nan if row is None else self._ratio_to_model(row)
+        if _is_within(ratio, MAX_MODEL_STIFFNESS_RATIO):
+            yield ChainCheck(entry.id, ChainEvidence.MODEL, entry.created)
         for other in reversed(self._rows.values()):
             is_near = abs(other.time - entry.created) <= MAX_OTHER_TOOL_AGE and other.tool != entry.tool
-            if is_near and self._entries[other.tap_id].chain == chain and self._agrees_with_model(other):
+            is_same = self._entries[other.tap_id].chain == chain
+            if is_near and is_same and _is_within(self._ratio_to_model(other), MAX_MODEL_STIFFNESS_RATIO):
                 yield ChainCheck(entry.id, ChainEvidence.OTHER_TOOL, other.time)
-        if fits_sensor_models(self._machine.daq, chain):
+        is_contradicted = math.isfinite(ratio) and not _is_within(ratio, MAX_DRAWING_STIFFNESS_RATIO)
+        if fits_sensor_models(self._machine.daq, chain) and not is_contradicted:
             yield ChainCheck(entry.id, ChainEvidence.SENSOR_MODELS, entry.created)
+        if emulator is not None and not is_contradicted:
+            yield ChainCheck(entry.id, ChainEvidence.EMULATOR, emulator.date)
 
-    def _agrees_with_model(self, row: HistoryRow) -> bool:
-        """Tell whether K of a tap test at the tip, without open questions, is that of its calibrated model."""
+    def _ratio_to_model(self, row: HistoryRow) -> float:
+        """Return K of a tap test at the tip over that of its calibrated model; NaN if unknown or in question."""
         if self._machine.tap.position_mm or row.questions or not row.stiffness.is_known:
-            return False
-        ratio = row.stiffness.value / row.modal_tip_stiffness
-        return 1 / MAX_MODEL_STIFFNESS_RATIO <= ratio <= MAX_MODEL_STIFFNESS_RATIO
+            return math.nan
+        return row.stiffness.value / row.modal_tip_stiffness
 
     def attach(self, assembly: Assembly) -> Assembly:
         """Return an assembly with the checks of its tap tests, and the remarks on those without evidence."""
         used = [assembly.taps[direction] for direction in assembly.directions if direction in assembly.taps]
         checks = tuple(map(self.check, used))
         recorded = [check.remark for check in checks if check.remark is not None and check.is_recorded]
-        others = dict.fromkeys(check.remark for check in checks if check.remark is not None and not check.is_recorded)
-        remarks = (*assembly.remarks, *others)
-        return replace(assembly, chain_checks=checks, unchecked=(*assembly.unchecked, *recorded), remarks=remarks)
+        return replace(assembly, chain_checks=checks, unchecked=(*assembly.unchecked, *recorded))
 
     def newest_remarks(self, rows: Sequence[HistoryRow]) -> Iterator[Remark]:
         """Yield the remarks on the newest tap tests of each tool and direction that nothing has checked."""
@@ -85,3 +96,8 @@ class ChainChecks:
             check = self.check(row.tap_id)
             if check.remark is not None and check.is_recorded and row.stiffness.is_known:
                 yield replace(check.remark, about=f"{row.tool}, {row.direction}")
+
+
+def _is_within(ratio: float, limit: float) -> bool:
+    """Tell whether a ratio and its inverse are up to a limit; NaN is not."""
+    return 1 / limit <= ratio <= limit

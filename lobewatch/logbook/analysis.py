@@ -11,6 +11,7 @@ from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.measurement.chain_check import ChainCheck
 from lobewatch.measurement.tap_age import is_too_old, old_remark, tap_age_days, too_old_remark
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
@@ -174,6 +175,16 @@ class Analysis:
         """Checks of the sensors behind the tap tests."""
         files = self.files
         return ChainChecks(self.machine, self.history.rows, files.by_id, files.contents.mass_checks, self.folder.path)
+
+    def chain_check(self, tap_id: str) -> ChainCheck:
+        """Return the check of the sensors behind one tap test.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+        """
+        return self.chain_checks.check(tap_id)
 
     def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
         """Return the assembly of a tool, or the reason why there is none.

@@ -220,6 +220,7 @@ class Logbook:
     initial_verdict = _answered_by(Analysis.initial_verdict)
     advice = _answered_by(Analysis.advice)
     status = _answered_by(Analysis.status)
+    chain_check = _answered_by(Analysis.chain_check)
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
         """Store a tap test permanently.

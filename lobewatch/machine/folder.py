@@ -105,8 +105,8 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     scatters = tuple(msgspec.convert(line, FleetScatter) for line in lines if line["kind"] == "scatter")
     cuts, events = journal_entries.read_committed_cuts(reading), journal_entries.read_events(lines)
     tests = tuple(taps), _sort_by_time(lost), tuple(remarks)
-    of_lines = events, len(reading.lines), cuts, acknowledged, scatters, journal_entries.read_mass_checks(lines)
-    return FolderContents(*tests, *of_lines)
+    checks = journal_entries.read_mass_checks(lines)
+    return FolderContents(*tests, events, len(reading.lines), cuts, acknowledged, scatters, checks)
 
 
 def _list_tap_sizes(folder: Path) -> dict[str, int]:

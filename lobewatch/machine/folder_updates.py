@@ -117,7 +117,7 @@ def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
 
 def _find_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
     contents = folder.contents()
-    others = [*contents.cuts, *contents.mass_checks]
+    others: list[CutEntry | MassCheckEntry] = [*contents.cuts, *contents.mass_checks]
     return lines.find_excludable_entry(name, [*contents.taps, *contents.lost], others, str(folder.path))
 
 

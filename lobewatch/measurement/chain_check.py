@@ -1,5 +1,6 @@
 """Check of the sensors behind a tap test: its evidence, and the remark without any."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -24,12 +25,15 @@ class ChainEvidence(StrEnum):
     """K of another tool of known drawing, tapped within a day with the same chain, agrees with the model."""
     SENSOR_MODELS = "sensor-models"
     """Sensitivities agree with those printed for the sensor models; excludes no wrong range or amplifier."""
+    EMULATOR = "emulator"
+    """Emulated device that states the sensitivities of its signals."""
 
 
 EVIDENCE_TEXTS = {
     ChainEvidence.MASS: "mass check",
     ChainEvidence.MODEL: "stiffness K agrees with the spindle model",
     ChainEvidence.OTHER_TOOL: "another tool agrees with its drawing",
+    ChainEvidence.EMULATOR: "emulated device",
     ChainEvidence.SENSOR_MODELS: "sensitivities agree with the sensor models",
 }
 """Words for each evidence."""
@@ -58,6 +62,12 @@ class ChainCheck:
         return f"{EVIDENCE_TEXTS[self.evidence]} ({self.date.astimezone():%Y-%m-%d})"
 
 
+def find_weakest_check(checks: Sequence[ChainCheck]) -> ChainCheck | None:
+    """Return the check on which a verdict rests: one without evidence, else the oldest; None without any."""
+    by_date = sorted(checks, key=lambda check: 0.0 if check.date is None else check.date.timestamp())
+    return next(iter(by_date), None)
+
+
 def not_recorded_remark(tool: str) -> Remark:
     """Return the remark on older or replayed tap tests."""
     text = "sensor chain not checked, because older and replayed tap tests do not record it"
@@ -65,18 +75,18 @@ def not_recorded_remark(tool: str) -> Remark:
 
 
 def unchecked_remark(
-    direction: str, path: Path | str, failed: MassCheckEntry | None, other: MassCheckEntry | None
+    direction: str, path: Path | str, failed: MassCheckEntry | None, others: Sequence[MassCheckEntry]
 ) -> Remark:
     """Return the remark on a tap test without evidence.
 
-    failed: failed mass check that decides on it; other: newest check of another chain.
+    failed: failed mass check that decides on it; others: mass checks, oldest first, of other chains if none failed.
     """
     command = f"{format_command('sensors', Path(path))} check_mass.mass KG"
     text, cure = "sensor chain not checked", f"Check both sensors with a known mass in two minutes: {command}"
     if failed is not None:
         text = f"mass check of {failed.date.astimezone():%Y-%m-%d} failed: ratio {failed.ratio:.3g}"
         cure = f"Correct the sensitivities, check the mass again with {command}, and tap again"
-    elif other is not None:
-        date = f"{other.date.astimezone():%Y-%m-%d}"
+    elif others:
+        date = f"{others[-1].date.astimezone():%Y-%m-%d}"
         text += f", because DAQ, sensitivity or range is not that of the mass check of {date}"
     return Remark(CHAIN_CODE, f"direction {direction}", text, cure)

@@ -13,7 +13,6 @@ from acquisition.errors import join_sentences
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
-from lobewatch.measurement.chain_check import CHAIN_CODE
 from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.measurement.tap_age import OLD_CODE, TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
@@ -26,8 +25,6 @@ from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
-SHOWN_ASSEMBLY_CODES = (*DIRECTION_CODES, "predicted", CHAIN_CODE, OLD_CODE)
-"""Codes of the remarks on a tool that a verdict repeats."""
 
 
 class Stability(StrEnum):
@@ -187,6 +184,10 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     """Build the verdict on a program from its Monte Carlo result."""
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
+    if stability is Stability.STABLE:
+        unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
+        remarks += dict.fromkeys(filter(None, unrecorded))
+        remarks += (remark for remark in case.assembly.remarks if remark.code == OLD_CODE)
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -216,10 +217,10 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
 
 def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
     """Return a verdict as of now: at most doubtful if its tap tests are too old. aged: its tool with the age."""
-    found = [remark for remark in (*aged.remarks, *aged.unchecked) if remark.code in (OLD_CODE, TOO_OLD_CODE)]
-    verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *found))
-    is_limited = any(remark.code == TOO_OLD_CODE for remark in found) and verdict.is_stable
-    if not is_limited or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
+    old = [remark for remark in aged.remarks if remark.code == OLD_CODE and verdict.stability is Stability.STABLE]
+    too_old = [remark for remark in aged.unchecked if remark.code == TOO_OLD_CODE and verdict.samples is not None]
+    verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *old, *too_old))
+    if not too_old or not verdict.is_stable or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
         return verdict
     others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
     advice = Remark("doubt-decides", verdict.program.name, *describe_uncovered(aged.unchecked))
@@ -264,7 +265,7 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
-    yield from (remark for remark in case.assembly.remarks if remark.code in SHOWN_ASSEMBLY_CODES)
+    yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
     assembly = case.assembly
     yield from (*assembly.questions, *assembly.uncovered, *assembly.unchecked, *assembly.hit_remarks)

@@ -230,7 +230,7 @@ def read_mass_checks(entries: Sequence[Mapping[str, Any]]) -> tuple[MassCheckEnt
     """Read the checks with a known mass, oldest first."""
     excluded = read_exclusion_reasons(entries)
     lines = [line for line in entries if line["kind"] == MASS_CHECK_KIND]
-    checks = [msgspec.convert(line | {"excluded": excluded.get(line["id"], "")}, MassCheckEntry) for line in lines]
+    checks = [msgspec.convert({**line, "excluded": excluded.get(line["id"], "")}, MassCheckEntry) for line in lines]
     return tuple(sorted(checks, key=attrgetter("date")))
 
 

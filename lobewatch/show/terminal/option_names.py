@@ -60,6 +60,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "Description.unit": "--unit",
     "DynamicsSource.FRF": "--source frf",
     "DynamicsSource.MODES": "--source modes",
+    "emulate_mass.mass": "--mass-kg",
     "EmulationSetup.tcp": "--tcp",
     "evaluate_requested.names": "--program",
     "exclude_entry": "exclude",

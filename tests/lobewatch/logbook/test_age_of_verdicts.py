@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 
 from lobewatch.fleet.fleet import Fleet
-from lobewatch.logbook import Logbook, compare_lobes
+from lobewatch.logbook import LobeComparison, Logbook, compare_lobes
 from lobewatch.logbook.requested_cuts import recommend_requested
 from lobewatch.notify.prometheus import format_prometheus
 from lobewatch.notify.publish_status import make_message_content
 from lobewatch.show.fleet.fleet_status import fleet_row
 from lobewatch.show.programs.verdicts import verdict_json
 from lobewatch.show.report.report_data import collect_report_data
+from lobewatch.tool import DynamicsSource, LobeMethod
 from tests.lobewatch.commands.invoke import invoke
 from tests.lobewatch.conftest import START, Shop
 
@@ -46,16 +47,18 @@ def without_interval(path: Path) -> Iterator[Path]:
     toml.write_text(text, "utf-8")
 
 
+def chart(logbook: Logbook) -> LobeComparison:
+    return compare_lobes(logbook, None, "B", DynamicsSource.MODES, LobeMethod.ZERO_ORDER)
+
+
 def everywhere(path: Path, now: datetime) -> dict[str, str]:
     """Return the verdict on the same cut in every output."""
     logbook = Logbook.open(path, now)
     (verdict,) = logbook.verdicts()
     (machine,) = Fleet({"m": path}).assess_machines(now)
-    (charted,) = compare_lobes(logbook, None, "B").verdicts
+    (charted,) = chart(logbook).verdicts
     (reported,) = logbook.query(collect_report_data, "reference", "x", None).programs
-    label = next(
-        line for line in format_prometheus([machine]).splitlines() if 'program="B"' in line and line[-1] != "0"
-    )
+    (label,) = (line for line in format_prometheus([machine]).splitlines() if 'program="B"' in line)
     return {
         "check": verdict.stability,
         "a cut of its own": logbook.verdict_for(verdict.program).stability,
@@ -63,7 +66,7 @@ def everywhere(path: Path, now: datetime) -> dict[str, str]:
         "report": reported.verdict.stability,
         "status": fleet_row(machine)["programs"]["B"],
         "MQTT": make_message_content(machine)["programs"]["B"],
-        "Prometheus": "doubtful" if "doubtful" in label else "stable",
+        "Prometheus": label.partition('word="')[2].partition('"')[0],
     }
 
 
@@ -88,7 +91,7 @@ def test_no_setting_is_recommended_on_an_old_test(path: Path) -> None:
     answers = [recommend_requested(Logbook.open(path, now), CUT, None) for now in (NEW, OLD)]
     assert [answer.setting is not None for answer in answers] == [True, False]
     assert answers[1].remedies == ("Tap again",)
-    assert compare_lobes(Logbook.open(path, OLD), None, "B").pockets == []
+    assert chart(Logbook.open(path, OLD)).pockets == []
 
 
 def test_stored_verdicts_do_not_depend_on_the_clock(path: Path) -> None:

@@ -223,7 +223,7 @@ def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
     if not too_old or not verdict.is_stable or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
         return verdict
     others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
-    advice = Remark("doubt-decides", verdict.program.name, *describe_uncovered(aged.unchecked))
+    advice = program_remarks.decisive_remark(verdict.program.name, *describe_uncovered(aged.unchecked))
     return replace(verdict, stability=Stability.DOUBTFUL, decisive_cause=UNCHECKED.name, remarks=(*others, advice))
 
 

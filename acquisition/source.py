@@ -94,7 +94,7 @@ class DeviceIdentity:
     """Serial number; empty if it has none."""
     firmware: str = ""
     """Version; empty if it has none."""
-    knows_sensors: bool = field(default=False, compare=False)
+    knows_sensors: bool = field(default=False, compare=False, kw_only=True)
     """True if it is emulated and says that its sensitivities are the true ones of its signals."""
 
     @property

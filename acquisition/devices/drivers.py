@@ -119,8 +119,8 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
-    serving = {"realtime": setup.realtime, "tcp": setup.tcp, "knows_sensors": True}
-    return TapsEmulator(signal, channels, setup.sample_rate, **serving)
+    rate, realtime = setup.sample_rate, setup.realtime
+    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, knows_sensors=True)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:

@@ -2,12 +2,15 @@
 
 import contextlib
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
 from lobewatch.commands.shared_options import Machine
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, print_remarks, show_address
+
+if TYPE_CHECKING:
+    from lobewatch.tap.visit import TapVisit
 
 
 def tap(
@@ -59,6 +62,7 @@ def tap(
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status
+    from lobewatch.show.mass_check_offer import offer_mass_check
     from lobewatch.show.measurement import emit_tap_results
     from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped
@@ -85,10 +89,7 @@ def tap(
     try:
         with contextlib.ExitStack() as screens:
             if screen:
-                from lobewatch.screen import ScreenServer  # imports aiohttp
-
-                server = screens.enter_context(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
-                show_address(server.url, server.watch_url)
+                _open_screen(screens, visit, listen, token, watch_token)
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
@@ -97,6 +98,14 @@ def tap(
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)
     if is_guided and not screen:
-        from lobewatch.show.terminal.mass_check_offer import offer_mass_check
-
         offer_mass_check(folder, finished[-1].saved[0], port, operator)
+
+
+def _open_screen(
+    screens: contextlib.ExitStack, visit: "TapVisit", listen: str, token: str | None, watch_token: str | None
+) -> None:
+    """Serve a visit in the browser until the context ends, and print the address."""
+    from lobewatch.screen import ScreenServer  # imports aiohttp
+
+    server = screens.enter_context(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
+    show_address(server.url, server.watch_url)

@@ -1,7 +1,7 @@
-"""Evidence for the sensors behind tap tests: known mass, spindle model, another tool, or printed sensitivities."""
+"""Evidence for the sensors behind tap tests: known mass, model, tool geometry, another tool, printed sensitivities."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -10,8 +10,10 @@ from acquisition import CROSS_TAP, Remark
 from lobewatch.history.history import HistoryRow
 from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
-from lobewatch.machine.settings.sensor_models import fits_sensor_models
 from lobewatch.measurement.chain_check import ChainCheck, ChainEvidence, not_recorded_remark, unchecked_remark
+from lobewatch.measurement.sensor_models import fits_sensor_models
+from lobewatch.measurement.tap_measurement import Measurement
+from lobewatch.measurement.tool_compliance import find_tool_beam, has_plausible_size
 from lobewatch.tool import Assembly
 
 MAX_MODEL_STIFFNESS_RATIO = 1.2
@@ -36,8 +38,14 @@ class ChainChecks:
         entries: Mapping[str, TapEntry],
         mass_checks: Sequence[MassCheckEntry],
         path: Path | str,
+        measure: Callable[[str], Measurement],
     ) -> None:
-        """Use these tap tests. rows: history; entries: by identity; path: machine folder, for commands."""
+        """Use these tap tests.
+
+        rows: history; entries: by identity; path: machine folder, for commands; measure: returns the measurement of a
+        tap test.
+        """
+        self._measure = measure
         self._machine, self._entries, self._mass_checks, self._path = machine, entries, mass_checks, path
         self._rows = {row.tap_id: row for row in rows if row.direction != CROSS_TAP}
 
@@ -62,19 +70,33 @@ class ChainChecks:
     ) -> Iterator[ChainCheck]:
         """Yield all evidence but a mass, the strongest first; emulator: check that the emulated device brings."""
         row = self._rows.get(entry.id)
-        ratio = math.nan if row is None else self._ratio_to_model(row)
-        if _is_within(ratio, MAX_MODEL_STIFFNESS_RATIO):
-            yield ChainCheck(entry.id, ChainEvidence.MODEL, entry.created)
+        own = None if row is None else self._agreement(row)
+        if own is not None:
+            yield ChainCheck(entry.id, own, entry.created)
         for other in reversed(self._rows.values()):
             is_near = abs(other.time - entry.created) <= MAX_OTHER_TOOL_AGE and other.tool != entry.tool
-            is_same = self._entries[other.tap_id].chain == chain
-            if is_near and is_same and _is_within(self._ratio_to_model(other), MAX_MODEL_STIFFNESS_RATIO):
+            if is_near and self._entries[other.tap_id].chain == chain and self._agreement(other):
                 yield ChainCheck(entry.id, ChainEvidence.OTHER_TOOL, other.time)
-        is_contradicted = math.isfinite(ratio) and not _is_within(ratio, MAX_DRAWING_STIFFNESS_RATIO)
-        if fits_sensor_models(self._machine.daq, chain) and not is_contradicted:
+        ratio = math.nan if row is None else self._ratio_to_model(row)
+        if math.isfinite(ratio) and not _is_within(ratio, MAX_DRAWING_STIFFNESS_RATIO):
+            return
+        if fits_sensor_models(self._machine.daq, chain):
             yield ChainCheck(entry.id, ChainEvidence.SENSOR_MODELS, entry.created)
-        if emulator is not None and not is_contradicted:
+        if emulator is not None:
             yield ChainCheck(entry.id, ChainEvidence.EMULATOR, emulator.date)
+
+    def _agreement(self, row: HistoryRow) -> ChainEvidence | None:
+        """Return the evidence of a tap test by itself: its spindle model, else the geometry of its tool."""
+        ratio = self._ratio_to_model(row)
+        if math.isfinite(ratio):
+            return ChainEvidence.MODEL if _is_within(ratio, MAX_MODEL_STIFFNESS_RATIO) else None
+        tool = None if row.questions or self._machine.tap.position_mm else find_tool_beam(self._machine, row.tool)
+        frf = None if tool is None else self._measure(row.tap_id).frf
+        if tool is None or frf is None:
+            return None
+        highest = frf.usable_band[1] if frf.usable_band else float(frf.frequency[-1])
+        is_plausible = has_plausible_size(self._measure(row.tap_id).at_tip, tool, highest)
+        return ChainEvidence.TOOL if is_plausible else None
 
     def _ratio_to_model(self, row: HistoryRow) -> float:
         """Return K of a tap test at the tip over that of its calibrated model; NaN if unknown or in question."""

@@ -173,8 +173,9 @@ class Analysis:
     @property
     def chain_checks(self) -> ChainChecks:
         """Checks of the sensors behind the tap tests."""
-        files = self.files
-        return ChainChecks(self.machine, self.history.rows, files.by_id, files.contents.mass_checks, self.folder.path)
+        files, rows = self.files, self.history.rows
+        of_files = files.by_id, files.contents.mass_checks, self.folder.path
+        return ChainChecks(self.machine, rows, *of_files, self.measurement)
 
     def chain_check(self, tap_id: str) -> ChainCheck:
         """Return the check of the sensors behind one tap test.

@@ -21,8 +21,10 @@ class ChainEvidence(StrEnum):
     """Known mass: excludes every error above 5 %."""
     MODEL = "model"
     """Stiffness K agrees with the calibrated spindle model, which follows the frequency only."""
+    TOOL = "tool-geometry"
+    """Compliance at the tip agrees with diameter, stick-out and material of the tool."""
     OTHER_TOOL = "other-tool"
-    """K of another tool of known drawing, tapped within a day with the same chain, agrees with the model."""
+    """Another tool, tapped within a day with the same chain, agrees with its model or geometry."""
     SENSOR_MODELS = "sensor-models"
     """Sensitivities agree with those printed for the sensor models; excludes no wrong range or amplifier."""
     EMULATOR = "emulator"
@@ -32,6 +34,7 @@ class ChainEvidence(StrEnum):
 EVIDENCE_TEXTS = {
     ChainEvidence.MASS: "mass check",
     ChainEvidence.MODEL: "stiffness K agrees with the spindle model",
+    ChainEvidence.TOOL: "compliance agrees with the geometry of the tool",
     ChainEvidence.OTHER_TOOL: "another tool agrees with its drawing",
     ChainEvidence.EMULATOR: "emulated device",
     ChainEvidence.SENSOR_MODELS: "sensitivities agree with the sensor models",

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquisition import Channel, Circumstances, Hit, HitFlags, MassCalibration, Structure, TapDirection, new_tap_id
 from acquisition.source import DeviceIdentity
@@ -17,9 +19,11 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import exclude_entry, store_mass_check
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
+from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
 from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
 from lobewatch.tap.tap_in_progress import average_hits
 from lobewatch.verdicts import Stability, Verdict
+from modal import Mode
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -230,6 +234,34 @@ def test_another_tool_that_agrees_with_its_drawing_on_the_same_day_serves_instea
     assert evidence(plain) == [None, None]
     tap(plain, "x", 0.3, sensors, tool="reference")
     assert evidence(plain) == [found, found]
+
+
+@given(share=st.floats(0.8, 1.0), length=st.floats(0.04, 0.15), is_soft=st.booleans())
+def test_the_geometry_of_a_tool_excludes_a_factor_of_3_in_every_plausible_spindle(
+    share: float, length: float, is_soft: bool
+) -> None:
+    tool = ToolBeam(0.016, length, length, "carbide")
+    true = tool.compliance * share + (SUPPORT_COMPLIANCE if is_soft else 0.0)
+
+    def is_plausible(compliance: float, highest: float = 2e4) -> bool:
+        return has_plausible_size([Mode(900.0, 0.02, 1 / compliance)], tool, highest)
+
+    assert not is_plausible(3.001 * true)
+    assert not is_plausible(true / 3.75)
+    assert is_plausible(1.5 * tool.compliance) or tool.compliance < SUPPORT_COMPLIANCE / 3.5
+    assert not is_plausible(1.5 * tool.compliance, 0.99 * tool.frequency)
+
+
+def test_a_tip_that_is_as_compliant_as_its_tool_serves_instead(plain: Shop) -> None:
+    described = '[[tool]]\nname = "plain"\ndiameter_mm = 50\ntool_material = "carbide"\nstick_out_mm = {}\n\n'
+    text = plain.path.joinpath("machine.toml").read_text("utf-8")
+    tap_both(plain)
+    found = []
+    for length in (163, 130, 220):  # the tip is 1.4, 2.8 and 0.6 times as compliant as the tool alone
+        marked = text.replace("[[program]]", described.format(length) + "[[program]]", 1)
+        plain.path.joinpath("machine.toml").write_text(marked, "utf-8")
+        found.append([check.evidence for check in verdict(plain).assembly.chain_checks])  # type: ignore[union-attr]
+    assert found == [["tool-geometry"] * 2, [None] * 2, [None] * 2]
 
 
 CHANNELS = """

@@ -12,7 +12,7 @@ from acquisition import Channel, DeviceIdentity, HammeredStructure, TapsSource, 
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.measurement.chain_check import ChainCheck, ChainEvidence
-from lobewatch.show.terminal import mass_check_offer
+from lobewatch.show import mass_check_offer
 from lobewatch.tap.device_connection import DeviceConnection
 from lobewatch.tap.emulated_mass import build_hung_mass, emulate_mass
 from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, emulate_machine

@@ -95,7 +95,7 @@ def test_nothing_is_known_of_pockets_without_such_a_tap(shop: Shop) -> None:
 
 
 def test_lobes_lists_speeds_without_depths(without_force: Shop) -> None:
-    told = run(without_force, "lobes", "--cut", "A", "--now", "2026-01-17")
+    told = run(without_force, "lobes", "--cut", "A")
     assert [pocket["depth_mm"] for pocket in told["pockets"]] == [None] * 3
     assert told["pockets"][1]["speed_rpm"] == pytest.approx(12850, rel=0.01)
     assert {remark["code"] for remark in told["remarks"]} == {"force-not-measured"}

@@ -2,14 +2,16 @@
 
 import contextlib
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
 from lobewatch.commands.shared_options import Machine
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, show_address
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, print_remarks, show_address
 
 if TYPE_CHECKING:
+    from lobewatch.machine import MachineFolder
     from lobewatch.tap.visit import TapVisit
 
 
@@ -59,7 +61,6 @@ def tap(
     """
     from acquisition import Conditions, TapDirection, parse_direction
     from lobewatch.logbook import Logbook
-    from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status
     from lobewatch.show.mass_check_offer import offer_mass_check
     from lobewatch.show.measurement import emit_tap_results
@@ -68,7 +69,7 @@ def tap(
     from lobewatch.tap.session import TapSession, plan_session
     from lobewatch.tap.visit import TapVisit, choose_first_direction
 
-    folder, finished = MachineFolder(machine), list[TapSession]()
+    folder, finished = _open_folder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     is_single = bool(direction or as_json or port.startswith("file:"))
     is_guided = (screen or (notes.is_terminal and sys.stdin.isatty())) and not is_single
@@ -97,6 +98,16 @@ def tap(
     emit_tap_results(Logbook(folder), finished, as_json, details)
     if is_guided and not screen:
         offer_mass_check(folder, finished[-1].saved[0], port, operator)
+
+
+def _open_folder(path: Path) -> "MachineFolder":
+    """Open a machine folder, and print a note if another folder next to it is a copy."""
+    from lobewatch.fleet.copied_folders import find_copies
+    from lobewatch.machine import MachineFolder
+
+    folder = MachineFolder(path)
+    print_remarks(find_copies({path.resolve().name: path}).values())
+    return folder
 
 
 def _open_screen(

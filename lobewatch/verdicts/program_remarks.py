@@ -180,4 +180,9 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     if assembly.unchecked:
         values["unchecked"], values["unchecked_remedy"] = describe_uncovered(assembly.unchecked)
     values |= {"missing": missing, "missing_remedy": missing_remedy}
-    return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+    return decisive_remark(table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+
+
+def decisive_remark(program: str, text: str, cure: str) -> Remark:
+    """Return the remark on the decisive cause of a doubtful verdict."""
+    return Remark("doubt-decides", program, text, cure)

@@ -53,6 +53,24 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
 
 
+def tap_age_json(assembly: Assembly | None) -> int | None:
+    """Return the age of the newest tap test in whole days; None if unknown."""
+    return None if assembly is None or assembly.age_days is None else math.floor(assembly.age_days)
+
+
+def tap_age_text(assembly: Assembly) -> str:
+    """Return date and age of the newest tap test."""
+    age = tap_age_json(assembly)
+    return f"Newest tap test: {assembly.time.astimezone():%Y-%m-%d}" + ("" if age is None else f", {age} days old")
+
+
+def _tap_age_lines(verdicts: Sequence[Verdict]) -> list[str]:
+    """Return a line on the newest tap test of each tool."""
+    tools = {verdict.assembly.tool: verdict.assembly for verdict in verdicts if verdict.assembly is not None}
+    texts = {tool: tap_age_text(assembly) for tool, assembly in tools.items()}
+    return [f"{tool}: {text}" if len(tools) > 1 else text for tool, text in texts.items()]
+
+
 def chain_json(assembly: Assembly | None) -> JsonObject | None:
     """Return the evidence for the sensors behind a tool and its date; None for a prediction."""
     check = None if assembly is None else find_weakest_check(assembly.chain_checks)
@@ -78,7 +96,7 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             named.setdefault(tuple(parts), []).append(verdict.program.name)
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
-    lines = _chain_lines(verdicts)
+    lines = [*_tap_age_lines(verdicts), *_chain_lines(verdicts)]
     lines += NOT_ROTATING_TEXTS if len(learned) < evaluated else ()
     lines += [at_speed_text(learned)] if learned else []
     for causes, names in named.items():
@@ -195,6 +213,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "depth_mm": program.depth_mm,
         "feed": program.feed,
         "tap_id": assembly.tap_id if assembly else "",
+        "tap_age_days": tap_age_json(assembly),
         "stable": verdict.is_stable,
         "verdict": verdict.stability,
         "measured": verdict.is_measured,

@@ -65,9 +65,11 @@ def _stiffness_ratios(calibration: Calibration) -> Floats:
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
 
 
-def apply_drops(samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0) -> ProgramSamples:
-    """Apply each of some frequency drops (k,) to all samples, one after the other; speed: relative, one or (k,)."""
-    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]))
+def apply_drops(
+    samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0, force: Factors = 1.0
+) -> ProgramSamples:
+    """Apply each of some frequency drops (k,) to all samples; speed and force: relative, one or (k,)."""
+    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]), force)
 
 
 def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
@@ -169,7 +171,9 @@ class Setting:
     depth_margin: float
     """Depth margin: median limit over depth, less 1."""
     drop_margin: float
-    """Relative frequency drop up to which it stays stable; 0.1 means 0.1 or more."""
+    """Relative frequency drop by age, beyond that at speed, up to which it stays stable; 0.1 means 0.1 or more."""
+    chatter_risk: float = math.nan
+    """Chatter risk with the spindle rotating (0 to 1)."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
@@ -177,7 +181,7 @@ WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
 ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
 """Speed factor in both directions within which a setting must be safe; chosen."""
 ROBUST_DEPTH_FACTOR = 1.05
-"""Depth factor up to which a setting must be safe; chosen."""
+"""Depth factor up to which a setting must be safe, as a factor on the force; chosen."""
 MIN_DEPTH_MARGIN = 0.20
 """Smallest depth margin of a recommended setting in the median estimate; chosen."""
 MIN_ROBUST_DROP = 0.01
@@ -187,14 +191,16 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
-    return apply_drops(samples, np.array([0, drop]), stiffness_at, np.array([1 / ROBUST_SPEED_FACTOR, 1]))
+    """Sweep all samples over the extremes, one at a time: slower, the frequency drop by age, and more depth."""
+    drops, speeds = np.array([0, drop, 0]), np.array([1 / ROBUST_SPEED_FACTOR, 1, 1])
+    return apply_drops(samples, drops, stiffness_at, speeds, np.array([1, 1, ROBUST_DEPTH_FACTOR]))
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over both speeds, the frequency drop and half of it."""
-    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR])
-    return apply_drops(samples, np.array([0, drop, drop / 2, 0]), stiffness_at, speeds)
+    """Sweep all samples over both speeds, the frequency drop by age, half of it, and more depth, one at a time."""
+    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR, 1])
+    deeper = np.array([1, 1, 1, 1, ROBUST_DEPTH_FACTOR])
+    return apply_drops(samples, np.array([0, drop, drop / 2, 0, 0]), stiffness_at, speeds, deeper)
 
 
 def find_speed_window(

@@ -128,8 +128,8 @@ def is_verdict_missing(ruling: StoredVerdict | None, drops: bool) -> bool:
 
 
 def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Return the largest drop up to which no sample chatters."""
-    most = min(last, float(CALIBRATED_DROPS[-1]))
+    """Return the largest drop by age up to which no sample chatters, each at its own drop at speed."""
+    samples, most = samples.at_speed(), min(last, float(CALIBRATED_DROPS[-1]))
 
     def chatters(drop: float) -> bool:
         return bool(np.any(apply_drops(samples, np.array([drop]), stiffness_at).growth(depth) >= 0))

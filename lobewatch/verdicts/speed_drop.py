@@ -5,6 +5,7 @@ The modal masses stay, so that K drops with the square of the frequency, and zet
 in proportion to what softer bearings do to it in the model of the spindle, and alike without a model.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -13,7 +14,7 @@ import numpy as np
 from dsm import Calibration, natural_frequencies
 from lobes import MillingRows
 from lobewatch.arrays import Floats
-from lobewatch.machine import Machine
+from lobewatch.machine import Machine, SpeedTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.uncertainty import scale_fields
 
@@ -71,6 +72,8 @@ class SpeedDrop:
         return scale_fields(rows, frequency=lower, stiffness=lower**2)
 
 
+DEFAULT_DROP = SpeedDrop(*SpeedTable().drop_range(math.inf))
+"""Drop of a machine that states none."""
 NO_DROP = SpeedDrop()
 """No drop, as where test cuts show the spindle at speed."""
 

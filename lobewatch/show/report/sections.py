@@ -124,7 +124,7 @@ def _program_row(program: ProgramAdvice, dates: dict[str, list[str]]) -> list[st
         alternative_text(program),
         format_rpm(verdict.program.speed_rpm),
         f"{verdict.program.depth_mm:g}",
-        verdicts.limits_text(verdict).replace("..", " to "),
+        verdicts.limits_text(verdict).replace("..", " to ").replace("\n", ", "),
         verdicts.margin_text(verdict),
         verdicts.chatter_risk_text(verdict),
         frequency_margin_text(program.advice),

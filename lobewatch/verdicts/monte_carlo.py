@@ -179,6 +179,8 @@ N_HARDEST_SAMPLES, N_SOFTEST_SAMPLES = 24, 8
 """Numbers of samples checked over the whole drop at speed: nearest to chatter, and with the most force on a mode."""
 SHALLOWER_SHARE = 0.12
 """Share of a depth at which the limit at speed is searched next, if all of it chatters."""
+REFINED_LIMIT_SHARE = 1.03
+"""Depth over the first estimate of the limit at speed up to which it is refined."""
 MIN_LIMIT = 1e-6
 """Smallest limit at speed that is searched (m)."""
 
@@ -194,7 +196,7 @@ def find_limit_at_speed(samples: ProgramSamples, depth: float) -> float:
     while found == 0 and tried > MIN_LIMIT:
         tried *= SHALLOWER_SHARE
         found = find_deepest_stable(median, tried)
-    return limit if found == most else found
+    return limit if found == most else find_deepest_stable(median, REFINED_LIMIT_SHARE * found)
 
 
 def find_chattering_at_speed(samples: ProgramSamples, depth: float) -> Flags:

@@ -159,8 +159,13 @@ def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
     return evaluate_samples(case.depth, worst, program_samples.draw_samples(case, worst))
 
 
-def evaluate_samples(depth: float, worst: WorstLimit, samples: ProgramSamples) -> MonteCarloResult:
-    """Evaluate all samples of a program at its depth (m): limits, quantiles, samples that chatter."""
+def evaluate_samples(
+    depth: float, worst: WorstLimit, samples: ProgramSamples, turning: Flags | None = None
+) -> MonteCarloResult:
+    """Evaluate all samples of a program at its depth (m): limits, quantiles, samples that chatter.
+
+    turning: samples that chatter at speed (`find_chattering_at_speed`), if they have been found already.
+    """
     median, _, axes_ratio = worst
     limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
@@ -168,9 +173,9 @@ def evaluate_samples(depth: float, worst: WorstLimit, samples: ProgramSamples) -
     around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
     chatters = _find_chattering(samples, (samples.limits <= below) | around, around, limits, depth)
     at_speed = find_limit_at_speed(samples, depth)
-    turning = np.zeros(len(samples.rows), dtype=np.bool_)
-    if median.stable and not np.any(chatters):
-        turning = find_chattering_at_speed(samples, depth)
+    if turning is None:
+        is_calm = median.stable and not np.any(chatters)
+        turning = find_chattering_at_speed(samples, depth) if is_calm else np.zeros(len(samples.rows), dtype=np.bool_)
     lowest = float(np.min(limits))
     return MonteCarloResult(median, lowest, float(low), float(high), samples, chatters, axes_ratio, at_speed, turning)
 
@@ -190,7 +195,7 @@ def find_limit_at_speed(samples: ProgramSamples, depth: float) -> float:
     limit = float(samples.limits[0])
     if samples.drop.is_zero:
         return limit
-    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * limit, MAX_WIDER_FEEDS) if np.isfinite(limit) else samples
+    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS) if np.isfinite(limit) else samples
     median, most = near[np.zeros(1, dtype=np.intp)].over_drops(), min(limit, MAX_PROGRAM_DEPTH_RATIO * depth)
     found, tried = find_deepest_stable(median, most), most
     while found == 0 and tried > MIN_LIMIT:

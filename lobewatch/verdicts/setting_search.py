@@ -14,12 +14,18 @@ from functools import cached_property
 import numpy as np
 
 from lobes import Program
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, estimate_chatter_risk, evaluate_samples
+from lobewatch.verdicts.monte_carlo import (
+    SKIPPED_CUT_MARGIN,
+    MonteCarloResult,
+    estimate_chatter_risk,
+    evaluate_samples,
+    find_chattering_at_speed,
+)
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.program_samples import (
     N_PROGRAM_SAMPLES,
@@ -255,9 +261,12 @@ class SettingSearch:
         grown = around.critical_growth(depth)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        result = evaluate_samples(depth, worst, samples)
+        turning = find_chattering_at_speed(samples, depth)
+        if np.any(turning):
+            return self._depth_below(samples.over_drops(), turning, depth_mm)
+        result = evaluate_samples(depth, worst, samples, turning)
         if not result.is_stable_throughout:
-            return self._depth_below(result, depth_mm)
+            return min(self._depth_below(samples, np.append(False, result.chatters), depth_mm), 1e3 * result.lowest)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
         left = robustness.find_drop_margin(hardest, depth, self.stiffness_at)
@@ -265,16 +274,12 @@ class SettingSearch:
         risk = estimate_chatter_risk(result, depth, self.case.at_speed.n_cuts)
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left, risk)
 
-    def _depth_below(self, result: MonteCarloResult, depth_mm: float) -> float:
-        """Return a smaller depth (mm) at which the samples that chatter may be stable, not rotating and at speed."""
-        places, samples = 1 + np.flatnonzero(result.chatters), result.samples
-        if not places.size:
-            places = np.flatnonzero(result.chatters_at_speed)
+    def _depth_below(self, samples: ProgramSamples, chatters: Flags, depth_mm: float) -> float:
+        """Return a smaller depth (mm) at which the samples that chatter may be stable, with all their drops."""
+        places = np.flatnonzero(chatters)[:N_WINDOW_SAMPLES]
         self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-        few = samples[places[:N_WINDOW_SAMPLES]]
-        if not np.any(result.chatters):
-            few = few.over_drops()
-        calm = min(find_deepest_stable(few, depth_mm / 1e3), result.lowest)
+        repeated = np.add.outer(np.arange(0, len(samples.rows), chatters.size), places).ravel()
+        calm = find_deepest_stable(samples[repeated], depth_mm / 1e3)
         return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
 
     def _reduced_depth(self, samples: ProgramSamples, grown: Floats, depth_mm: float) -> float:

@@ -16,7 +16,14 @@ from lobewatch.logbook import Analysis, LobeComparison, Logbook
 from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
-from lobewatch.show.programs.verdicts import at_speed_text, chance_text, verdict_json, verdict_notes, verdict_table
+from lobewatch.show.programs.verdicts import (
+    at_speed_text,
+    chance_text,
+    limits_at_speed_lines,
+    verdict_json,
+    verdict_notes,
+    verdict_table,
+)
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
@@ -265,7 +272,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
         texts += [heading, pocket_table(comparison.pockets)]
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
     if verdicts:
-        texts.append(verdict_table(verdicts))
+        texts += [verdict_table(verdicts), *limits_at_speed_lines(verdicts)]
         methods = dict.fromkeys(verdict.method for verdict in verdicts if verdict.method)
         texts += [f"Verdicts computed by {method}, as in lobewatch check" for method in methods]
     if taught := [verdict for verdict in verdicts if verdict.n_cuts]:

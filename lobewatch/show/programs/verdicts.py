@@ -22,7 +22,7 @@ from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
 NOT_ROTATING_TEXTS = (
-    "Limits are for the spindle as tapped, not rotating. The limit at speed is the lowest over the frequency drop.",
+    "Limits in the table are for the spindle as tapped, not rotating.",
     "The chatter risk is estimated for the rotating spindle, not measured.",
 )
 """Notes on reading a table of verdicts."""
@@ -62,6 +62,7 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
     lines = [*NOT_ROTATING_TEXTS, speed_drop_text(machine)] if len(learned) < evaluated else []
+    lines += limits_at_speed_lines(verdicts)
     lines += [at_speed_text(learned)] if learned else []
     for causes, names in named.items():
         about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
@@ -74,6 +75,17 @@ def speed_drop_text(machine: Machine) -> str:
     low, high = machine.speed.drop_percent
     source = "assumed" if machine.speed.drop_percent == SpeedTable().drop_percent else FROM_MACHINE_FILE
     return f"Stable covers a frequency drop at speed of {low:g} to {high:g} % ({source})."
+
+
+def limits_at_speed_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Yield one line with the lowest limit of each program over the frequency drop; none for learned ones."""
+    texts = [
+        f"{verdict.program.name} {limit_at_speed_text(verdict)}"
+        for verdict in verdicts
+        if not (verdict.n_cuts or math.isnan(verdict.limit_at_speed))
+    ]
+    if texts:
+        yield f"Limit at speed, lowest over the frequency drop (mm): {', '.join(texts)}"
 
 
 def at_speed_text(verdicts: Sequence[Verdict]) -> str:
@@ -219,11 +231,14 @@ def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> T
 
 
 def limits_text(verdict: Verdict) -> str:
-    """Return the median limit (mm) with its band, and the limit at speed if it is lower."""
+    """Return the median limit (mm) with its band."""
     band = band_text(verdict)
-    at_speed = verdict.limit_at_speed < verdict.limit
-    lines = [limit_text(verdict) + (f" ({band})" if band else "")]
-    return "\n".join([*lines, *([f"at speed {1e3 * verdict.limit_at_speed:.2f}"] if at_speed else [])])
+    return limit_text(verdict) + (f" ({band})" if band else "")
+
+
+def limit_at_speed_text(verdict: Verdict) -> str:
+    """Return the lowest limit (mm) over the frequency drop at speed."""
+    return "-" if math.isnan(verdict.limit_at_speed) else _depth_text(verdict.limit_at_speed, verdict)
 
 
 def limit_text(verdict: Verdict) -> str:

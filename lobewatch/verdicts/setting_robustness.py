@@ -17,6 +17,7 @@ from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.monte_carlo import find_chattering_at_speed
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.uncertainty import Factors
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
@@ -206,7 +207,10 @@ def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: Stiff
 def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
-    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
+    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable, not rotating and at speed.
+
+    hardest: some samples at speed, which are checked first.
+    """
     ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * np.arange(MAX_WINDOW_STEPS + 1.0)) for sign in (-1, 1))
     slow, fast = (_last_stable_ratio(near, hardest, ratio, depth) for ratio in ratios)
     slowest = math.ceil(max(speed * slow, reach.low_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
@@ -228,9 +232,14 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
         last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
         if last < steps[-1]:
             break
-    while last > 0 and np.any(near.sweep(ratio[last : last + 1]).critical_growth(depth) >= 0):
+    while last > 0 and _has_chatter(near.sweep(ratio[last : last + 1]), depth):
         last //= 2
     return float(ratio[last])
+
+
+def _has_chatter(samples: ProgramSamples, depth: float) -> bool:
+    """Return whether a sample chatters at a depth (m), not rotating or at speed."""
+    return bool(np.any(samples.critical_growth(depth) >= 0) or np.any(find_chattering_at_speed(samples, depth)))
 
 
 def _last_stable_row(grown: Floats) -> int:

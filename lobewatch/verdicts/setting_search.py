@@ -256,8 +256,8 @@ class SettingSearch:
         grown = samples.median_growth_near(
             SKIPPED_CUT_MARGIN * deep / (1 - samples.drop.largest) ** 2, drop, robustness.ROBUST_SPEED_FACTOR
         )
-        near = samples.with_cuts(grown >= 0).at_speed()
-        around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
+        near = samples.with_cuts(grown >= 0)
+        around = robustness.sweep_neighborhood(near.at_speed(), self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(depth)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
@@ -267,7 +267,7 @@ class SettingSearch:
         result = evaluate_samples(depth, worst, samples, turning)
         if not result.is_stable_throughout:
             return min(self._depth_below(samples, np.append(False, result.chatters), depth_mm), 1e3 * result.lowest)
-        hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
+        hardest = near.at_speed()[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
         left = robustness.find_drop_margin(hardest, depth, self.stiffness_at)
         self.results[speed, depth_mm] = result

@@ -41,6 +41,8 @@ class Outcome:
 
     number: int
     table: ProgramTable
+    risk: float
+    """Chance of chatter at speed as stated."""
     chatters: tuple[bool, ...] = ()
 
     @property
@@ -138,13 +140,37 @@ def study(numbers: Sequence[int], seed: int, most_modes: int = 3, n_programs: in
         for _ in range(n_programs):
             table = program(milling, limit * rng.uniform(*SHARES_OF_LIMIT))
             counts.n_programs += 1
-            if evaluate_program(table, tool, MACHINE).stability is Stability.STABLE:
-                counts.programs.append(judge(milling, Outcome(number, table)))
+            verdict = evaluate_program(table, tool, MACHINE)
+            if verdict.stability is Stability.STABLE:
+                counts.programs.append(judge(milling, Outcome(number, table, verdict.chatter_risk)))
         start = time.process_time()
         setting = recommend(program(milling, 1.0), tool, MACHINE, NO_TEST_CUTS).setting
         counts.seconds.append(time.process_time() - start)
         if setting is not None:
             place = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm}
             table = msgspec.structs.replace(program(milling, 1.0), **place)
-            counts.settings.append(judge(milling, Outcome(number, table)))
+            counts.settings.append(judge(milling, Outcome(number, table, setting.chatter_risk)))
     return counts
+
+
+def chance_truths(milling: RandomMilling, outcome: Outcome, count: int, rng: np.random.Generator) -> list[Case]:
+    """Return truths as the stated chance assumes them: drop 0 to 5 %, zeta, K, Kt and speed, in one feed direction."""
+    made = []
+    for _ in range(count):
+        drop, (damping, stiffness, force) = rng.uniform(0, 0.05), rng.standard_normal(3) * (0.25, 0.10, 0.30)
+        damped, stiff, push = (max(1 + part, 0.1) for part in (damping, stiffness, force))
+        x, y = (
+            tuple((f, 1.1 * damped * zeta, stiff * k) for f, zeta, k in drop_modes(modes, drop))
+            for modes in (milling.x, milling.y)
+        )
+        push *= rng.uniform(0.8, 1.2)
+        true = replace(
+            milling,
+            x=x,
+            y=y,
+            tangential=push * milling.tangential,
+            radial=push * rng.uniform(0.8, 1.2) * milling.radial,
+            speed_rpm=outcome.table.speed_rpm * rng.uniform(0.99, 1.01),
+        )
+        made.append(true.case(outcome.table.depth_mm / 1e3, float(rng.choice(milling.feed_angles))))
+    return made

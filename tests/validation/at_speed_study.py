@@ -64,7 +64,7 @@ class Study:
 
     def count(self, outcomes: Sequence[Outcome]) -> list[int]:
         """Count the outcomes that chatter at each of `DROPS`."""
-        return np.sum([outcome.chatters for outcome in outcomes], axis=0, dtype=int).tolist()
+        return [sum(outcome.chatters[place] for outcome in outcomes) for place in range(len(DROPS))]
 
 
 def draw_machine(rng: np.random.Generator, most_modes: int = 3) -> RandomMilling:

@@ -156,9 +156,11 @@ def test_a_recommended_setting_is_stable_over_the_drop_and_ageing() -> None:
     modes = MODE, Mode(1500.0, 0.04, 6e7)
     answer = recommend(cut(), tool(*modes), machine(), SpindleAtSpeed())
     assert answer.setting is not None
+    assert answer.verdict is not None
     setting = answer.setting
     limits = [true_limit(setting.speed_rpm, drop, *modes) for drop in np.linspace(0, 0.07, 15)]
     assert setting.depth_mm < min(limits)
     assert answer.verdict.chatter_risk == setting.chatter_risk
     free = recommend(cut(), tool(*modes), machine("drop_percent = [0, 0]"), SpindleAtSpeed()).setting
+    assert free is not None
     assert free.speed_rpm * free.depth_mm > setting.speed_rpm * setting.depth_mm

@@ -144,6 +144,8 @@ class LimitsTable(TomlTable, frozen=True):
 
 DROP_LIMITS_PERCENT = (-5.0, 20.0)
 """Smallest and largest frequency drop at speed (%); bearing models give 2 to 8 %, heat may raise a frequency."""
+DropPercent = Annotated[float, Plausible(0.05, 20)]
+"""Frequency drop at speed (%); negative: a rise."""
 FULL_DROP_SPEED_SHARE = 0.25
 """Share of the highest speed from which the whole frequency drop counts; chosen."""
 
@@ -157,7 +159,7 @@ class SpeedTable(TomlTable, frozen=True):
     """Highest speed (rpm)."""
     steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
     """Number of speeds of a diagram."""
-    drop_percent: tuple[float, float] = (0.0, 5.0)
+    drop_percent: tuple[DropPercent, DropPercent] = (0.0, 5.0)
     """Smallest and largest drop of the natural frequencies at speed (%), below those not rotating; negative: a rise.
 
     The default is assumed. Jones-type bearing models give 2 to 8 % at high speed, and heat in locked bearings less."""

@@ -119,7 +119,8 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
-    return TapsEmulator(signal, channels, setup.sample_rate, realtime=setup.realtime, tcp=setup.tcp)
+    rate, realtime = setup.sample_rate, setup.realtime
+    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, knows_sensors=True)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:

@@ -18,6 +18,7 @@ from lobewatch.verdicts.uncertainty_causes import (
     QUESTION,
     SPEED_DROP,
     UNCERTAINTY_CAUSES,
+    UNCHECKED,
     UNTAPPED,
     WORKPIECE,
 )
@@ -151,6 +152,8 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
         return QUESTION.name
     if case.assembly.uncovered:
         return COVERAGE.name
+    if case.assembly.unchecked:
+        return UNCHECKED.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
@@ -179,5 +182,12 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     values["drop_percent"] = f"{100 * drop.low:.3g} to {100 * drop.high:.3g}"
     if assembly.uncovered:
         values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
+    if assembly.unchecked:
+        values["unchecked"], values["unchecked_remedy"] = describe_uncovered(assembly.unchecked)
     values |= {"missing": missing, "missing_remedy": missing_remedy}
-    return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+    return decisive_remark(table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+
+
+def decisive_remark(program: str, text: str, cure: str) -> Remark:
+    """Return the remark on the decisive cause of a doubtful verdict."""
+    return Remark("doubt-decides", program, text, cure)

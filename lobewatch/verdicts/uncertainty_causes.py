@@ -50,6 +50,7 @@ SPEED_DROP = Cause(
 )
 QUESTION = Cause("question", "a tap test has an open question ({questions})", "Answer the question, or tap again")
 COVERAGE = Cause("coverage", "the modes do not cover the measurement ({uncovered})", "{uncovered_remedy}")
+UNCHECKED = Cause("unchecked", "{unchecked}", "{unchecked_remedy}")
 WORKPIECE = Cause(
     "workpiece",
     "the thin wall deflects and its modes are unknown",

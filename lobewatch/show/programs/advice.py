@@ -20,6 +20,8 @@ from lobewatch.show.programs.verdicts import (
     at_speed_text,
     chance_text,
     limits_at_speed_lines,
+    tap_age_json,
+    tap_age_text,
     verdict_json,
     verdict_notes,
     verdict_table,
@@ -235,6 +237,7 @@ def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> Js
     return {
         **lobes_json(now.name, lobes),
         "tap_id": now.assembly.tap_id,
+        "tap_age_days": tap_age_json(now.assembly),
         "source": now.source,
         "speed_rpm": lobes.speed_rpm,
         "depth_mm": lobes.depth * 1e3,
@@ -262,6 +265,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     texts: Texts = [
         f"{now.name}: {now.lobes.method_text}",
         f"computed from the {now.source} of {now.assembly.tap_id}",
+        tap_age_text(now.assembly),
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
         else f"no stability limit in this speed range ({now.lobes.method_text})",

@@ -16,6 +16,7 @@ from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
 from lobewatch.verdicts.uncertainty_causes import (
     COVERAGE,
     QUESTION,
+    SPEED_DROP,
     UNCERTAINTY_CAUSES,
     UNCHECKED,
     UNTAPPED,
@@ -156,8 +157,10 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
-    if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
+    if UNTAPPED.name in uncertainty.modes:
         return UNTAPPED.name
+    if not np.any(result.chatters):
+        return SPEED_DROP.name if np.any(result.chatters_at_speed) else UNTAPPED.name
     places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
     for cause in uncertainty.causes:
@@ -175,6 +178,8 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    drop = result.samples.drop
+    values["drop_percent"] = f"{100 * drop.low:.3g} to {100 * drop.high:.3g}"
     if assembly.uncovered:
         values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
     if assembly.unchecked:

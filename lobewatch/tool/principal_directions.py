@@ -84,10 +84,17 @@ class PrincipalDirections:
         nothing = np.zeros((len(signs), self.stiffness.size))
         return list(self._vectors(signs, nothing[:, : len(self.pairs)], nothing))
 
+    @property
+    def possible_vectors(self) -> list[Floats]:
+        """Mode vectors (n, 2) for each combination of unknown signs, and along x and y if a sign is unknown."""
+        along = np.eye(2)[self.is_y.astype(int)]
+        patterns = [along if vectors is None else vectors for vectors in self.sign_patterns]
+        return [*patterns, along] if self.sign_count else patterns
+
     def sample(self, count: int, seed: int) -> Floats:
         """Return random mode vectors within the uncertainty, shape (count, n, 2), reproducible by the seed."""
         random = np.random.default_rng((seed, 2))
-        signs = random.choice([-1.0, 1.0], (count, self.sign_count))
+        signs = random.choice([-1.0, 0.0, 1.0], (count, self.sign_count))
         turn = random.uniform(-1, 1, (count, len(self.pairs))) * [pair.max_rotation for pair in self.pairs]
         lean = random.uniform(-1, 1, (count, self.max_cross_share.size)) * self.max_cross_share
         return self._vectors(signs, turn, lean)

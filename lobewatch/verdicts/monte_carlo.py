@@ -141,17 +141,21 @@ class MonteCarloResult(NamedTuple):
     """True for each sample that chatters, without the median, shape (samples,)."""
     axes_ratio: float
     """Highest over lowest median limit for all open principal directions; 1 if none are open."""
+    chatters_otherwise: bool = False
+    """True if the median chatters in other possible principal directions than those of `median`."""
 
     @property
     def is_stable_throughout(self) -> bool:
-        """True if the median and every sample are stable."""
-        return self.median.stable and not np.any(self.chatters)
+        """True if the median in all possible principal directions and every sample are stable."""
+        return self.median.stable and not self.chatters_otherwise and not np.any(self.chatters)
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
     """Evaluate a program on all its samples by semi-discretization."""
     worst = program_samples.find_worst_limit(case)
-    return evaluate_samples(case.depth, worst, program_samples.draw_samples(case, worst))
+    median = program_samples.find_median_limit(case, worst)
+    result = evaluate_samples(case.depth, median, program_samples.draw_samples(case, median))
+    return result._replace(low=min(result.low, worst.limit.limit), chatters_otherwise=median is not worst)
 
 
 def evaluate_samples(depth: float, worst: WorstLimit, samples: ProgramSamples) -> MonteCarloResult:

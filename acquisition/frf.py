@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,19 @@ from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 FrfQuantity = Literal["receptance", "mobility", "accelerance"]
 FRF_UNITS: dict[FrfQuantity, str] = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
 """Unit of each form of an FRF."""
+
+
+class FrfPoints(NamedTuple):
+    """Points of an FRF: node numbers, and directions as +-1 x, +-2 y, +-3 z, 0 if unknown."""
+
+    response_node: int
+    """Node of the sensor."""
+    response_direction: int
+    """Direction of the sensor."""
+    hit_node: int
+    """Node of the hammer."""
+    hit_direction: int
+    """Direction of the hammer."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from lobewatch.arrays import Floats
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.speed_drop import NO_DROP, SpeedDrop, find_speed_drop
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields, uncertainty_of
 
 AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
@@ -146,6 +147,10 @@ class ProgramCase:
     def uncertainty(self) -> Uncertainty:
         """Uncertainty by cause."""
         return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
+
+    def drop_at(self, speed_rpm: float) -> SpeedDrop:
+        """Find the frequency drop at a speed (rpm); none where test cuts have shown the spindle at speed."""
+        return NO_DROP if self.at_speed.n_cuts else find_speed_drop(self.assembly, self.machine, speed_rpm)
 
     def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""

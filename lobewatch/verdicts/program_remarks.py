@@ -14,7 +14,15 @@ from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
-from lobewatch.verdicts.uncertainty_causes import COVERAGE, CROSS, QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
+from lobewatch.verdicts.uncertainty_causes import (
+    COVERAGE,
+    CROSS,
+    QUESTION,
+    SPEED_DROP,
+    UNCERTAINTY_CAUSES,
+    UNTAPPED,
+    WORKPIECE,
+)
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -151,8 +159,10 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
     samples, uncertainty = result.samples, result.samples.uncertainty
     if UNTAPPED.name not in uncertainty.modes and result.chatters_otherwise:
         return CROSS.name
-    if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
+    if UNTAPPED.name in uncertainty.modes:
         return UNTAPPED.name
+    if not np.any(result.chatters):
+        return SPEED_DROP.name if np.any(result.chatters_at_speed) else UNTAPPED.name
     places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
     for cause in uncertainty.causes:
@@ -171,6 +181,8 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    drop = result.samples.drop
+    values["drop_percent"] = f"{100 * drop.low:.3g} to {100 * drop.high:.3g}"
     if assembly.uncovered:
         values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
     values |= {"missing": missing, "missing_remedy": missing_remedy}

@@ -236,6 +236,12 @@ class BandFit:
         """Relative standard errors of the sizes of the modal constants, shape (p, m)."""
         return np.asarray(self.standard_error[2 : 2 + len(self.constant)] / np.abs(self.constant))
 
+    def size_covariance(self, i: int) -> Floats:
+        """Return the covariance of the relative sizes of the modal constants of mode i in the FRFs, shape (p, p)."""
+        p, m = self.constant.shape
+        own, size = (2 + np.arange(p)) * m + i, np.abs(self.constant[:, i])
+        return np.asarray(self.covariance[np.ix_(own, own)] / np.outer(size, size))
+
     @property
     def complex_residual(self) -> Complexes:
         """Residual line by line, shape (p, n)."""

@@ -152,7 +152,7 @@ def _refine_crossings(growth: GrowthFunction, brackets: _DepthSteps, accuracy: f
             break
         a, b, fa, fb = low[busy], high[busy], at_low[busy], at_high[busy]
         guess = np.clip(b - fb * (b - a) / (fb - fa), a + 0.01 * (b - a), b - 0.01 * (b - a))
-        value = growth(row[busy], guess[:, np.newaxis], accuracy)[:, 0]
+        value = growth(row[busy], guess[:, np.newaxis], min(accuracy, GROWTH_SIGN_ACCURACY))[:, 0]
         lower = (value < 0) == (fa < 0)
         left = value * np.where(lower, guess - b, a - guess) / np.where(lower, fb - value, value - fa)
         zero[busy] = guess + left

@@ -26,6 +26,8 @@ TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
 """Shares of the median limit, scaled by the cutting coefficient of each sample, at which the sample is checked."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
 """Further shares, for samples that are stable at all of these."""
+LOWER_LIMIT_SHARES = np.linspace(0, 1, 9)[1:]
+"""Shares of the first of these depths, for samples that chatter there."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
 """Shares of the largest depth of interest, if there is no median limit."""
 N_REFINED_EXTREMES = 9
@@ -57,6 +59,11 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
         tried = softness * limit * TRIED_LIMIT_SHARES
     bracket = _bracket_limits(tried, worst.growth(tried))
     low, high, at_low, at_high = bracket
+    early = np.flatnonzero(low == 0)
+    if early.size:
+        first = tried[early, :1]
+        lower = np.sort(np.hstack((first * LOWER_LIMIT_SHARES, np.minimum(first, depth))), axis=1)
+        bracket[:, early] = _bracket_limits(lower, worst[early].growth(lower))
     open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
     if open_ones.size:
         further = np.hstack((low[open_ones, np.newaxis], softness[open_ones] * limit * FURTHER_LIMIT_SHARES))
@@ -147,16 +154,22 @@ class MonteCarloResult(NamedTuple):
 
     Looked for only where none chatters that does not rotate."""
 
+    chatters_otherwise: bool = False
+    """True if the median chatters in other possible principal directions than those of `median`."""
+
     @property
     def is_stable_throughout(self) -> bool:
-        """True if the median and every sample are stable, not rotating and at speed."""
-        return self.median.stable and not np.any(self.chatters) and not np.any(self.chatters_at_speed)
+        """True if the median in all possible principal directions and every sample are stable, also at speed."""
+        is_calm = self.median.stable and not self.chatters_otherwise
+        return is_calm and not np.any(self.chatters) and not np.any(self.chatters_at_speed)
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
     """Evaluate a program on all its samples by semi-discretization."""
     worst = program_samples.find_worst_limit(case)
-    return evaluate_samples(case.depth, worst, program_samples.draw_samples(case, worst))
+    median = program_samples.find_median_limit(case, worst)
+    result = evaluate_samples(case.depth, median, program_samples.draw_samples(case, median))
+    return result._replace(low=min(result.low, worst.limit.limit), chatters_otherwise=median is not worst)
 
 
 def evaluate_samples(

@@ -11,6 +11,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobes import Cut, Direction, Program
+from lobes.floquet.program_limit import estimate_program_limits
 from lobewatch.arrays import Floats
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
@@ -134,6 +135,13 @@ class ProgramCase:
             for direction in (MILLING_DIRECTIONS if self.any_direction and cut.immersion < 1 else (cut.direction,))
             for angle in _feed_angles_of(self.table, cut.immersion, differ)
         )
+
+    @cached_property
+    def axes_limits(self) -> Floats:
+        """Estimated limits (m) in each of the possible principal directions (`possible_vectors`)."""
+        spindle = self.spindle
+        vectors = spindle.principal_directions.possible_vectors
+        return estimate_program_limits(self.program, spindle.x, spindle.y, self.cuts, vectors)
 
     @cached_property
     def uncertainty(self) -> Uncertainty:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition import Remark
+from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement.coverage import describe_uncovered
@@ -15,6 +16,7 @@ from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
 from lobewatch.verdicts.uncertainty_causes import (
     COVERAGE,
+    CROSS,
     QUESTION,
     SPEED_DROP,
     UNCERTAINTY_CAUSES,
@@ -115,7 +117,8 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
         text = f"helix_deg is missing, 0 is assumed ({risk})"
         yield Remark("helix-not-written", table.name, text, "Set helix_deg, 0 for straight edges")
     if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
-        effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %, worst case used"
+        used = "" if result.chatters_otherwise else ", worst case used"
+        effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %{used}"
         text = f"modes may have rotated principal directions ({effect})"
         yield Remark(CROSS_NOT_TAPPED_CODE, table.name, text, "Tap Circumstances.direction xy (hit in x, sensor in y)")
 
@@ -157,6 +160,8 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
+    if UNTAPPED.name not in uncertainty.modes and result.chatters_otherwise:
+        return CROSS.name
     if UNTAPPED.name in uncertainty.modes:
         return UNTAPPED.name
     if not np.any(result.chatters):
@@ -165,7 +170,8 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
     shares = {}
     for cause in uncertainty.causes:
         rows = uncertainty.sample(median, N_PROGRAM_SAMPLES, without=cause)[places]
-        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(case.depth) < 0))
+        grown = replace(samples, rows=rows).growth(case.depth * np.array(CHECKED_DEPTH_SHARES))
+        shares[cause] = float(np.mean(np.max(grown, axis=1) < 0))
     return max(shares, key=lambda cause: shares[cause])
 
 

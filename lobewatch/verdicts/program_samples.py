@@ -1,5 +1,6 @@
 """Monte Carlo samples of a program, the cuts it makes on its path, and which samples chatter."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
@@ -183,24 +184,43 @@ def build_median_row(program: Program, assembly: Assembly, axes: Floats | None =
 
 
 class WorstLimit(NamedTuple):
-    """Median limit of a program, with the worst of its possible principal directions."""
+    """Median limit of a program in one of its possible sets of principal directions, the worst unless stated."""
 
     limit: ProgramLimit
-    """Lowest limit."""
+    """Limit in these directions."""
     axes: Floats | None
-    """Principal directions with that limit, shape (n, 2); None along x and y."""
+    """These principal directions, shape (n, 2); None along x and y."""
     axes_ratio: float
     """Highest over lowest limit: over the open signs, and with modes along x and y; 1 if nothing is open."""
 
 
 def find_worst_limit(case: ProgramCase) -> WorstLimit:
-    """Find the lowest limit over all cuts of a program and all open signs of the principal directions."""
+    """Find the lowest limit over all cuts of a program and all possible principal directions."""
+    return next(_find_rising_limits(case))
+
+
+def find_median_limit(case: ProgramCase, worst: WorstLimit) -> WorstLimit:
+    """Find the lowest limit over the possible principal directions in which a program is stable; else the worst."""
+    if worst.limit.stable:
+        return worst
+    return next((found for found in _find_rising_limits(case, case.depth) if found.limit.stable), worst)
+
+
+def _find_rising_limits(case: ProgramCase, above: float = 0.0) -> Iterator[WorstLimit]:
+    """Yield the limits of a program in each set of possible principal directions, the lowest estimate first.
+
+    above: estimate (m) up to which directions are left out.
+    """
     spindle, axes = case.spindle, case.spindle.principal_directions
-    patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
-    limits = [lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
-    worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    depths = [min(limit.limit, MAX_PROGRAM_DEPTH_RATIO * case.depth) for limit in limits]
-    return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
+    patterns: Sequence[Floats | None] = axes.possible_vectors if axes.sign_count else axes.sign_patterns
+    estimates = case.axes_limits if axes.sign_count else np.ones(1)
+    depths = np.minimum(estimates, MAX_PROGRAM_DEPTH_RATIO * case.depth)
+    ratio = float(np.max(depths) / np.min(depths))
+    for place in np.argsort(estimates, kind="stable").tolist():
+        if axes.sign_count and estimates[place] <= above:
+            continue
+        limit = lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, patterns[place])
+        yield WorstLimit(limit, patterns[place], ratio)
 
 
 def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:

@@ -35,7 +35,7 @@ class Stability(StrEnum):
     DOUBTFUL = "doubtful"
     """Stable in the median estimate, but more samples may chatter; a remark names the decisive cause and its remedy."""
     NOT_STABLE = "not stable"
-    """Chatter in the median estimate."""
+    """Chatter in the median estimate, whatever the principal directions may be."""
     UNKNOWN = "unknown"
     """Not evaluated; a remark says why."""
 
@@ -81,7 +81,8 @@ class Verdict:
     """Spindle at speed, as learned from test cuts."""
     limit: float = math.nan
     """Median estimate of the deepest stable depth at its speed, in the worst feed direction (m); inf if there is no
-    limit up to 20 times its own depth, NaN if unknown."""
+    limit up to 20 times its own depth, NaN if unknown. Of unknown principal directions the worst in which it is stable
+    counts, if there is one."""
     limit_low: float = math.nan
     """1 % quantile of the limit (m)."""
     limit_high: float = math.nan

@@ -18,7 +18,7 @@ from disturbed_study import FORCES, N_HITS, make_hit
 from numpy.typing import NDArray
 from verdict_study import MACHINE
 
-from acquisition import Circumstances, Frf, TapTest, check_hit, estimate_frf
+from acquisition import Circumstances, Frf, TapDirection, TapTest, check_hit, estimate_frf
 from lobes import program_limit, project_modes
 from lobewatch.machine import FEED_ANGLES, ProgramTable
 from lobewatch.measurement.tap_measurement import measure
@@ -109,7 +109,8 @@ def tapped(spindle: AskewSpindle, rng: np.random.Generator) -> Assembly:
     """Return the tool as ten hits in x and in y show it, with their FRFs."""
     shown, forces = project_modes(spindle.modes, spindle.vectors), tuple(rng.uniform(*FORCES, N_HITS).tolist())
     measured = []
-    for direction, modes in (("x", shown.x), ("y", shown.y)):
+    sides: tuple[tuple[TapDirection, list[Mode]], ...] = (("x", shown.x), ("y", shown.y))
+    for direction, modes in sides:
         made = tuple((mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes)
         hits = tuple(make_hit(made, peak, rng) for peak in forces)
         about = Circumstances("drawn", datetime(2026, 1, 1, tzinfo=UTC), "reference", direction)

@@ -159,13 +159,18 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
         return UNCHECKED.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
-    samples, uncertainty = result.samples, result.samples.uncertainty
-    if UNTAPPED.name not in uncertainty.modes and result.chatters_otherwise:
-        return CROSS.name
-    if UNTAPPED.name in uncertainty.modes:
+    if UNTAPPED.name in result.samples.uncertainty.modes:
         return UNTAPPED.name
+    if result.chatters_otherwise:
+        return CROSS.name
     if not np.any(result.chatters):
         return SPEED_DROP.name if np.any(result.chatters_at_speed) else UNTAPPED.name
+    return _find_most_frequent_cause(case, result)
+
+
+def _find_most_frequent_cause(case: ProgramCase, result: MonteCarloResult) -> str:
+    """Find the cause without which most of the chattering samples would be stable."""
+    samples, uncertainty = result.samples, result.samples.uncertainty
     places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
     for cause in uncertainty.causes:

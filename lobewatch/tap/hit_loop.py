@@ -21,6 +21,7 @@ from lobewatch.tap.device_connection import (
     label_device,
 )
 from lobewatch.tap.live_curves import build_curves
+from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
@@ -72,6 +73,9 @@ class TapPhases:
         self._trial: TrialHits | None = None
         self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
+        self._is_one_stream = True
+        self.remarks: tuple[Remark, ...] = ()
+        """Remarks on the finished test: whether its sample rate is verified."""
 
     def run(self, tap: TapInProgress) -> None:
         """Run all phases, reconnecting as often as needed. DeviceError if the first connection fails."""
@@ -83,11 +87,12 @@ class TapPhases:
                     self._check(connection)
                     self._try(connection)
                     self._take_hits(connection)
-                return
+                return self._check_stream_rate(connection)
             except DeviceError as error:
+                self._check_stream_rate(connection)
                 if not self._tap.missing:
-                    return
-                connection = self._reconnect(error)
+                    return None
+                connection, self._is_one_stream = self._reconnect(error), False
 
     def _connect(self) -> DeviceConnection:
         """Open and start a device that fits the hits so far. Earlier button presses do not count.
@@ -130,6 +135,16 @@ class TapPhases:
         check_device_rate(self._folder, device, remarks=remarks)
         if remarks:
             self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))
+
+    def _check_stream_rate(self, connection: DeviceConnection) -> None:
+        """Check the rate of the blocks so far, and show it. DataError if it is off the rate in use."""
+        if (stream := connection.rate) is None:
+            return
+        is_whole = self._is_one_stream and not self._tap.n_resumed
+        refuse_wrong_rate(self._tap, connection.device, stream, is_whole=is_whole)
+        self.remarks = rate_remarks(stream)
+        others = [check for check in self._publisher.state.checks if check.name != "sample rate"]
+        self._publisher.show(checks=(*others, check_stream_rate(stream)))
 
     def _check(self, connection: DeviceConnection) -> None:
         """Run the self-check, once per session."""
@@ -180,6 +195,8 @@ class TapPhases:
         for hit in self._hits(connection, self._at_rest(tap.trigger)):
             if tap.missing and hit is not None:
                 self._take(hit)
+                if (stream := connection.rate) is not None and stream.find_deviation() is not None:
+                    self._check_stream_rate(connection)
             elif not tap.missing and self._verdict_age(connection.device.sample_rate) >= undo_time:
                 return
 

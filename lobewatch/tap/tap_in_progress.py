@@ -1,4 +1,4 @@
-"""A tap test in progress: its hits, their mean, set-up and cross FRF."""
+"""A tap test in progress: its hits, their mean and set-up."""
 
 import errno
 import shutil
@@ -7,14 +7,14 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 import acquisition
 from acquisition import (
-    CROSS_TAP,
     Circumstances,
+    DataError,
     Hit,
     HitDecision,
     HitFlags,
@@ -23,7 +23,7 @@ from acquisition import (
     evaluate_hit,
     write_hit,
 )
-from acquisition.errors import format_os_error, join_sentences
+from acquisition.errors import join_sentences
 from acquisition.file_io import make_folder
 from acquisition.hit_fault import HIT_FAULTS
 from acquisition.hit_quality.best_hits import choose_best_hits
@@ -35,6 +35,7 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
 from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
+from lobewatch.tap.kept_rate import correct_rate, find_kept_rate
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
 
@@ -330,69 +331,25 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
+        rate, fault = _find_rate(folder, path)
+        is_recent = circumstances.created - about.created < spool.MAX_RESUME_AGE
+        if resume and newest is None and same and is_recent and not fault:
             newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
-                newest.add_spooled(hit)
+                newest.add_spooled(hit._replace(hit=correct_rate(hit.hit, rate)))
             newest.resume_mean()
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             test = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            text = f"An interrupted test ({test}) is still in {path}"
+            text = f"An interrupted test ({test}{fault and f', {fault}'}) is still in {path}"
             new.not_resumed.append(join_sentences(text, "Delete this folder if you do not need the test"))
     return newest
 
 
-MIN_CROSS_TAP_HITS = 3
-"""Good hits needed for a cross FRF, chosen: fewer do not show their scatter."""
-
-
-class CrossTapResult(NamedTuple):
-    """Result of the cross tap test that the same hits give."""
-
-    tap_id: str | None
-    """Id of the saved tap test, None if it was not saved."""
-    text: str
-    """Sentence for the operator."""
-
-
-def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> CrossTapResult | None:
-    """Save the cross tap test of a finished test of a driving point. None if no second sensor recorded it.
-
-    It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
-    affect the other test.
-    """
-    numbers = [i for i, hit in enumerate(tap.hits) if hit.cross_hit is not None]
-    if not numbers:
-        return None
-    hits = [cross for hit in tap.hits if (cross := hit.cross_hit) is not None]
-    first = [tap.decided_flags[i] for i in numbers]
-    found = [
-        tap.flags[i] | (HitFlags.OK if tap.decided_flags[i] else _evaluate_cross_hit(hit))
-        for i, hit in zip(numbers, hits, strict=True)
-    ]
-    decisions = tuple(
-        replace(made, hit=numbers.index(made.hit - 1) + 1) for made in tap.decisions if made.hit - 1 in numbers
-    )
-    verdicts = decide_flags(found, decisions)
-    good, wanted = verdicts.count(HitFlags.OK), first.count(HitFlags.OK)
-    faults = {flags.words for flags, before in zip(verdicts, first, strict=True) if flags and not before}
-    used = f"{good} of the {wanted} hits in x ({', '.join(sorted(faults))} in y)" if faults else f"the {good} hits in x"
-    about = replace(tap.circumstances, direction=CROSS_TAP)
+def _find_rate(folder: MachineFolder, test: Path) -> tuple[float | None, str]:
+    """Return the sample rate that replaces that of the hits, None for their own, and why they cannot be resumed."""
     try:
-        if good < MIN_CROSS_TAP_HITS:
-            raise ValueError(f"only {used} are usable. Check the sensor along y.")
-        test = average_hits(acquisition.new_tap_id(about), about, hits, found, decisions)
-        commit(test)
-    except (ArithmeticError, OSError, ValueError) as error:
-        why = format_os_error(error) if isinstance(error, OSError) else str(error)
-        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why.rstrip('.')}.")
-    return CrossTapResult(test.id, f"{CROSS_TAP} is also saved, from {used}.")
-
-
-def _evaluate_cross_hit(hit: Hit) -> HitFlags:
-    """Return the faults of a hit as the second sensor recorded it, which may hardly respond."""
-    if np.ptp(hit.acceleration) == 0:
-        return HitFlags.NOT_EVALUATED
-    return evaluate_safely(lambda: evaluate_hit(hit)).flags & ~HitFlags.NO_RESPONSE
+        return find_kept_rate(folder.machine.daq, test), ""
+    except DataError as error:
+        return None, str(error)

@@ -195,7 +195,8 @@ class TapPhases:
         for hit in self._hits(connection, self._at_rest(tap.trigger)):
             if tap.missing and hit is not None:
                 self._take(hit)
-                if (stream := connection.rate) is not None and stream.find_deviation() is not None:
+                found = connection.rate and connection.rate.find_deviation()
+                if found and found.is_accurate:  # so that the kept hits get the right rate
                     self._check_stream_rate(connection)
             elif not tap.missing and self._verdict_age(connection.device.sample_rate) >= undo_time:
                 return

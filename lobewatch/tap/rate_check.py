@@ -24,7 +24,7 @@ def refuse_wrong_rate(tap: TapInProgress, device: Device, stream: StreamRate, *,
     percent = 100 * (stream.sample_rate / found.rate - 1)
     error = f"every frequency would be {abs(percent):.2g} % too {'high' if percent > 0 else 'low'}"
     rates = f"the DAQ sampled at {found.rate:.2f} ± {found.std:.2f} Hz in this test, not {stream.sample_rate:g} Hz"
-    kept = f"The test is not saved, but its {len(tap.hits)} hits are kept"
+    kept = "The test is not saved, but its hits are kept"
     cure = f"Run lobewatch sensors {tap.folder.path} to measure the sample rate again, then repeat the command"
     raise DataError(join_sentences(f"{rates}, so {error}", kept, cure))
 

@@ -119,8 +119,8 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
-    serving = {"realtime": setup.realtime, "tcp": setup.tcp}
-    return TapsEmulator(signal, channels, setup.sample_rate, clock=setup.clock, **serving)
+    rate, realtime = setup.sample_rate, setup.realtime
+    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, clock=setup.clock)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
@@ -142,8 +142,8 @@ def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
 
     skewed = any(sensor.channel.skew for sensor in setup.inputs)
     traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if setup.digital_clock else None)
-    serving = {"realtime": setup.realtime, "tcp": setup.tcp}
-    return DataqEmulator(setup.signal_at, setup.inputs, traits=traits, clock=setup.clock, **serving)
+    signal, realtime = setup.signal_at, setup.realtime
+    return DataqEmulator(signal, setup.inputs, realtime=realtime, tcp=setup.tcp, traits=traits, clock=setup.clock)
 
 
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:

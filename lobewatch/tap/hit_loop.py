@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Remark, Trigger
 from acquisition.errors import join_sentences
@@ -20,9 +21,11 @@ from lobewatch.tap.device_connection import (
     estimate_resting_rms,
     label_device,
 )
+from lobewatch.tap.hit_check import add_steady_vibration
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
+from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
@@ -56,6 +59,7 @@ class TapPhases:
         open_device: Callable[[], Device],
         publisher: StatePublisher[TapState],
         *,
+        questions: StartQuestions,
         guided: bool,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -65,7 +69,7 @@ class TapPhases:
         trial hits need it.
         """
         self._folder, self._open_device, self._publisher = folder, open_device, publisher
-        self._guided, self._sleep = guided, sleep
+        self.questions, self._guided, self._sleep = questions, guided, sleep
         self.undos, self.stopping = threading.Semaphore(0), threading.Event()
         """Requests of any thread to take back the last good hit, each once, and to end the test."""
         self.decisions = queue.SimpleQueue[tuple[int | None, bool]]()
@@ -152,8 +156,7 @@ class TapPhases:
         trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.device.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
-        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
-        baseline = find_quiet_part(connection.record(self._blocks(connection), SELF_CHECK_DURATION))
+        baseline = self._record_rest(connection)
         self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
         checks = [*self._publisher.state.checks]
         checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
@@ -162,6 +165,16 @@ class TapPhases:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}" for check in checks if not check.passed]
         self._publisher.show(checks=tuple(checks), reason=join_sentences(*failed))
+
+    def _record_rest(self, connection: DeviceConnection) -> Hit:
+        """Record the signals at rest, after a person has confirmed that the spindle is stopped."""
+
+        def record(duration: float = SELF_CHECK_DURATION) -> Hit:
+            return find_quiet_part(connection.record(self._blocks(connection), duration))
+
+        self.questions.confirm(partial(record, LEVEL_WINDOW))
+        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
+        return self.questions.settle(record(), record)
 
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
@@ -182,7 +195,8 @@ class TapPhases:
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
         hit = next(filter(None, self._hits(connection, self._at_rest(trial.trigger))))
-        verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
+        verdict = add_steady_vibration(HitVerdict(HitFlags.OK), hit, self._tap.baseline)
+        verdict = verdict if verdict.flags else evaluate_safely(lambda: HitVerdict(trial.add(hit)))
         self._show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
         self._show_curves(hit)
         return not verdict.flags

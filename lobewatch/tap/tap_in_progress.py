@@ -35,6 +35,7 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
 from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
+from lobewatch.tap.hit_check import add_steady_vibration
 from lobewatch.tap.kept_rate import correct_rate, find_kept_rate
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
@@ -238,6 +239,7 @@ class TapInProgress:
         elif mean is not None and len(references) < len(self.mean.hits):
             mean = acquisition.estimate_frf(references)
         verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
+        verdict = add_steady_vibration(verdict, hit, self.baseline)
         if not verdict.flags:
             self.mean.add(hit)
         return verdict

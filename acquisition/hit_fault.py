@@ -242,6 +242,8 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         {
             "": "The response in its loudest tenth is {ratio:.2g} times its noise (limit {noise_ratio:g})",
             "constant": "The response is constant",
+            "steady": "The response of {level:.3g} m/s^2 rms is hum or drift that does not answer the hit",
+            "saturated": "The response is at the limit of its range already before the hit",
         },
         {"noise_ratio": 1.15},
     ),
@@ -259,6 +261,5 @@ The limits are chosen. A peak below 2 % of the force range shows the steps of th
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
 noise. The loudest tenth of mere noise is below 1.15 times its rms before the hit. A hit 30 % away from the mean would
 move a mean of ten hits by 3 %. Its distance must also be 4 times what the scatter of the hits would give. A pulse whose
-first 10 % of the peak are missing has lost 1 % of its impulse. A steady vibration has 3 times
-the rms of the self-check.
+first 10 % of the peak are missing has lost 1 % of its impulse. A steady vibration has 3 times the rms at rest.
 """

@@ -74,27 +74,31 @@ class EmulatedFaults:
         """Return the signal function with these faults. inputs: sensor of each row. rate: sample rate (Hz)."""
         channels, random = [sensor.channel for sensor in inputs], np.random.default_rng(1)
 
+        drift = np.zeros(1)
+
         def disturbed(first_scan: int, n_scans: int) -> Floats:
+            nonlocal drift
             rows = signal(first_scan, n_scans)
+            drift = drift[-1] + DRIFT_STEP * np.cumsum(random.normal(size=n_scans))
             time = (first_scan + np.arange(n_scans)) / rate - self.begin
             begun = time >= 0
-            return np.where(begun, self._disturb(rows, time, channels, random), rows) if begun.any() else rows
+            return np.where(begun, self._disturb(rows, time, channels, drift), rows) if begun.any() else rows
 
         return disturbed
 
-    def _disturb(self, rows: Floats, time: Floats, channels: Sequence[Channel], random: np.random.Generator) -> Floats:
+    def _disturb(self, rows: Floats, time: Floats, channels: Sequence[Channel], drift: Floats) -> Floats:
         quantities = [channel.quantity for channel in channels]
         unbalance = UNBALANCE_ACCELERATION * _make_tone(time, self.turning_rpm / 60, UNBALANCE_HARMONICS)
         if self.kind is EmulatedFault.SWAPPED:
             return _swap(rows, channels)
         return np.stack(
             [
-                self._disturb_row(row, time, channel, random) + unbalance * (quantity == "acceleration")
+                self._disturb_row(row, time, channel, drift) + unbalance * (quantity == "acceleration")
                 for row, channel, quantity in zip(rows, channels, quantities, strict=True)
             ]
         )
 
-    def _disturb_row(self, row: Floats, time: Floats, channel: Channel, random: np.random.Generator) -> Floats:
+    def _disturb_row(self, row: Floats, time: Floats, channel: Channel, drift: Floats) -> Floats:
         """Return the signal of a channel with the fault of the chain."""
         hum, fault = _make_tone(time, 50.0, HUM_HARMONICS), self.kind
         broken = {"force": EmulatedFault.FORCE_CABLE, "acceleration": EmulatedFault.RESPONSE_CABLE}
@@ -102,7 +106,6 @@ class EmulatedFaults:
             return BROKEN_CABLE_HUM[channel.quantity] * hum
         if channel.quantity == "force":
             return row
-        drift = DRIFT_STEP * np.cumsum(random.normal(size=row.size))
         disturbed = {
             EmulatedFault.OPEN_INPUT: drift,
             EmulatedFault.SATURATED: np.full(row.size, 2 * channel.full_scale / abs(channel.sensitivity)),

@@ -4,12 +4,16 @@ import time
 from collections.abc import Callable
 
 from acquisition.channel import Block
-from acquisition.sensors.daq_timing import MIN_RATE_BLOCKS, RATE_TOLERANCE, MeasuredRate, fit_rate
+from acquisition.sensors.daq_timing import MAX_RATE_STD, MIN_RATE_BLOCKS, RATE_TOLERANCE, MeasuredRate, fit_rate
 
 ARRIVAL_INTERVAL = 0.1
 """Time of which only the least delayed block is kept (s), chosen: an hour of a stream takes 36 000 of them."""
 RATE_STD_FACTOR = 3.0
 """Standard errors by which a rate must be off beyond the tolerance: 0.3 % of honest stretches at the limit itself."""
+BUFFER_TIME = 5e-3
+"""Time by which a buffer between converter and computer may fill or empty during the stream (s), chosen: a period of a
+sound card. The standard error does not show it.
+"""
 RECENT_TIME = 5.0
 """Length of the newest stretch (s), which shows a rate that changes during the stream: as long as `measure_rate`."""
 
@@ -51,6 +55,8 @@ class StreamRate:
             Block that has just been read.
         """
         now, scans = self._clock(), block.first_scan + block.codes.shape[1]
+        if self._scans and scans <= self._scans[-1]:
+            return
         if now >= self._interval_end:
             self._interval_end = now + ARRIVAL_INTERVAL
         elif now - self._arrived[-1] < (scans - self._scans[-1]) / self.sample_rate:  # less delayed
@@ -79,9 +85,9 @@ class StreamRate:
         return fit_rate(self._scans[begin:], self._arrived[begin:])
 
     def find_deviation(self) -> MeasuredRate | None:
-        """Return the measured rate if it is off the rate in use by more than 0.2 % and 3 standard errors.
+        """Return the measured rate if it is off the rate in use by more than 0.2 %, 3 standard errors and 5 ms.
 
-        The whole stream and its newest 5 s are measured.
+        The whole stream and its newest 5 s are measured. A rate with a standard error above 0.2 % shows nothing.
 
         Returns
         -------
@@ -95,8 +101,14 @@ class StreamRate:
     def is_verified(self) -> bool:
         """True if the stream was long and even enough to show a deviation of 0.2 %."""
         measured = self.measure()
-        return measured is not None and RATE_STD_FACTOR * measured.std <= RATE_TOLERANCE * self.sample_rate
+        return measured is not None and _uncertainty(measured) <= RATE_TOLERANCE
 
     def _is_off(self, measured: MeasuredRate) -> bool:
-        limit = RATE_TOLERANCE * self.sample_rate + RATE_STD_FACTOR * measured.std
-        return abs(measured.rate - self.sample_rate) > limit
+        if measured.std > MAX_RATE_STD * measured.rate:
+            return False
+        return abs(measured.rate / self.sample_rate - 1) > RATE_TOLERANCE + _uncertainty(measured)
+
+
+def _uncertainty(measured: MeasuredRate) -> float:
+    """Return the largest relative error of a measured rate."""
+    return RATE_STD_FACTOR * measured.std / measured.rate + BUFFER_TIME / measured.seconds

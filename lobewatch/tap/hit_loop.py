@@ -21,13 +21,13 @@ from lobewatch.tap.device_connection import (
     estimate_resting_rms,
     label_device,
 )
-from lobewatch.tap.hit_check import add_steady_vibration
+from lobewatch.tap.hit_check import add_steady_vibration, evaluate_safely
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
 from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
-from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
+from lobewatch.tap.tap_in_progress import TapInProgress
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8

@@ -16,12 +16,11 @@ from lobewatch.measurement import Measurement
 from lobewatch.measurement.recording_questions import check_question_codes, find_device_questions, find_open_questions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
-from lobewatch.tap.cross_tap import CrossTapResult, commit_cross_tap
 from lobewatch.tap.device_connection import DeviceOpener
 from lobewatch.tap.hit_loop import TapPhases, TapStopped
 from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Outcome, ProgramVerdict, StatePublisher, TapState, TapStep
-from lobewatch.tap.tap_in_progress import TapInProgress, begin_tap
+from lobewatch.tap.tap_in_progress import CrossTapResult, TapInProgress, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
 
 
@@ -199,7 +198,9 @@ class TapSession:
         self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
-        commit = partial(logbook.commit, now=now, asked=self.questions.asked)
+        commit = partial(logbook.commit, now=now)
+        if self.questions.asked:
+            commit = partial(commit, asked=self.questions.asked)
         commit(tap)
         self.across = commit_cross_tap(in_progress, commit)
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]

@@ -1,4 +1,4 @@
-"""A tap test in progress: its hits, their mean and set-up."""
+"""A tap test in progress: its hits, their mean, set-up and cross FRF."""
 
 import errno
 import shutil
@@ -7,12 +7,13 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import acquisition
 from acquisition import (
+    CROSS_TAP,
     Circumstances,
     DataError,
     Hit,
@@ -23,11 +24,10 @@ from acquisition import (
     evaluate_hit,
     write_hit,
 )
-from acquisition.errors import join_sentences
+from acquisition.errors import format_os_error, join_sentences
 from acquisition.file_io import make_folder
-from acquisition.hit_fault import HIT_FAULTS
 from acquisition.hit_quality.best_hits import choose_best_hits
-from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
+from acquisition.hit_quality.decide_hits import add_decisions
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
 from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
@@ -35,20 +35,10 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
 from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
-from lobewatch.tap.hit_check import add_steady_vibration
+from lobewatch.tap.hit_check import add_steady_vibration, average_hits, evaluate_safely, format_peak
 from lobewatch.tap.kept_rate import correct_rate, find_kept_rate
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
-
-
-def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
-    """Call `evaluate`. If it fails, reject the hit as NOT_JUDGED with the reason: one hit must not end a test."""
-    try:
-        return judge()
-    except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
-        failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
-        return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
-
 
 MIN_HITS_FOR_MEAN = 3
 """Hits in a mean with which others are compared."""
@@ -278,26 +268,6 @@ def _compare(hit: Hit, others: Sequence[Hit]) -> HitVerdict:
     return HitVerdict.from_findings(evaluate_spectrum(hit, acquisition.estimate_frf(others)))
 
 
-def average_hits(
-    tap_id: str,
-    about: Circumstances,
-    hits: Sequence[Hit],
-    flags: Sequence[HitFlags],
-    decisions: tuple[HitDecision, ...] = (),
-) -> TapTest:
-    """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
-    frf, _ = average_decided_hits(hits, decide_flags(flags, decisions))
-    hits = tuple(replace(hit, cross_hit=None) for hit in hits)
-    return TapTest(tap_id, about, frf, hits, tuple(flags), decisions=decisions)
-
-
-def format_peak(hit: Hit) -> str:
-    """Format the largest force of a hit, or without a force sensor its largest acceleration, with the unit."""
-    if hit.has_force:
-        return f"{hit.force.max():.0f} N"
-    return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"
-
-
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
     """Begin a tap test, or resume the interrupted one of the same tool and direction.
 
@@ -355,3 +325,57 @@ def _find_rate(folder: MachineFolder, test: Path) -> tuple[float | None, str]:
         return find_kept_rate(folder.machine.daq, test), ""
     except DataError as error:
         return None, str(error)
+
+
+MIN_CROSS_TAP_HITS = 3
+"""Good hits needed for a cross FRF, chosen: fewer do not show their scatter."""
+
+
+class CrossTapResult(NamedTuple):
+    """Result of the cross tap test that the same hits give."""
+
+    tap_id: str | None
+    """Id of the saved tap test, None if it was not saved."""
+    text: str
+    """Sentence for the operator."""
+
+
+def commit_cross_tap(tap: TapInProgress, commit: Callable[[TapTest], None]) -> CrossTapResult | None:
+    """Save the cross tap test of a finished test of a driving point. None if no second sensor recorded it.
+
+    It uses the hits that are good at the driving point and in the second sensor. A failure is reported and does not
+    affect the other test.
+    """
+    numbers = [i for i, hit in enumerate(tap.hits) if hit.cross_hit is not None]
+    if not numbers:
+        return None
+    hits = [cross for hit in tap.hits if (cross := hit.cross_hit) is not None]
+    first = [tap.decided_flags[i] for i in numbers]
+    found = [
+        tap.flags[i] | (HitFlags.OK if tap.decided_flags[i] else _evaluate_cross_hit(hit))
+        for i, hit in zip(numbers, hits, strict=True)
+    ]
+    decisions = tuple(
+        replace(made, hit=numbers.index(made.hit - 1) + 1) for made in tap.decisions if made.hit - 1 in numbers
+    )
+    verdicts = decide_flags(found, decisions)
+    good, wanted = verdicts.count(HitFlags.OK), first.count(HitFlags.OK)
+    faults = {flags.words for flags, before in zip(verdicts, first, strict=True) if flags and not before}
+    used = f"{good} of the {wanted} hits in x ({', '.join(sorted(faults))} in y)" if faults else f"the {good} hits in x"
+    about = replace(tap.circumstances, direction=CROSS_TAP)
+    try:
+        if good < MIN_CROSS_TAP_HITS:
+            raise ValueError(f"only {used} are usable. Check the sensor along y.")
+        test = average_hits(acquisition.new_tap_id(about), about, hits, found, decisions)
+        commit(test)
+    except (ArithmeticError, OSError, ValueError) as error:
+        why = format_os_error(error) if isinstance(error, OSError) else str(error)
+        return CrossTapResult(None, f"{CROSS_TAP} is not saved: {why.rstrip('.')}.")
+    return CrossTapResult(test.id, f"{CROSS_TAP} is also saved, from {used}.")
+
+
+def _evaluate_cross_hit(hit: Hit) -> HitFlags:
+    """Return the faults of a hit as the second sensor recorded it, which may hardly respond."""
+    if np.ptp(hit.acceleration) == 0:
+        return HitFlags.NOT_EVALUATED
+    return evaluate_safely(lambda: evaluate_hit(hit)).flags & ~HitFlags.NO_RESPONSE

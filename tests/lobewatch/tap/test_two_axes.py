@@ -28,10 +28,9 @@ from acquisition import (
 )
 from acquisition.emulation import SignalFunction
 from lobewatch.logbook import Logbook
-from lobewatch.tap.cross_tap import commit_cross_tap
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.tap_in_progress import TapInProgress
+from lobewatch.tap.tap_in_progress import TapInProgress, commit_cross_tap
 from tests.lobewatch.conftest import Shop
 
 RATE = 25600.0

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from functools import partial
 
 import acquisition
-from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, TapTest
+from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, Remark, TapTest
 from acquisition.errors import PERMISSION_ERRNOS, format_os_error, join_sentences
 from dsm import format_with_error
 from lobewatch.logbook import Logbook
@@ -91,6 +91,11 @@ class TapSession:
     def state(self) -> TapState:
         """Newest state of the test, replaced and never changed."""
         return self._publisher.state
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks on the finished test: whether its sample rate is verified."""
+        return self._phases.remarks
 
     @property
     def measurement(self) -> Measurement:

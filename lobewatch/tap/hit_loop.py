@@ -167,12 +167,16 @@ class TapPhases:
         self._publisher.show(checks=tuple(checks), reason=join_sentences(*failed))
 
     def _record_rest(self, connection: DeviceConnection) -> Hit:
-        """Record the signals at rest, after a person has confirmed that the spindle is stopped."""
+        """Record the signals at rest, after a person has confirmed that the spindle is stopped.
+
+        Nobody is asked about a recording or an emulated device that is faster than real time.
+        """
 
         def record(duration: float = SELF_CHECK_DURATION) -> Hit:
             return find_quiet_part(connection.record(self._blocks(connection), duration))
 
-        self.questions.confirm(partial(record, LEVEL_WINDOW))
+        if connection.device.follows_clock:
+            self.questions.confirm(partial(record, LEVEL_WINDOW))
         self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
         return self.questions.settle(record(), record)
 

@@ -226,8 +226,12 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",
-        "Hit the same spot in the same direction as in the other hits.",
-        {"": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
+        "Hit the same spot in the same direction as in the other hits, and check that the accelerometer is fixed.",
+        {
+            "": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})",
+            "weaker": "The response to this hit has only {share:.0%} of the mean of {count} hits, as that of a loose "
+            "accelerometer (FRF differs by {distance:.0%}, limit {limit:.0%})",
+        },
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),
     HitFlags.UNDONE: HitFault("undone", "The operator removed this hit."),

@@ -109,7 +109,8 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
     findings |= _evaluate_strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
-    findings |= _evaluate_response_level(hit) | _evaluate_touches(hit, band) | _evaluate_decay(hit)
+    missing = _evaluate_response_level(hit)
+    findings |= missing | _evaluate_touches(hit, band) | ({} if missing else _evaluate_decay(hit))
     if HitFlags.DOUBLE_HIT in findings:
         band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
@@ -199,8 +200,18 @@ def evaluate_spectrum(hit: Hit, mean: Frf | None, band: tuple[float, float] | No
         distance, noise = compute_distance_from_mean(frf, mean)
         limit = max(limits["mean_distance"], limits["noise_ratio"] * noise)
         if distance > limit:
-            findings |= _state(HitFlags.INCONSISTENT, distance=distance, count=mean.n_averages, limit=limit)
+            figures = {"distance": distance, "count": mean.n_averages, "limit": limit}
+            share = _compare_magnitudes(frf, mean)
+            case = "weaker" if share < 1 - limits["mean_distance"] else ""
+            findings |= _state(HitFlags.INCONSISTENT, case, **figures, share=share)
     return findings
+
+
+def _compare_magnitudes(frf: Frf, mean: Frf) -> float:
+    """Return the median magnitude of an FRF over that of a mean, in the usable band."""
+    low, high = frf.usable_band or (0.0, np.inf)
+    lines = (frf.frequency >= low) & (frf.frequency <= high)
+    return find_median(np.abs(frf.receptance[lines])) / max(find_median(np.abs(mean.receptance[lines])), 1e-300)
 
 
 def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import enum
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+_DIFFERS = "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"
 _RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
 
 TOUCH_TEXT = "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)"
@@ -228,9 +229,8 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         "inconsistent",
         "Hit the same spot in the same direction as in the other hits, and check that the accelerometer is fixed.",
         {
-            "": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})",
-            "weaker": "The response to this hit has only {share:.0%} of the mean of {count} hits, as that of a loose "
-            "accelerometer (FRF differs by {distance:.0%}, limit {limit:.0%})",
+            "": _DIFFERS,
+            "weaker": f"{_DIFFERS} and has {{share:.0%}} of its magnitude, as with a loose accelerometer",
         },
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),

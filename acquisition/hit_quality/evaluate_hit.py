@@ -201,17 +201,22 @@ def evaluate_spectrum(hit: Hit, mean: Frf | None, band: tuple[float, float] | No
         limit = max(limits["mean_distance"], limits["noise_ratio"] * noise)
         if distance > limit:
             figures = {"distance": distance, "count": mean.n_averages, "limit": limit}
-            share = _compare_magnitudes(frf, mean)
+            share = compare_magnitude(frf, mean)
             case = "weaker" if share < 1 - limits["mean_distance"] else ""
             findings |= _state(HitFlags.INCONSISTENT, case, **figures, share=share)
     return findings
 
 
-def _compare_magnitudes(frf: Frf, mean: Frf) -> float:
-    """Return the median magnitude of an FRF over that of a mean, in the usable band."""
+def compare_magnitude(frf: Frf, mean: Frf) -> float:
+    """Return the share of a mean that an FRF of the same lines has, |sum A conj(B)| / sum |B|^2 of their accelerances.
+
+    The peaks decide, not the noise of receptance at low frequencies.
+    """
     low, high = frf.usable_band or (0.0, np.inf)
     lines = (frf.frequency >= low) & (frf.frequency <= high)
-    return find_median(np.abs(frf.receptance[lines])) / max(find_median(np.abs(mean.receptance[lines])), 1e-300)
+    weight = frf.frequency[lines] ** 2
+    own, other = weight * frf.receptance[lines], weight * mean.receptance[lines]
+    return float(np.abs(np.vdot(other, own)) / max(np.vdot(other, other).real, np.finfo(float).tiny))
 
 
 def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:

@@ -79,7 +79,7 @@ def test_a_wrong_rate_refuses_the_test_and_its_hits_are_corrected_later(
     tapped: Callable[[float], Any], folder: MachineFolder
 ) -> None:
     error = -0.05
-    with pytest.raises(DataError, match="lobewatch sensors"):
+    with pytest.raises(DataError, match="measure_rate"):
         tapped(error)
     assert folder.taps() == []
     (spool,) = folder.spool.iterdir()

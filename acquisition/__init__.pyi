@@ -27,9 +27,9 @@ from .files.contents.recording import Recording
 from .files.contents.units import STANDARD_GRAVITY
 from .files.convert import Conversion, convert
 from .files.file_source import FileSource
-from .files.read_recording import inspect_file, list_formats, read_frf, read_hits, read_recording
+from .files.read_recording import inspect_file, list_formats, list_frf_points, read_frf, read_hits, read_recording
 from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
-from .frf import Frf, from_accelerance
+from .frf import Frf, FrfPoints, from_accelerance
 from .hit import Hit
 from .hit_fault import HitFlags
 from .hit_quality.evaluate_hit import HitVerdict, average_good_hits, check_hit, evaluate_hit
@@ -85,6 +85,7 @@ __all__ = [
     "FileSource",
     "Format",
     "Frf",
+    "FrfPoints",
     "HammeredStructure",
     "Hammering",
     "Hit",
@@ -145,6 +146,7 @@ __all__ = [
     "is_smoothed",
     "list_driver_names",
     "list_formats",
+    "list_frf_points",
     "list_serial_ports",
     "load_drivers",
     "measure_rate",

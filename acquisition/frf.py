@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,19 @@ from acquisition.hit import MAX_SI_VALUE, describe_invalid_value
 FrfQuantity = Literal["receptance", "mobility", "accelerance"]
 FRF_UNITS: dict[FrfQuantity, str] = {"receptance": "m/N", "mobility": "m/s/N", "accelerance": "m/s^2/N"}
 """Unit of each form of an FRF."""
+
+
+class FrfPoints(NamedTuple):
+    """Points of an FRF: node numbers, and directions as +-1 x, +-2 y, +-3 z, 0 if unknown."""
+
+    response_node: int
+    """Node of the sensor."""
+    response_direction: int
+    """Direction of the sensor."""
+    hit_node: int
+    """Node of the hammer."""
+    hit_direction: int
+    """Direction of the hammer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +78,7 @@ class Frf:
         f = self.frequency
         if f.ndim != 1 or f.size < 2:
             raise ValueError(f"frequency must be a 1-D array of at least 2 lines (Hz), not of shape {f.shape}")
-        if not np.all(np.isfinite(f)) or f[0] < 0 or not np.all(np.diff(f) > 0):
+        if not (f[0] >= 0 and f[-1] < math.inf and np.all(f[1:] > f[:-1])):
             raise ValueError("frequency must be finite, at least 0 Hz and strictly increasing")
         if self.measured_as not in get_args(FrfQuantity):
             raise ValueError(f"measured_as={self.measured_as!r} is not one of {', '.join(get_args(FrfQuantity))}")
@@ -82,7 +96,7 @@ class Frf:
             return
         if self.coherence.shape != self.frequency.shape:
             raise ValueError(f"coherence {self.coherence.shape} and frequency {self.frequency.shape} differ in shape")
-        if not np.all((self.coherence >= 0) & (self.coherence <= 1 + 1e-9)):
+        if not 0 <= self.coherence.min() <= self.coherence.max() <= 1 + 1e-9:
             raise ValueError("coherence must be between 0 and 1")
 
     @property

@@ -8,6 +8,7 @@ from .fit_modes import decay_spectra, fit_common_modes, fit_decays, fit_modes, m
 from .frequency_series import HitChangeKind
 from .frf_peaks import find_peaks_above_band, find_truncated_peaks, mode_indicator, pick_peaks
 from .hit_changes import HitChange, find_hit_changes
+from .mode_shapes import FrfAgreement, ModeShape, average_points, compare_frfs, fit_mode_shapes, mac_matrix
 from .modes.match_modes import ModeMatch, follow_mode, mac, match_modes, predominant_mode
 from .modes.measurement_effects import (
     CommonDelay,
@@ -25,6 +26,7 @@ from .modes.response_delay import find_delay
 from .poles import PhysicalPoles, StabilisationChart, fit_lscf_poles, select_physical_poles
 from .quality.trust import CredibleModes, Trust, assess_trust, select_credible_modes, trust_rules
 from .quality.unexplained_peaks import UnexplainedPeak, find_unexplained_peaks
+from .tip_compliance import PartShare, compliance_shares
 
 __all__ = [
     "CommonDelay",
@@ -32,20 +34,26 @@ __all__ = [
     "CredibleModes",
     "Extraction",
     "FittedBand",
+    "FrfAgreement",
     "HitChange",
     "HitChangeKind",
     "MassLoading",
     "Mode",
     "ModeEdits",
     "ModeMatch",
+    "ModeShape",
+    "PartShare",
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",
     "UnexplainedPeak",
     "assess_trust",
+    "average_points",
     "candidate_frequencies",
     "common_decay_rate",
     "common_delay",
+    "compare_frfs",
+    "compliance_shares",
     "decay_spectra",
     "edit_modes",
     "extract_modes",
@@ -57,9 +65,11 @@ __all__ = [
     "fit_common_modes",
     "fit_decays",
     "fit_lscf_poles",
+    "fit_mode_shapes",
     "fit_modes",
     "follow_mode",
     "mac",
+    "mac_matrix",
     "mass_loading",
     "match_modes",
     "mode_indicator",

@@ -106,15 +106,29 @@ def modes_from_extraction(state: Extraction, hits: Sequence[Sequence[Hit]] = ())
     >>> [f"{mode.frequency:.1f} Hz" for mode in modes_from_extraction(state)]
     ['500.0 Hz']
     """
+    return [mode for mode, _, _ in fit_constants(state, hits)]
+
+
+def fit_constants(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[tuple[Mode, Complexes, Floats]]:
+    """Return the modes of an extraction by rising frequency, each with its modal constants and their covariance.
+
+    Constants (m/N) have the shape (p,), the covariance of their relative sizes in the fit (p, p). Arguments as
+    `modes_from_extraction`.
+    """
     if hits and len(hits) != len(state.frfs):
         found = f"{len(hits)} lists of hits for {len(state.frfs)} FRFs"
         raise ValueError(f"{found}. Give one list of hits per FRF, even an empty list.")
     pairs = [(own, leave_one_out_frfs(own, frf)) for own, frf in zip(hits, state.frfs, strict=False)]
     state = merge_scattered_pairs(state, pairs)
-    modes = [mode for band in state.bands for mode in _modes_with_scatter(state, band, pairs)]
-    rising = sorted(modes, key=lambda mode: mode.frequency)
-    checked = add_smoothing_remarks(state, add_phase_remarks(rising), has_hits=any(hits))
-    return add_quantity_remarks(state.frf, checked)
+    found_modes = [
+        (mode, band.fit.constant[:, i], band.fit.size_covariance(i))
+        for band in state.bands
+        for i, mode in enumerate(_modes_with_scatter(state, band, pairs))
+    ]
+    rising = sorted(found_modes, key=lambda fitted: fitted[0].frequency)
+    modes = add_phase_remarks([mode for mode, _, _ in rising])
+    checked = add_quantity_remarks(state.frf, add_smoothing_remarks(state, modes, has_hits=any(hits)))
+    return [(mode, constants, covariance) for mode, (_, constants, covariance) in zip(checked, rising, strict=True)]
 
 
 def _modes_with_scatter(state: Extraction, band: FittedBand, pairs: Sequence[HitsOfFrf]) -> list[Mode]:

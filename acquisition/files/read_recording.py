@@ -20,7 +20,7 @@ from acquisition.files.readers.read_labview import LABVIEW_FORMATS
 from acquisition.files.readers.read_text_tables import TEXT_FORMATS
 from acquisition.files.readers.read_uff import UFF_FORMAT
 from acquisition.files.tap_file import TAP_FORMAT
-from acquisition.frf import Frf
+from acquisition.frf import Frf, FrfPoints
 from acquisition.hit import Hit
 from acquisition.hit_quality.evaluate_hit import average_good_hits
 from acquisition.plugin import PLUGIN_ERRORS, format_exception_line, get_package_name, load_plugin, make_unusable_remark
@@ -228,6 +228,28 @@ def read_frf(path: Path | str, description: Description = EMPTY_DESCRIPTION) -> 
     if frf is None:
         raise DataError(f"{path}: no FRF, because no force was measured. Tap with an instrumented hammer.")
     return frf
+
+
+def list_frf_points(path: Path) -> list[FrfPoints | None]:
+    """List the points of each FRF in a file, in the order of `Description.response`; None for an FRF without points.
+
+    Parameters
+    ----------
+    path
+        Recorded file of any known format.
+
+    Returns
+    -------
+    list of FrfPoints or None
+        Points and directions of response and hit; empty for a file without FRFs.
+
+    Raises
+    ------
+    DataError
+        For a file that is damaged or of no known format.
+    """
+    held = read_contents(detect_format(path), path, EMPTY_DESCRIPTION)
+    return [signal.points for signal in held.signals if signal.role == "frf"] if isinstance(held, Contents) else []
 
 
 def detect_format(path: Path) -> Format:

@@ -42,6 +42,7 @@ GROUPS = {
     },
     "Single steps": {
         "modes": "Fit natural frequency, damping ratio and stiffness of a recording or a stored tap test.",
+        "shapes": "Show mode shapes from tool to column, and the share of each part in 1/K at the tip.",
         "convert": "Convert a recorded file to UFF, CSV, MATLAB or SEP005.",
         "model": "Show the spindle model: modes, stiffness, critical speed.",
         "calibrate": "Fit bearing and joint stiffness to measured natural frequencies.",

@@ -113,12 +113,14 @@ def missing_window_text(named: float | None, given: Window | None) -> str:
     return f"The response has a window: give {needed} as well"
 
 
-def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], float]:
+def window_ringing_hits(hits: Sequence[Hit], time_constant: float | None = None) -> tuple[Frf, tuple[Hit, ...], float]:
     """Return the FRF of hits under our own window, the windowed hits, and the time constant (s).
 
-    The rest of the ringing at the end of the record acts as if cut off: K is wrong by about that share.
+    time_constant (s): None for that of the shortest record. The rest of the ringing at the end of the record acts as if
+    cut off: K is wrong by about that share.
     """
-    tau = min(acquisition.measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
+    shortest = min(acquisition.measure_time_after_hit(hit) for hit in hits) / -float(np.log(WINDOW_END_LEVEL))
+    tau = shortest if time_constant is None else time_constant
     windowed = tuple(acquisition.apply_exponential_window(hit, tau) for hit in hits)
     return acquisition.correct_windowed_receptance(acquisition.estimate_frf(windowed), tau), windowed, tau
 
@@ -130,12 +132,15 @@ def own_window_remark(about: str, time_constant: float, cure: str) -> Remark:
     return Remark("windowed-here", about, text, cure)
 
 
-def remove_own_window(modes: Sequence[Mode], time_constant: float) -> Iterator[Mode]:
-    """Yield modes without our own window; a mode that decays no faster than the window is none."""
+def remove_own_window(modes: Sequence[Mode], time_constant: float, delay: float = 0.0) -> Iterator[Mode]:
+    """Yield modes without our own window; a mode that decays no faster than the window is none.
+
+    delay: time from the start of the window to the hit (s).
+    """
     for mode in modes:
         if 2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant:
             wider = widen_for_window(mode, time_constant, -time_constant * float(np.log(WINDOW_END_LEVEL)))
-            yield remove_window(wider, time_constant)
+            yield remove_window(wider, time_constant, delay)
 
 
 def remove_recorded_window(

@@ -191,7 +191,12 @@ def _fit_remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | No
     if band is None:
         yield from _peaks_beyond_remarks(frf)
     if not modes:
-        yield Remark("no-mode", "", "no mode found", "Check the frequency band, and hit harder")
+        yield make_no_mode_remark()
+
+
+def make_no_mode_remark() -> Remark:
+    """Return the remark on an FRF without any mode."""
+    return Remark("no-mode", "", "no mode found", "Check the frequency band, and hit harder")
 
 
 def _peaks_beyond_remarks(frf: Frf) -> Iterator[Remark]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 
 import pytest
 from disturbed_study import KINDS, Counts, judge_disturbed, judge_undisturbed
 
 from lobewatch.verdicts.verdict import Stability
+
+counted = functools.cache(judge_disturbed)
+"""Counts of a kind, a number of machines and a seed."""
 
 
 def say(what: str, counts: Counts) -> None:
@@ -21,7 +25,7 @@ def say(what: str, counts: Counts) -> None:
     ("count", "seed"), [(3, 5), pytest.param(50, 11, marks=[pytest.mark.long, pytest.mark.timeout(7200)])]
 )
 def test_nothing_is_stable_beyond_the_least_limit_of_the_states_met(kind: str, count: int, seed: int) -> None:
-    counts = judge_disturbed(kind, count, seed)
+    counts = counted(kind, count, seed)
     say(kind, counts)
     assert counts.words.total() == count
     assert counts.wrong == 0
@@ -29,7 +33,7 @@ def test_nothing_is_stable_beyond_the_least_limit_of_the_states_met(kind: str, c
 
 def test_without_the_comparison_a_mode_that_is_in_some_hits_would_leave_the_verdict() -> None:
     """The kind whose modes the fit rejects most often: the comparison says so on each of these machines."""
-    assert judge_disturbed("in some hits", 3, 5).uncovered >= 2
+    assert counted("in some hits", 3, 5).uncovered >= 2
 
 
 @pytest.mark.long

@@ -17,7 +17,7 @@ from lobewatch.verdicts.setting_robustness import Setting
 from lobewatch.verdicts.setting_search import SettingSearch
 
 
-@pytest.mark.parametrize("seed", [31, 32])
+@pytest.mark.parametrize("seed", [31, pytest.param(32, marks=pytest.mark.long)])
 def test_advice_pockets_and_recommendation_are_one_answer_that_holds_when_it_is_entered(seed: int) -> None:
     counts = answers(range(16), seed=seed, most_modes=3, dense=False)
     assert counts.cuts == 2

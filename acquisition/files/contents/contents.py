@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import Remark, join_sentences
-from acquisition.frf import Frf
+from acquisition.frf import Frf, FrfPoints
 from acquisition.hit import Hit
 from acquisition.tap_test import UNKNOWN_CONDITIONS, Circumstances, Conditions, HitDecision
 
@@ -235,6 +235,8 @@ class Signal:
     """Fault of each value that is NaN, as "is empty in line 7", by its index."""
     array: NDArray[Any] | None = None
     """Array of two or more axes that it is a column of."""
+    points: FrfPoints | None = None
+    """Points of response and hit of an FRF, where the file numbers them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,9 +332,8 @@ def parse_time_constant(window: str) -> float | None:
 
 def format_window(time_constant: float | None) -> str:
     """Format a time constant as `parse_time_constant` reads it."""
-    if time_constant is None:
-        return "none"
-    return "of unknown form" if math.isnan(time_constant) else f"exponential {time_constant!r} s"
+    shape = "of unknown form" if math.isnan(time_constant or 0.0) else f"exponential {time_constant!r} s"
+    return "none" if time_constant is None else shape
 
 
 MAX_ARRAY_COLUMNS = 1024
@@ -396,5 +397,4 @@ class Format:
     read_frf: Callable[[Path], Frf] | None = None
     """Function that reads the FRF of a file that also has hits; None if it is estimated from them."""
     read_from: Callable[[Path, int, str], Contents] | None = None
-    """Function that reads a text after some skipped lines, with a decimal sign (empty: unknown); None for other files.
-    """
+    """Function that reads a text after skipped lines, with a decimal sign (empty: unknown); None for other files."""

@@ -17,6 +17,7 @@ from acquisition.arrays import Complexes, Floats
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Format, Role, Signal, parse_local_time
 from acquisition.files.readers.text_file import decode_utf8_or_latin1
+from acquisition.frf import FrfPoints
 
 _NUMBERS_PER_VALUE = {2: 1, 4: 1, 5: 2, 6: 2}
 """Number of numbers per value by the type of the ordinate data: real and complex, single and double."""
@@ -47,7 +48,7 @@ class UffFunction:
     """Direction of the response: +-1 x, +-2 y, +-3 z; 0 if unknown."""
     reference_direction: int
     """Direction of the hammer in the same code."""
-    place: tuple[object, ...]
+    place: tuple[str, int, int, str, int, int]
     """Nodes and directions, equal for an FRF and its coherence."""
     abscissa: Floats
     """Abscissa in its unit, shape (n,)."""
@@ -66,6 +67,13 @@ class UffFunction:
     def keys(self) -> dict[str, str]:
         """Entries `key=value` in the lines of identification, as lobewatch writes them."""
         return {key: value for line in self.lines for key, value in re.findall(r"(\w+)=([^;]*)(?:;|$)", line)}
+
+    @property
+    def points(self) -> FrfPoints | None:
+        """Points of response and hit; None if the file numbers none."""
+        _, response_node, response_direction, _, hit_node, hit_direction = self.place
+        points = FrfPoints(response_node, response_direction, hit_node, hit_direction)
+        return points if response_node or hit_node else None
 
     @property
     def averages(self) -> int | None:
@@ -254,7 +262,7 @@ def _make_frf_signals(sets: UffDataSets, frfs: Sequence[UffFunction]) -> Iterato
         unit, quantity = _get_frf_unit(frf, sets.system)
         sign = -1.0 if frf.response_direction * frf.reference_direction < 0 else 1.0
         yield Signal("frequency", frf.abscissa, "frequency", frf.abscissa_axis.unit or "Hz", record=record)
-        yield Signal(frf.name, sign * frf.values, "frf", unit, quantity, record=record)
+        yield Signal(frf.name, sign * frf.values, "frf", unit, quantity, record=record, points=frf.points)
         for function in coherences:
             if function.place == frf.place and function.values.size == frf.values.size:
                 yield Signal(f"coherence of {frf.name}", function.values, "coherence", record=record)

@@ -43,7 +43,7 @@ def test_every_answer_is_an_option_and_is_in_the_file(run: Run) -> None:
     assert said.out.endswith("lobewatch tap mill-3\n")
     assert "/dev/ttyNOPE" in said.err
     known = tables()
-    assert known["machine"] == {"name": "Mill 3", "tap_interval_days": 30}
+    assert known["machine"] == {"name": "Mill 3"}
     assert known["speed"] == {"low_rpm": 1000, "high_rpm": 18000}
     assert known["drive"] == {"power_kw": 15, "torque_nm": 40}
     hammer, accelerometer = known["daq"].pop("channel")
@@ -165,7 +165,7 @@ def test_from_an_empty_folder_to_a_verdict_on_a_tapped_tool_in_three_commands(
             for answer in ("", "3000 24000", "-", device.port, "0 glue", "4 20 0", "1400 500", "slot: 16000 0.2 20"):
                 person.answer(answer)
             assert person.end() == 0
-        with Terminal(tmp_path, "tap", "mill-3") as person:
+        with Terminal(tmp_path, "tap", "mill-3", "--accept", "same-direction") as person:
             person.wait_for("MOVE SENSOR")
             person.wait_for("y tap y")
             person.type("\n")

@@ -11,6 +11,7 @@ from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
 from acquisition.devices.registry import convert_driver_errors
 from acquisition.hit import TapInputs
+from acquisition.sensors.stream_rate import StreamRate
 from acquisition.tap_test import SERIAL_PREFIX
 from lobewatch.machine.settings.setup_tables import DaqTable
 
@@ -100,6 +101,8 @@ def estimate_resting_rms(baseline: Hit, width: int) -> float:
     return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))
 
 
+UNFELT_HIT_RATIO = 30.0
+"""Peak of the response over its rms at rest that only a hit reaches, chosen."""
 BUTTON_BOUNCE_TIME = 0.3
 """Time after a button event in which further presses are bouncing (s)."""
 
@@ -113,6 +116,8 @@ class DeviceConnection:
         """Device, and direction that is tapped. It selects one of several accelerations."""
         self.inputs = TapInputs.select(device.channels, quantity, direction)
         """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
+        self.rate = StreamRate(device.sample_rate) if device.follows_clock else None
+        """Measured sample rate of the blocks, None without a sample clock."""
         self._recent: deque[Codes] = deque(maxlen=64)
         self._moved: int | None = None
         self._fault = ""
@@ -124,6 +129,15 @@ class DeviceConnection:
         rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
         return rms[0] if len(rms) > 1 else None, rms[-1]
 
+    def is_hit_alone(self, baseline: Hit | None) -> bool:
+        """Return whether the response in the newest block is that of a hit. baseline: record at rest with a force."""
+        if baseline is None or not baseline.has_force:
+            return False
+        channel = self.inputs.channels[-1]
+        response = self._recent[-1][self.inputs.rows[-1]] * channel.scale
+        peak = float(np.max(np.abs(response - np.mean(baseline.acceleration))))
+        return peak > UNFELT_HIT_RATIO * float(np.std(baseline.acceleration))
+
     def record(self, blocks: Iterable[Block], duration: float) -> Hit:
         """Return the next blocks of this duration (s) as one record."""
         codes, lost = collect_codes(blocks, duration * self.device.sample_rate)
@@ -132,6 +146,8 @@ class DeviceConnection:
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks that the device sends from now on."""
         for block in self.device.blocks():
+            if self.rate is not None:
+                self.rate.add(block)
             self._recent.append(block.codes)
             yield block
 

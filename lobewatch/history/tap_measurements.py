@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from acquisition import CROSS_TAP, DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
+from lobewatch.history.series_reference import find_reference, find_series_questions
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
@@ -64,10 +65,9 @@ class UsableTaps:
 
     def refuse_excluded(self, tap_id: str) -> None:
         """Raise DataError for an excluded tap test."""
-        for tap in self.excluded:
-            if tap.id == tap_id:
-                cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use the test again."
-                raise DataError(f"{tap_id}: tap test stored already, but excluded ({tap.excluded!r}). {cure}")
+        for tap in [tap for tap in self.excluded if tap.id == tap_id]:
+            cure = f"Run {format_command('include', self._folder.path)} {tap_id} to use the test again."
+            raise DataError(f"{tap_id}: tap test stored already, but excluded ({tap.excluded!r}). {cure}")
 
     def list_until(self, tap_id: str | None) -> list[TapPlace]:
         """Return the tap tests up to one of them since its baseline; None: up to now."""
@@ -202,7 +202,7 @@ def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
 
 _RowBasis = tuple[str, str, ModeValues | None, tuple[Remark, ...], tuple[FollowedMode, ...]]
 """Inputs of a result besides its own file: tap test of the other direction and cross FRF (empty without one), followed
-mode before it, remarks on its mounting, and modes that shift an older direction."""
+mode before it, remarks on its mounting and in its series, and modes that shift an older direction."""
 
 
 class _RowArchive:
@@ -212,19 +212,20 @@ class _RowArchive:
         self.places, self.rows = ordered, rows
         self._followed = FollowedModeIndex()
 
-    def basis_of(self, place: TapPlace) -> _RowBasis:
+    def basis_of(self, place: TapPlace, row: HistoryRow) -> _RowBasis:
         before = (self.rows[number] for number in iterate_earlier(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
+        remarks = (*place.remarks, *find_series_questions(row, find_reference(place, self.places, self.rows)))
         if place.other_direction is None:
-            return "", cross, last, place.remarks, ()
+            return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry
         if place.entry.created - other.created <= MAX_DIRECTION_AGE:
-            return other.id, cross, last, place.remarks, ()
+            return other.id, cross, last, remarks, ()
         points = self._followed.before(place, self.rows)[place.entry.direction]
         behind = bisect_right(points, other.created, key=lambda point: point.time)
         near = (*points[max(behind - 1, 0) : behind + 1], *points[-1:])
-        return other.id, cross, last, place.remarks, near
+        return other.id, cross, last, remarks, near
 
 
 class ReusableRows:
@@ -253,8 +254,8 @@ class ReusableRows:
         row, then = self._then.rows[number], self._then.places[number]
         if row.software or not is_row_of(row, place):
             return None
-        basis = self._now.basis_of(place)
-        if basis != self._then.basis_of(then) or (basis[0] and not self._is_alike(basis[0], rows, place)):
+        basis = self._now.basis_of(place, row)
+        if basis != self._then.basis_of(then, row) or (basis[0] and not self._is_alike(basis[0], rows, place)):
             return None
         self._alike.add(row.tap_id)
         return replace(row, verdicts=None)
@@ -301,12 +302,14 @@ class TapMeasurements:
             before = (rows[number] for number in iterate_earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             fit, machine = self._fits.get(place.entry.id), self._folder.machine
+            reference, by_hand = find_reference(place, self._places, rows), place.entry.by_hand
             if fit is None:
-                measurement = measure(self._folder.read(place.entry), machine, last, place.entry.by_hand)
+                measurement = measure(self._folder.read(place.entry), machine, last, by_hand, reference)
             else:
-                measurement = interpret_fit(fit, machine, last)
-            remarks = mark_accepted((*measurement.remarks, *place.remarks), place.entry)
-            measurement = replace(measurement, remarks=remarks)
+                measurement = interpret_fit(fit, machine, last, reference)
+            measurement = replace(
+                measurement, remarks=mark_accepted((*measurement.remarks, *place.remarks), place.entry)
+            )
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > MAX_MEASUREMENTS_IN_MEMORY:
             del self._measurements[next(iter(self._measurements))]

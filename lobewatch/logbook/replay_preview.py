@@ -3,9 +3,11 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
-from acquisition import Description, Recording, TapTest
+from acquisition import Circumstances, Description, Recording, TapTest
+from lobewatch.history.series_reference import find_earlier_tests
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.prepare_taps import (
     InterpretedFile,
@@ -15,6 +17,8 @@ from lobewatch.logbook.recordings.prepare_taps import (
     work_on_files,
 )
 from lobewatch.logbook.recordings.store_recordings import LOCAL_WORKERS, ProgressCallback, ReplayPlan
+from lobewatch.measurement.recording_questions import find_open_questions
+from lobewatch.measurement.series_questions import MAX_DAY, EarlierTest, SeriesReference
 from lobewatch.measurement.share_work import Workers
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit
 from modal import Mode
@@ -52,9 +56,9 @@ def preview_replay(
     The result does not depend on the workers.
     """
     previews = sorted(_read_recordings(logbook, files, description, progress, workers), key=_recorded_time)
-    newest_modes: dict[tuple[str, str], Mode] = {}
+    earlier: dict[tuple[str, str], _EarlierTests] = {}
     for i, preview in enumerate(previews):
-        previews[i] = _measure_preview(logbook, preview, newest_modes)
+        previews[i] = _measure_preview(logbook, preview, earlier)
         progress("measure", i + 1, len(files))
     return previews
 
@@ -87,23 +91,57 @@ def _read_recordings(
             yield ReplayPreview(file, recording=result.recording, tap=result.tap, fit=result.fit)
 
 
+@dataclass
+class _EarlierTests:
+    """Earlier tests of one tool and direction, stored or previewed."""
+
+    tests: list[EarlierTest]
+    """Followed modes without open questions, oldest first."""
+    mode: Mode | None
+    """Newest followed mode."""
+    time: datetime | None = None
+    """Time of the newest test; None without one."""
+    frequencies: tuple[float, ...] = ()
+    """Frequencies of all its modes (Hz)."""
+
+    def add(self, measurement: Measurement) -> None:
+        """Add a previewed test."""
+        self.time, self.frequencies = measurement.time, tuple(mode.frequency for mode in measurement.modes)
+        followed = measurement.followed
+        if followed is None:
+            return
+        self.mode = followed
+        if not find_open_questions(measurement.remarks):
+            self.tests.append(EarlierTest(measurement.time, followed.frequency, followed.stiffness))
+
+
 def _measure_preview(
-    logbook: Logbook, preview: ReplayPreview, newest_modes: dict[tuple[str, str], Mode]
+    logbook: Logbook, preview: ReplayPreview, earlier: dict[tuple[str, str], _EarlierTests]
 ) -> ReplayPreview:
-    """Measure a tap test to preview. `newest_modes` holds the newest followed mode of each tool and direction."""
+    """Measure a tap test to preview. `earlier` holds the tests of each tool and direction so far."""
     if preview.tap is None or preview.fit is None:
         return preview
-    series = (preview.tap.circumstances.tool, preview.tap.circumstances.direction)
-    before = newest_modes.get(series) or _find_earlier_mode(logbook, preview.tap)
-    measurement = interpret_fit(preview.fit, logbook.machine, before)
-    if measurement.followed is not None:
-        newest_modes[series] = measurement.followed
+    about = preview.tap.circumstances
+    names = about.direction, "x" if about.direction == "y" else "y"
+    for name in names:
+        if (about.tool, name) not in earlier:
+            earlier[about.tool, name] = _find_stored(logbook, about, name)
+    own, across = (earlier[about.tool, name] for name in names)
+    is_same_day = across.time is not None and abs(about.created - across.time) <= MAX_DAY
+    frequencies = across.frequencies if is_same_day else ()
+    reference = SeriesReference(tuple(own.tests), tuple(across.tests), frequencies)
+    measurement = interpret_fit(preview.fit, logbook.machine, own.mode, reference)
+    own.add(measurement)
     return replace(preview, measurement=measurement)
 
 
-def _find_earlier_mode(logbook: Logbook, tap: TapTest) -> Mode | None:
-    """Find the followed mode of the newest earlier tap test of the same series."""
-    about = tap.circumstances
-    rows = [row for row in logbook.history.rows if (row.tool, row.direction) == (about.tool, about.direction)]
-    modes = [row.mode for row in rows if row.time < about.created and row.mode is not None and not row.questions]
-    return modes[-1] if modes else None
+def _find_stored(logbook: Logbook, about: Circumstances, direction: str) -> _EarlierTests:
+    """Find the stored tests of a tool and direction that are older than a test."""
+    rows = [row for row in logbook.history.rows if (row.tool, row.direction) == (about.tool, direction)]
+    rows = [row for row in rows if row.time < about.created]
+    modes = [row.mode for row in rows if row.mode is not None and not row.questions]
+    current = [row for row in rows if row.baseline == logbook.history.baseline]
+    found = _EarlierTests([*find_earlier_tests(current)], modes[-1] if modes else None)
+    if rows:
+        found.time, found.frequencies = rows[-1].time, tuple(mode[0] for mode in rows[-1].modes)
+    return found

@@ -20,6 +20,8 @@ from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_choice import find_choice_remarks
 from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
+from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference, check_same_direction, check_series
+from lobewatch.measurement.tool_compliance import check_tool_compliance
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
 from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
@@ -27,6 +29,8 @@ from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
 """Codes of the remarks on mode edits."""
+LOST_MODE_CODES = (questions.FREQUENCY_JUMP.code, questions.NO_MODE_TO_FOLLOW.code)
+"""Codes of the questions about another mode, which is not compared with the series."""
 BEARING_STIFFNESS_RANGE = (1e5, 1e11)
 """Plausible bearing stiffness (N/m), from a plain bearing on a soft seat to a rigid seat."""
 MAX_STIFFNESS_CHANGE_RATIO = 2.0
@@ -86,7 +90,11 @@ def _thread_controller() -> ThreadpoolController:
 
 
 def measure(
-    tap: TapTest, machine: Machine, last: Mode | None = None, by_hand: ModeEdits = NO_MODE_EDITS
+    tap: TapTest,
+    machine: Machine,
+    last: Mode | None = None,
+    by_hand: ModeEdits = NO_MODE_EDITS,
+    reference: SeriesReference = NO_REFERENCE,
 ) -> Measurement:
     """Measure one tap test.
 
@@ -100,13 +108,15 @@ def measure(
         Followed mode of the previous test; None for the first one.
     by_hand
         Mode edits.
+    reference
+        Earlier tests of the series, whose numbers are compared.
 
     Returns
     -------
     Measurement
         Modes, followed mode, calibrated model, and remarks.
     """
-    return interpret_fit(fit_tap(tap, machine, by_hand), machine, last)
+    return interpret_fit(fit_tap(tap, machine, by_hand), machine, last, reference)
 
 
 @time_step("fitting")
@@ -156,8 +166,13 @@ def mode_edits_remarks(by_hand: ModeEdits) -> tuple[Remark, ...]:
     return (Remark("modes-by-hand", str(by_hand), "modes chosen by the user"),) if by_hand else ()
 
 
-def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
-    """Follow the mode, calibrate the model and find the modes at the tip; last: followed mode of the previous test."""
+def interpret_fit(
+    fit: TapFit, machine: Machine, last: Mode | None, reference: SeriesReference = NO_REFERENCE
+) -> Measurement:
+    """Follow the mode, calibrate the model and find the modes at the tip.
+
+    last: followed mode of the previous test; reference: earlier tests of the series.
+    """
     if fit.direction == CROSS_TAP:
         return _interpret_cross_tap(fit, machine, last)
     if fit.failed:
@@ -167,9 +182,13 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         trusted = modal.select_credible_modes(_select_in_band(modes, machine))
         remarks += trusted.remarks
         followed = _follow_mode(trusted, modes, machine, remarks, last)
+        remarks += _find_series_questions(followed, trusted.modes, reference, remarks)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
         is_at_tip = machine.tap.position_mm == 0
+        if at_tip and is_at_tip and fit.frf is not None:
+            highest = float(fit.frf.frequency[-1])
+            remarks += filter(None, [check_tool_compliance(modes, machine, fit.tool, highest)])
         used = trusted.modes if is_at_tip or followed is None else (followed,)
         unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
         at_tip += [peak.missing for peak in unexplained if is_at_tip]
@@ -216,10 +235,19 @@ def _follow_mode(
     if jump is not None:
         remarks.append(jump)
         return now
-    remarks += [] if next_mode.mode is None else filter(None, [questions.check_stiffness_jump(last, next_mode.mode)])
     cure = "For a rebuilt spindle, set [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode
+
+
+def _find_series_questions(
+    followed: Mode | None, modes: Sequence[Mode], reference: SeriesReference, remarks: Sequence[Remark]
+) -> list[Remark]:
+    """Return the questions from the numbers of the series; none if the mode of the series was lost."""
+    if followed is None or any(remark.code in LOST_MODE_CODES for remark in remarks):
+        return []
+    same = check_same_direction(followed, modes, reference)
+    return [*check_series(followed, reference), *filter(None, [same])]
 
 
 def _calibrate(

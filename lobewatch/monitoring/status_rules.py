@@ -217,6 +217,7 @@ STATUS_RULES = (
     MODE_LOST,
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
+    *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),
     *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )

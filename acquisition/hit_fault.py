@@ -56,6 +56,8 @@ class HitFlags(enum.Flag):
     """The response is not above its noise."""
     SURPLUS = enum.auto()
     """The hit is good, but enough others agree better."""
+    STEADY_VIBRATION = enum.auto()
+    """A steady vibration began after the self-check, as that of a turning spindle."""
 
     @property
     def words(self) -> str:
@@ -240,10 +242,18 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
         {
             "": "The response in its loudest tenth is {ratio:.2g} times its noise (limit {noise_ratio:g})",
             "constant": "The response is constant",
+            "steady": "The response of {level:.3g} m/s^2 rms is hum or drift that does not answer the hit",
+            "saturated": "The response is at the limit of its range already before the hit",
         },
         {"noise_ratio": 1.15},
     ),
     HitFlags.SURPLUS: HitFault("surplus", "Enough other hits agree better with each other."),
+    HitFlags.STEADY_VIBRATION: HitFault(
+        "steady vibration",
+        "Stop the spindle and nearby machines, then hit again. If the spindle stands still, check the cable.",
+        {"": "Since the self-check, {finding}"},
+        {"rest_ratio": 3.0},
+    ),
 }
 """Fault of each flag.
 
@@ -251,5 +261,5 @@ The limits are chosen. A peak below 2 % of the force range shows the steps of th
 saturate before its converter. The last tenth of the response may have 2 % of the rms of its loudest tenth, or twice the
 noise. The loudest tenth of mere noise is below 1.15 times its rms before the hit. A hit 30 % away from the mean would
 move a mean of ten hits by 3 %. Its distance must also be 4 times what the scatter of the hits would give. A pulse whose
-first 10 % of the peak are missing has lost 1 % of its impulse.
+first 10 % of the peak are missing has lost 1 % of its impulse. A steady vibration has 3 times the rms at rest.
 """

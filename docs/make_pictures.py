@@ -23,6 +23,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 IMAGES = Path(__file__).with_name("images")
 SIZE = (1280, 657)
 STATES = {
+    "screen-ask": "SPINDLE STOPPED?",
     "screen-checking": "CHECKING",
     "screen-tap": "TAP",
     "screen": "GOOD",
@@ -84,6 +85,8 @@ def screens(folder: Path, driver: webdriver.Chrome) -> None:
                 name = WebDriverWait(driver, 90, 0.02).until(lambda _, left=left: state_of(driver, left))
                 driver.save_screenshot(str(IMAGES / f"{name}.png"))
                 del left[name]
+                if name == "screen-ask":
+                    driver.find_element(By.CSS_SELECTOR, "#choices button").click()
                 if name == "screen-move":
                     driver.find_element(By.XPATH, "//button[contains(., 'tap y')]").click()
 

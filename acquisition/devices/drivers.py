@@ -119,7 +119,8 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
 
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
-    return TapsEmulator(signal, channels, setup.sample_rate, realtime=setup.realtime, tcp=setup.tcp)
+    rate, realtime = setup.sample_rate, setup.realtime
+    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, clock=setup.clock)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
@@ -141,7 +142,8 @@ def _emulate_dataq(setup: EmulationSetup) -> EmulatorThread:
 
     skewed = any(sensor.channel.skew for sensor in setup.inputs)
     traits = DataqTraits(is_multiplexed=skewed, clock_hz=EMULATED_CLOCK_FREQUENCY if setup.digital_clock else None)
-    return DataqEmulator(setup.signal_at, setup.inputs, realtime=setup.realtime, tcp=setup.tcp, traits=traits)
+    signal, realtime = setup.signal_at, setup.realtime
+    return DataqEmulator(signal, setup.inputs, realtime=realtime, tcp=setup.tcp, traits=traits, clock=setup.clock)
 
 
 def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
@@ -149,7 +151,8 @@ def _emulate_text_board(setup: EmulationSetup) -> EmulatorThread:
 
     volts = tuple(sensor.channel.sensitivity for sensor in setup.inputs)
     rate, full_scale = min(setup.sample_rate, EMULATED_BOARD_RATE), setup.inputs[0].channel.full_scale
-    return TextBoardEmulator(setup.signal_at(rate), volts, full_scale, rate, realtime=setup.realtime, tcp=setup.tcp)
+    signal, true_rate = setup.signal_at(rate), (1 + setup.clock_error) * rate
+    return TextBoardEmulator(signal, volts, full_scale, true_rate, realtime=setup.realtime, tcp=setup.tcp)
 
 
 def _import(module: str) -> Any:

@@ -5,6 +5,7 @@ import os
 import select
 import socket
 import threading
+import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -122,6 +123,12 @@ class EmulationSetup:
     """True if it serves a TCP port of this computer instead of a pseudo-terminal."""
     digital_clock: bool = False
     """True if a square wave is on digital input 0."""
+    clock_error: float = 0.0
+    """Relative error of its sample clock, of which it does not know."""
+
+    def clock(self) -> float:
+        """Return the time (s) by the clock of the device."""
+        return (1 + self.clock_error) * time.monotonic()
 
 
 class PtyWire:

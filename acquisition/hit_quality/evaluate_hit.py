@@ -16,6 +16,7 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HIT_FAULTS, TOUCH_TEXT, HitFlags
 from acquisition.hit_quality.double_hit import find_force_hole, find_highest_touch, find_second_input
+from acquisition.hit_quality.missing_response import is_saturated, is_steady, measure_levels
 from acquisition.hit_quality.overload_and_hum import find_overload, fit_mains_hum, is_like_hum
 from acquisition.hits.force_window import window_force
 from acquisition.hits.free_decay import MAX_CONTACT_TIME, extract_free_decay, measure_rest_noise
@@ -102,6 +103,8 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
         return HitVerdict.from_findings(findings | ({} if findings else _evaluate_response(hit)) | _evaluate_decay(hit))
     if _is_swapped(hit):
         return HitVerdict.from_findings(findings | _state(HitFlags.SWAPPED_CHANNELS))
+    if is_saturated(hit):
+        return HitVerdict.from_findings(_state(HitFlags.NO_RESPONSE, "saturated"))
     pulse = find_pulse(hit)
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
@@ -283,19 +286,22 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
 
 
 def _evaluate_response_level(hit: Hit) -> Findings:
-    """Compare the response with its noise before the hit; a constant one is none either."""
-    quiet = hit.acceleration[: int(0.8 * count_pre_hit_samples(hit))]
-    if np.ptp(hit.acceleration) == 0:
+    """Compare the response with its noise before the hit, and find hum and drift; a constant one is none either.
+
+    The noise in a few samples before the hit is uncertain. The median of all tenths then confirms it.
+    """
+    response, limit = hit.acceleration, HIT_FAULTS[HitFlags.NO_RESPONSE].limits["noise_ratio"]
+    if np.ptp(response) == 0:
         return _state(HitFlags.NO_RESPONSE, "constant")
+    quiet, levels = response[: int(0.8 * count_pre_hit_samples(hit))], measure_levels(response)
     noise = float(np.std(quiet)) if quiet.size >= MIN_QUIET_SAMPLES else 0.0
-    ratio = _measure_levels(hit.acceleration).max() / noise if noise else np.inf
-    is_missing = ratio < HIT_FAULTS[HitFlags.NO_RESPONSE].limits["noise_ratio"]
-    return _state(HitFlags.NO_RESPONSE, ratio=ratio) if is_missing else {}
-
-
-def _measure_levels(response: Floats) -> Floats:
-    """Return the standard deviation of each tenth."""
-    return np.array([np.std(tenth) for tenth in np.array_split(response, 10)])
+    ratio = levels.max() / noise if noise else np.inf
+    if levels.max() < limit * np.median(levels):
+        ratio /= 1 + 2 / np.sqrt(2 * max(quiet.size, 1))
+    if ratio < limit:
+        return _state(HitFlags.NO_RESPONSE, ratio=ratio)
+    is_missing = is_steady(response, quiet.size)
+    return _state(HitFlags.NO_RESPONSE, "steady", level=float(np.std(response))) if is_missing else {}
 
 
 def describe_highest_touch(hit: Hit) -> tuple[str, ...]:
@@ -369,7 +375,7 @@ def _measure_residual(hit: Hit, end: int) -> tuple[float, bool]:
 def _compute_residual_share(response: Floats, before: int) -> float:
     """Return the rms of the last tenth over that of the loudest tenth; 0 where it is small or mere noise."""
     limits = HIT_FAULTS[HitFlags.NOT_DECAYED].limits
-    levels = _measure_levels(response)
+    levels = measure_levels(response)
     quiet = response[:before]
     noise = float(np.std(quiet)) if quiet.size >= MIN_QUIET_SAMPLES else 0.0
     limit = max(limits["residual_share"] * levels.max(), limits["noise_ratio"] * noise)

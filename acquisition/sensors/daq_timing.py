@@ -97,14 +97,39 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
         if arrived[-1] - arrived[0] >= seconds:
             break
     source.stop()
-    elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
+    elapsed = arrived[-1] - arrived[0] if scans else 0.0
     if len(scans) < MIN_RATE_BLOCKS or elapsed < seconds:
         needed = f"but at least {MIN_RATE_BLOCKS} in {seconds:g} s are needed"
         text = f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s, {needed}"
         raise DeviceError(text, "Check the sample rate and the cable of the DAQ")
-    period, scatter = _fit_scan_period(np.array(scans, dtype=np.float64), np.array(arrived))
+    return fit_rate(scans, arrived)
+
+
+def fit_rate(scans: ArrayLike, arrived: ArrayLike) -> MeasuredRate:
+    """Fit the sample rate to the arrival times of blocks, as `measure_rate` does.
+
+    Parameters
+    ----------
+    scans : array_like, shape (n,)
+        Number of scans of the stream up to the end of each block, n >= 10.
+    arrived : array_like, shape (n,)
+        Time of arrival of each block (s).
+
+    Returns
+    -------
+    MeasuredRate
+        Sample rate and its standard error.
+
+    Examples
+    --------
+    >>> round(fit_rate(512 * np.arange(100), 0.05 * np.arange(100)).rate)  # Hz
+    10240
+    """
+    counts, times = np.asarray(scans, dtype=np.float64), np.asarray(arrived, dtype=np.float64)
+    n_scans, elapsed = counts[-1] - counts[0], times[-1] - times[0]
+    period, scatter = _fit_scan_period(counts, times)
     std = float(np.hypot(scatter, USB_POLL_INTERVAL / np.sqrt(6) / n_scans) / period**2)
-    return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
+    return MeasuredRate(float(1 / period), std, int(n_scans), float(elapsed))
 
 
 def check_rate(measured: MeasuredRate, nominal: float) -> None:

@@ -2,6 +2,7 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -95,6 +96,8 @@ class TapsEmulator(TapsServer, EmulatorThread):
         Path that always leads to the pseudo-terminal, also after `replug`, like /dev/serial/by-id.
     faults
         Faults to inject, None for none.
+    clock
+        Clock that scans follow (s).
 
     Examples
     --------
@@ -118,8 +121,10 @@ class TapsEmulator(TapsServer, EmulatorThread):
         tcp: bool = False,
         link: Path | None = None,
         faults: TapsFaults | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(tcp, link)
+        self._time = clock
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or TapsFaults()
         self._clock, self._restarted = 0, False
@@ -196,14 +201,14 @@ class TapsEmulator(TapsServer, EmulatorThread):
         """Start a session and report active faults."""
         self._session = (self._session + 1) % 0x10000
         self._begin_count(n_scans)
-        self._started = self._status_due
+        self._started = self._time()
         self._pending_events.extend(event for event in self._active_faults.values() if event.begins)
 
     def _stream(self) -> None:
         """Send the frames that are due, drop them if the host is late, report from time to time."""
         if self._is_blocked():
             return
-        due = int((time.monotonic() - self._started) * self._rate) if self._realtime else self._scan + self._per_frame
+        due = int((self._time() - self._started) * self._rate) if self._realtime else self._scan + self._per_frame
         while self._scan + self._per_frame <= due:
             self._send_scans(overrun=not self._has_room())
         self._report_status(31.5)

@@ -65,6 +65,8 @@ MAX_LINE_BYTES = 200
 """Longest line of numbers (bytes)."""
 EMULATED_LINE = b"# emulated device"
 """Line among the numbers by which an emulated board says that it is emulated."""
+UNCLOCKED_LINE = b"# emulated device without a clock"
+"""Line of an emulated board that prints as fast as the host reads."""
 
 
 class _RowDecoder:
@@ -91,6 +93,8 @@ class LineDecoder(_RowDecoder):
         self._columns, self._counts = 0, counts
         self.is_emulated = False
         """True after the board has said that it is emulated."""
+        self.follows_clock = True
+        """False after the board has said that it prints as fast as the host reads."""
 
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the rows that these bytes complete."""
@@ -99,8 +103,10 @@ class LineDecoder(_RowDecoder):
         if lines and not self._begun:
             self._begun, lines = True, lines[1:]
         texts = [line.strip() for line in lines]
-        self.is_emulated |= EMULATED_LINE in texts
-        yield from self._split_at_broken(self._parse_line(text) for text in texts if text not in (b"", EMULATED_LINE))
+        self.follows_clock &= UNCLOCKED_LINE not in texts
+        self.is_emulated |= EMULATED_LINE in texts or not self.follows_clock
+        silent = (b"", EMULATED_LINE, UNCLOCKED_LINE)
+        yield from self._split_at_broken(self._parse_line(text) for text in texts if text not in silent)
 
     def _parse_line(self, line: bytes) -> list[float]:
         """Return the finite numbers of a line, as many as in the first, none if it contains anything else."""

@@ -16,6 +16,7 @@ from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink, find_usb
 from acquisition.source import EMULATED_SERIAL, ClosedOnExit, DeviceIdentity, Event
 from acquisition.text_boards.decoders import (
     EMULATED_LINE,
+    UNCLOCKED_LINE,
     LineDecoder,
     OutputFormat,
     ScanCounter,
@@ -87,8 +88,6 @@ class TextBoardSource(ClosedOnExit):
         There is no port.
     """
 
-    follows_clock = True
-    """True, as scans follow the clock. Their rate can only be measured."""
     fault = ""
     """Empty: the board reports no faults."""
 
@@ -105,8 +104,10 @@ class TextBoardSource(ClosedOnExit):
         self._running = False
         self._link = SerialLink(port, self._printing.baud_rate)
         usb = find_usb_identity(port)
-        is_emulated = usb is None and self._printing.frame is None and _says_emulated(self._link)
-        self.identity = DeviceIdentity("lines", EMULATED_SERIAL if is_emulated else usb[1] if usb else port)
+        heard = _listen_for_emulator(self._link) if usb is None and self._printing.frame is None else LineDecoder()
+        self.follows_clock = heard.follows_clock
+        """True if scans follow the clock: not those of an emulated board that prints as fast as they are read."""
+        self.identity = DeviceIdentity("lines", EMULATED_SERIAL if heard.is_emulated else usb[1] if usb else port)
 
     def start(self) -> None:
         """Count scans from the next whole line on."""
@@ -159,12 +160,12 @@ class TextBoardSource(ClosedOnExit):
         return codes
 
 
-def _says_emulated(link: SerialLink) -> bool:
+def _listen_for_emulator(link: SerialLink) -> LineDecoder:
     """Listen for the line by which an emulated board says that it is emulated."""
     decoder, deadline = LineDecoder(), time.monotonic() + EMULATED_LISTEN_TIME
     while not decoder.is_emulated and (remaining := deadline - time.monotonic()) > 0:
         list(decoder.feed(link.read(remaining)))
-    return decoder.is_emulated
+    return decoder
 
 
 def check_text_board(inputs: Sequence[SensorInput], sample_rate: float | None) -> float:
@@ -259,7 +260,7 @@ class TextBoardEmulator(EmulatorThread):
             for k, row in enumerate(np.clip(volts, -self._full_scale, self._full_scale).T):
                 self._print(self._scan + k, row)
             if self._printing.frame is None:
-                self.wire.pending += EMULATED_LINE + b"\r\n"
+                self.wire.pending += (EMULATED_LINE if self._realtime else UNCLOCKED_LINE) + b"\r\n"
             self._scan += SCANS_PER_PRINT
         return True
 

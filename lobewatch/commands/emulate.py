@@ -19,6 +19,18 @@ from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help=COMMANDS["emulate"], no_args_is_help=True)
 
+EmulatedFaultName: TypeAlias = Literal[
+    "none",
+    "response-cable",
+    "force-cable",
+    "open-input",
+    "saturated",
+    "swapped",
+    "falling-sensor",
+    "soft-tip",
+    "mains-hum",
+]
+"""Name of an emulated fault."""
 SCENARIO_MONTHS = 24
 """Length of a wear scenario (months)."""
 
@@ -54,6 +66,18 @@ class EmulateOptions:
         Option(help="Angle of the principal directions from x (deg), 0 to 90."),
     ] = None
     """Angle of the principal directions from x (deg). None for a round spindle."""
+    fault: Annotated[EmulatedFaultName, Option(help="Fault of sensors, cables or hammer in an emulated tap test.")] = (
+        "none"
+    )
+    """Fault of the measurement chain."""
+    turning: Annotated[float, Option(min=0, max=200_000, help="Spindle speed in a tap test (rpm).")] = 0.0
+    """Speed of a spindle that turns while it is tapped (rpm)."""
+    fault_after: Annotated[float, Option(min=0, help="Time at which --fault and --turning begin (s).")] = 0.0
+    """Time at which fault and turning begin (s)."""
+    clock_error: Annotated[
+        float, Option(min=-50, max=50, help="Error of the sample clock (%), of which the device does not know.")
+    ] = 0.0
+    """Error of the sample clock (%)."""
     cut: Annotated[
         str | None,
         Option(metavar="PROGRAM", help="Program of an emulated cut. Default: tap tests, no cut."),
@@ -131,9 +155,12 @@ def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulatio
     """Emulate tap tests. `shared` holds the arguments that a cut takes too."""
     if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth need a cut. Add --cut PROGRAM.")
+    from lobewatch.tap.emulated_faults import EmulatedFault, EmulatedFaults
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, **shared)
+    clock_error = options.clock_error / 100
+    faults = EmulatedFaults(EmulatedFault(options.fault), options.turning, options.fault_after, clock_error)
+    emulated = emulate_machine(direction=options.direction, axes_angle=options.askew, faults=faults, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f1 {emulated.frequency:.2f} Hz, stiffness K {emulated.stiffness / 1e6:.3f} N/um"
     words = f" --direction {options.direction}" * (options.direction != "x")
@@ -144,6 +171,8 @@ def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any
     """Emulate a cut. `shared` holds the arguments that tap tests take too."""
     if options.direction != "x" or options.askew is not None:
         raise ValueError("--cut cannot be used with --direction and --askew. Leave out --cut, or both others.")
+    if options.fault != "none" or options.turning or options.clock_error:
+        raise ValueError("--cut cannot be used with --fault, --turning and --clock-error. Leave out --cut.")
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut
 

@@ -186,11 +186,28 @@ def read_stored_devices(folder: MachineFolder) -> list[StoredDevice]:
         raise DataError(f"{path}: {error}. Delete this file, then lobewatch measures the sample rate again.") from error
 
 
+def replace_stored_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
+    """Replace the stored rate of a device by one measured during a test. An uncertain one only removes the old one.
+
+    Parameters
+    ----------
+    folder
+        Machine folder, locked.
+    device
+        Connected device.
+    measured
+        Measured rate.
+    """
+    if has_clock(device):
+        _store_rate(folder, device, measured)
+
+
 def _store_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
     kept = [entry for entry in read_stored_devices(folder) if not _is_same_device(entry, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     identity, numbers = device.identity, (measured.rate, measured.std, measured.n_scans, measured.seconds)
     new = StoredDevice(identity.model, identity.serial, device.sample_rate, *numbers, now)
     new = msgspec.structs.replace(new, crc=new.computed_crc)
-    content = msgspec.json.format(msgspec.json.encode([*kept, new]), indent=2)
+    entries = [*kept, new] if measured.is_accurate else kept
+    content = msgspec.json.format(msgspec.json.encode(entries), indent=2)
     acquisition.atomic_write(folder.path / "daq.json", content + b"\n")

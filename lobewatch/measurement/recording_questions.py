@@ -114,6 +114,10 @@ EMULATED_DEVICE = RecordingQuestion(
     "emulated-device", sentence="recorded from an emulated device, but other tap tests of this machine are real"
 )
 """Asked of an emulated tap test in a machine with real ones."""
+SPINDLE_TURNING = RecordingQuestion(
+    "spindle-turning", sentence="steady vibration before the first hit: did the spindle turn, or was it mains hum?"
+)
+"""Asked of a live test before its first hit."""
 MODE_QUESTIONS = (
     FREQUENCY_JUMP,
     NO_MODE_IN_BAND,
@@ -128,7 +132,7 @@ MODE_QUESTIONS = (
     WRONG_UNIT,
 )
 RECORDING_QUESTIONS = tuple(question.code for question in MODE_QUESTIONS)
-RECORDING_QUESTIONS += (*clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code, ONE_HIT.code)
+RECORDING_QUESTIONS += (*clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code, ONE_HIT.code, SPINDLE_TURNING.code)
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
 
@@ -191,7 +195,7 @@ def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...
 
 
 def _question_at_commit(code: str, tap: TapEntry) -> Remark:
-    asked = {question.code: question.ask() for question in (EMULATED_DEVICE, ONE_HIT)}
+    asked = {question.code: question.ask() for question in (EMULATED_DEVICE, ONE_HIT, SPINDLE_TURNING)}
     return asked[code] if code in asked else clock.clock_question(code, tap.time)
 
 

@@ -61,7 +61,7 @@ class LiveTest(TapVisit):
             raise DataError(f"{folder.toml}: no port in [daq]. Set port to the value of lobewatch tap --port.")
 
         def plan(tool: str, direction: TapDirection) -> TapSession:
-            return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume)
+            return plan_session(MachineFolder(folder.path), tool=tool, direction=direction, resume=resume, asks=True)
 
         tool = folder.machine.tap.tool
         super().__init__(plan, tool, direction, after=lambda _: publish_status(Logbook.open(folder.path)))

@@ -84,6 +84,7 @@ def emit_tap_results(logbook: Logbook, finished: Sequence[TapSession], as_json: 
             notes.print(format_not_asked(session.unasked, session.saved, logbook.questions), markup=False)
     last = finished[-1]
     payload = measurement_json(last.measurement, logbook)
+    payload["remarks"] = [*payload["remarks"], *last.remarks]
     payload["programs"] = list(map(verdict_json, logbook.verdicts()))
     if last.across is not None:
         payload["across"] = {"tap_id": last.across.tap_id}

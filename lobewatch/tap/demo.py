@@ -28,6 +28,7 @@ from lobewatch.tap.emulated_spindle import (
     remount_spindle,
 )
 from lobewatch.tap.hit_loop import TapPhases
+from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import begin_tap
 
@@ -146,7 +147,8 @@ def _run_tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generato
         folder.locked(),
     ):
         tap = begin_tap(folder, about, resume=False)
-        TapPhases(folder, open_device, publisher, guided=False).run(tap)
+        questions = StartQuestions(publisher, machine.tap.tool, (), asks=False)
+        TapPhases(folder, open_device, publisher, questions=questions, guided=False).run(tap)
         folder.commit(tap.finish())
     return tap.id
 

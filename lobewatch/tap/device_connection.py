@@ -11,6 +11,7 @@ from acquisition.arrays import Codes
 from acquisition.channel import ChannelQuantity
 from acquisition.devices.registry import convert_driver_errors
 from acquisition.hit import TapInputs
+from acquisition.sensors.stream_rate import StreamRate
 from lobewatch.machine.settings.setup_tables import DaqTable
 
 REPLAY_PREFIX = "file:"
@@ -112,6 +113,8 @@ class DeviceConnection:
         """Device, and direction that is tapped. It selects one of several accelerations."""
         self.inputs = TapInputs.select(device.channels, quantity, direction)
         """Inputs of the tap test: force and acceleration, or acceleration only, with a cross sensor between them."""
+        self.rate = StreamRate(device.sample_rate) if device.follows_clock else None
+        """Measured sample rate of the blocks, None without a sample clock."""
         self._recent: deque[Codes] = deque(maxlen=64)
         self._moved: int | None = None
         self._fault = ""
@@ -131,6 +134,8 @@ class DeviceConnection:
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks that the device sends from now on."""
         for block in self.device.blocks():
+            if self.rate is not None:
+                self.rate.add(block)
             self._recent.append(block.codes)
             yield block
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from functools import cached_property, partial
+from functools import cached_property
 from importlib import resources
 from typing import Literal, NamedTuple, Self
 
@@ -22,6 +22,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.spindle_tables import SpindleTable
 from lobewatch.monitoring.level_model import STEEL_FREQUENCY_PER_KELVIN
+from lobewatch.tap.emulated_faults import NO_FAULTS, EmulatedFaults
 
 EMULATED_MODES = 8
 """Number of modes simulated. All higher ones are a static flexibility."""
@@ -126,12 +127,14 @@ def emulate_machine(
     spindle: Spindle | None = None,
     direction: TapDirection = "x",
     axes_angle: float | None = None,
+    faults: EmulatedFaults = NO_FAULTS,
     **serving: bool,
 ) -> EmulatedMachine:
     """Emulate a device of this kind on the spindle of a machine that is tapped again and again.
 
     spindle: replaces that of machine.toml, with the same damping. axes_angle: angle from x (deg) of its principal
-    directions as in `rotate_structure`, None for a round spindle, the same in x and y. serving: as of `emulate_device`.
+    directions as in `rotate_structure`, None for a round spindle, the same in x and y. faults: of the tap test.
+    serving: as of `emulate_device`.
     DataError if machine.toml lacks the sensors of a device that does not describe them itself.
     """
     table, random = get_spindle_table(folder), np.random.default_rng(seed)
@@ -141,10 +144,10 @@ def emulate_machine(
     def signal_of(inputs: Sequence[SensorInput], rate: float) -> SignalFunction:
         is_crossed = any(_is_cross_sensor(sensor, direction) for sensor in inputs)
         cross = [_select_cross_direction(built, axes_angle, direction)] if is_crossed else []
-        hammered = HammeredStructure(structure, rate, random, cross_structures=cross)
-        return map_signal_to_inputs(inputs, hammered, direction)
+        hammered = HammeredStructure(structure, rate, random, faults.hammering, cross_structures=cross)
+        return faults.apply(map_signal_to_inputs(inputs, hammered, direction), inputs, rate)
 
-    device = emulate_device(folder, driver, signal_of, **serving)
+    device = emulate_device(folder, driver, signal_of, clock_error=faults.clock_error, **serving)
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
@@ -152,11 +155,12 @@ InputsSignal = Callable[[Sequence[SensorInput], float], SignalFunction]
 
 
 def emulate_device(
-    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, **serving: bool
+    folder: MachineFolder, driver: Driver, signal_of: InputsSignal, *, clock_error: float = 0.0, **serving: bool
 ) -> acquisition.EmulatorThread:
     """Make an emulated device of this kind.
 
-    signal_of: function of its sensors and sample rate (Hz). serving: `realtime` and `tcp` of `EmulationSetup`.
+    signal_of: function of its sensors and sample rate (Hz). clock_error: relative error of its clock. serving:
+    `realtime` and `tcp` of `EmulationSetup`.
     DataError if such a device cannot be emulated, or machine.toml lacks its sensors.
     """
     if driver.emulate is None:
@@ -164,8 +168,12 @@ def emulate_device(
             f"{driver.title} cannot be emulated. Connect a real device, or emulate another driver."
         )
     inputs = get_emulated_inputs(folder, driver)
-    signal_at, clock = partial(signal_of, inputs), folder.machine.daq.digital_clock
-    setup = acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, digital_clock=clock, **serving)
+
+    def signal_at(rate: float) -> SignalFunction:
+        return signal_of(inputs, (1 + clock_error) * rate)
+
+    setup = acquisition.EmulationSetup(signal_at, inputs, EMULATED_SAMPLE_RATE, clock_error=clock_error, **serving)
+    setup = replace(setup, digital_clock=folder.machine.daq.digital_clock)
     return driver.emulate(setup)
 
 

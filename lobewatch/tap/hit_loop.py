@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 
 from acquisition import Block, DataError, Device, DeviceError, Hit, HitFlags, HitSearch, HitVerdict, Remark, Trigger
 from acquisition.errors import join_sentences
@@ -20,10 +21,13 @@ from lobewatch.tap.device_connection import (
     estimate_resting_rms,
     label_device,
 )
+from lobewatch.tap.hit_check import add_steady_vibration, evaluate_safely
 from lobewatch.tap.live_curves import build_curves
+from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
+from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
-from lobewatch.tap.tap_in_progress import TapInProgress, evaluate_safely
+from lobewatch.tap.tap_in_progress import TapInProgress
 from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 
 MIN_VERDICT_TIME = 0.8
@@ -55,6 +59,7 @@ class TapPhases:
         open_device: Callable[[], Device],
         publisher: StatePublisher[TapState],
         *,
+        questions: StartQuestions,
         guided: bool,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -64,7 +69,7 @@ class TapPhases:
         trial hits need it.
         """
         self._folder, self._open_device, self._publisher = folder, open_device, publisher
-        self._guided, self._sleep = guided, sleep
+        self.questions, self._guided, self._sleep = questions, guided, sleep
         self.undos, self.stopping = threading.Semaphore(0), threading.Event()
         """Requests of any thread to take back the last good hit, each once, and to end the test."""
         self.decisions = queue.SimpleQueue[tuple[int | None, bool]]()
@@ -72,6 +77,9 @@ class TapPhases:
         self._trial: TrialHits | None = None
         self._verdict, self._scan_count = TapStep.TAP, 0
         self._verdict_at: int | None = None
+        self._is_one_stream = True
+        self.remarks: tuple[Remark, ...] = ()
+        """Remarks on the finished test: whether its sample rate is verified."""
 
     def run(self, tap: TapInProgress) -> None:
         """Run all phases, reconnecting as often as needed. DeviceError if the first connection fails."""
@@ -83,11 +91,12 @@ class TapPhases:
                     self._check(connection)
                     self._try(connection)
                     self._take_hits(connection)
-                return
+                return self._check_stream_rate(connection)
             except DeviceError as error:
+                self._check_stream_rate(connection)
                 if not self._tap.missing:
-                    return
-                connection = self._reconnect(error)
+                    return None
+                connection, self._is_one_stream = self._reconnect(error), False
 
     def _connect(self) -> DeviceConnection:
         """Open and start a device that fits the hits so far. Earlier button presses do not count.
@@ -131,14 +140,23 @@ class TapPhases:
         if remarks:
             self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))
 
+    def _check_stream_rate(self, connection: DeviceConnection) -> None:
+        """Check the rate of the blocks so far, and show it. DataError if it is off the rate in use."""
+        if (stream := connection.rate) is None:
+            return
+        is_whole = self._is_one_stream and not self._tap.n_resumed
+        refuse_wrong_rate(self._tap, connection.device, stream, is_whole=is_whole)
+        self.remarks = rate_remarks(stream)
+        others = [check for check in self._publisher.state.checks if check.name != "sample rate"]
+        self._publisher.show(checks=(*others, check_stream_rate(stream)))
+
     def _check(self, connection: DeviceConnection) -> None:
         """Run the self-check, once per session."""
         machine = self._folder.machine
         trigger = self._tap.trigger or trigger_from_setup(machine.tap, connection.device.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
-        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
-        baseline = find_quiet_part(connection.record(self._blocks(connection), SELF_CHECK_DURATION))
+        baseline = self._record_rest(connection)
         self._tap.baseline, free = baseline, shutil.disk_usage(self._folder.path).free
         checks = [*self._publisher.state.checks]
         checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
@@ -147,6 +165,20 @@ class TapPhases:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}" for check in checks if not check.passed]
         self._publisher.show(checks=tuple(checks), reason=join_sentences(*failed))
+
+    def _record_rest(self, connection: DeviceConnection) -> Hit:
+        """Record the signals at rest, after a person has confirmed that the spindle is stopped.
+
+        Nobody is asked about a recording or an emulated device that is faster than real time.
+        """
+
+        def record(duration: float = SELF_CHECK_DURATION) -> Hit:
+            return find_quiet_part(connection.record(self._blocks(connection), duration))
+
+        if connection.device.follows_clock:
+            self.questions.confirm(partial(record, LEVEL_WINDOW))
+        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away from the tool for a second.")
+        return self.questions.settle(record(), record)
 
     def _try(self, connection: DeviceConnection) -> None:
         """Take trial hits if machine.toml leaves a trigger setting open."""
@@ -167,7 +199,8 @@ class TapPhases:
     def _take_trial_hit(self, connection: DeviceConnection, trial: TrialHits) -> bool:
         """Take a trial hit and return whether it was usable."""
         hit = next(filter(None, self._hits(connection, self._at_rest(trial.trigger))))
-        verdict = evaluate_safely(lambda: HitVerdict(trial.add(hit)))
+        verdict = add_steady_vibration(HitVerdict(HitFlags.OK), hit, self._tap.baseline)
+        verdict = verdict if verdict.flags else evaluate_safely(lambda: HitVerdict(trial.add(hit)))
         self._show_verdict(verdict.flags, verdict.text or verdict.flags.cure or trial.text, trial=True)
         self._show_curves(hit)
         return not verdict.flags
@@ -180,6 +213,9 @@ class TapPhases:
         for hit in self._hits(connection, self._at_rest(tap.trigger)):
             if tap.missing and hit is not None:
                 self._take(hit)
+                found = connection.rate and connection.rate.find_deviation()
+                if found and found.is_accurate:  # so that the kept hits get the right rate
+                    self._check_stream_rate(connection)
             elif not tap.missing and self._verdict_age(connection.device.sample_rate) >= undo_time:
                 return
 

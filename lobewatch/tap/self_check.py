@@ -10,11 +10,18 @@ from acquisition import Channel, DataError, Hit, Remark, calibration_remark, cha
 from acquisition.arrays import Codes
 from acquisition.errors import join_sentences
 from dsm import format_rounded, natural_frequencies
-from lobewatch.arrays import Flags, Floats
+from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
 from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
+from lobewatch.tap.steady_line import (
+    MIN_LINE_CODES,
+    MIN_LINE_POWER_SHARE,
+    compute_power_spectrum,
+    find_steady_line,
+    measure_hum,
+)
 from lobewatch.tap.trial_hits import CHANNEL_UNITS
 
 QUIET_PIECE_TIME = 0.01
@@ -27,16 +34,6 @@ MIN_TRIGGER_NOISE_RATIO = 6.0
 """Smallest trigger level over the rms of the force at rest."""
 MAX_RESPONSE_NOISE_SHARE = 0.02
 """Largest noise of the response as a share of its range."""
-MAINS = (50.0, 60.0)
-"""Mains frequencies (Hz)."""
-CHECKED_MAINS_HARMONICS = 6
-"""Number of mains harmonics checked."""
-MIN_HUM_POWER_SHARE = 0.5
-"""Share of the power at rest in mains lines that is reported as hum, chosen."""
-MIN_SPINDLE_POWER_SHARE = 0.5
-"""Share of the power at rest in another single line that is reported as a turning spindle, chosen."""
-MIN_LINE_CODES = 3.0
-"""RMS of such lines (converter steps) below which they are ignored, chosen."""
 MIN_DISK_RESERVES = 4
 """Free disk space over that reserved by a test, at least, chosen."""
 SENSOR_ERROR_CODES = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-wrong"})
@@ -137,50 +134,26 @@ def _check_response_noise(rms: float, channel: Channel) -> Check:
     return Check("response noise", False, join_sentences(f"{text}, {100 * rms / scale:.2g} % of the range", cure))
 
 
-def _power_spectrum(signal: Floats, rate: float) -> tuple[Floats, Floats]:
-    """Return frequencies (Hz) and power of a Hann-windowed record. The powers add up to its mean square."""
-    window = np.hanning(signal.size)
-    power = np.abs(np.fft.rfft((signal - np.mean(signal)) * window)) ** 2
-    return np.arange(power.size) * rate / signal.size, 2 * power / (signal.size * np.sum(window**2))
-
-
-def _select_lines(frequency: Floats, *lines: float) -> Flags:
-    """Select the lines over which a Hann window spreads these frequencies."""
-    return np.asarray(np.any([np.abs(frequency - line) <= 2 * frequency[1] for line in lines], axis=0))
-
-
-def _list_harmonics(mains: float) -> list[float]:
-    return [mains * k for k in range(1, CHECKED_MAINS_HARMONICS + 1)]
-
-
 def _check_hum(baseline: Hit) -> Check:
     """Check for mains lines in each channel."""
     texts = []
     for channel, signal, unit in _list_signals(baseline):
-        frequency, power = _power_spectrum(signal, baseline.sample_rate)
-        sums = [float(np.sum(power[_select_lines(frequency, *lines)])) for lines in map(_list_harmonics, MAINS)]
-        hum, worst = max(sums), MAINS[int(np.argmax(sums))]
-        if hum > MIN_HUM_POWER_SHARE * np.sum(power) and np.sqrt(hum) > MIN_LINE_CODES * abs(channel.scale):
-            texts.append(
-                f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and harmonics in the {channel.quantity} signal"
-            )
+        frequency, power = compute_power_spectrum(signal, baseline.sample_rate)
+        hum, mains = measure_hum(frequency, power)
+        if hum**2 > MIN_LINE_POWER_SHARE * np.sum(power) and hum > MIN_LINE_CODES * abs(channel.scale):
+            texts.append(f"{hum:.2g} {unit} rms at {mains:g} Hz and harmonics in the {channel.quantity} signal")
     if texts:
-        return Check("hum", False, join_sentences(", ".join(texts), "Check cable shields and grounding"))
+        cure = "Check that the spindle stands still, then check cable shields and grounding"
+        return Check("hum", False, join_sentences(", ".join(texts), cure))
     return Check("hum", True, "no mains hum")
 
 
 def _check_spindle(baseline: Hit) -> Check:
-    """Check for one strong line in the response that is not mains hum."""
-    channel, signal, unit = _list_signals(baseline)[-1]
-    frequency, power = _power_spectrum(signal, baseline.sample_rate)
-    mains = [line for mains in MAINS for line in _list_harmonics(mains)]
-    off_mains = np.where(_select_lines(frequency, *mains), 0.0, power)
-    line = float(frequency[int(np.argmax(off_mains))])
-    rms = float(np.sqrt(np.sum(off_mains[_select_lines(frequency, line)])))
-    if rms**2 > MIN_SPINDLE_POWER_SHARE * np.sum(power) and rms > MIN_LINE_CODES * abs(channel.scale):
-        vibration = f"{format_rounded(rms, digits=2)} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
-        return Check("spindle", False, f"steady vibration of {vibration}. Stop the spindle and nearby machines.")
-    return Check("spindle", True, "no steady vibration")
+    """Check for a strong line in the response that weak mains hum does not explain."""
+    line = find_steady_line(baseline)
+    if line is None or not line.is_asked:
+        return Check("spindle", True, "no steady vibration")
+    return Check("spindle", False, line.text)
 
 
 def _list_signals(baseline: Hit) -> list[tuple[Channel, Floats, str]]:

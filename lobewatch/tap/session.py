@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from functools import partial
 
 import acquisition
-from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, TapTest
+from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, Remark, TapTest
 from acquisition.errors import PERMISSION_ERRNOS, format_os_error, join_sentences
 from dsm import format_with_error
 from lobewatch.logbook import Logbook
@@ -18,6 +18,7 @@ from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceOpener
 from lobewatch.tap.hit_loop import TapPhases, TapStopped
+from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Outcome, ProgramVerdict, StatePublisher, TapState, TapStep
 from lobewatch.tap.tap_in_progress import CrossTapResult, TapInProgress, begin_tap, commit_cross_tap
 from lobewatch.verdicts.program_remarks import CROSS_NOT_TAPPED_CODE
@@ -41,6 +42,8 @@ class TapSession:
         and the outcome.
     accept
         Codes of questions about the recording that are answered already.
+    asks
+        Whether a person can answer questions before the first hit.
     clock
         Function that returns a monotonic time (s).
     sleep
@@ -61,15 +64,19 @@ class TapSession:
         resume: bool = True,
         guided: bool = True,
         accept: Sequence[str] = (),
+        asks: bool = False,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._accept = check_question_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
         self._publisher = StatePublisher(first, clock)
-        self._phases = TapPhases(folder, partial(self._open, open_device), self._publisher, guided=guided, sleep=sleep)
+        codes = check_question_codes(accept)
+        self.questions = StartQuestions(self._publisher, circumstances.tool, codes, asks=asks)
+        """Questions before the first hit, and the accepted codes."""
+        opener, publisher = partial(self._open, open_device), self._publisher
+        self._phases = TapPhases(folder, opener, publisher, questions=self.questions, guided=guided, sleep=sleep)
         self._measurement: Measurement | None = None
         self.wakes = self._publisher.wakes
         """Functions called after every change by the thread of the test. None may take time."""
@@ -84,6 +91,11 @@ class TapSession:
     def state(self) -> TapState:
         """Newest state of the test, replaced and never changed."""
         return self._publisher.state
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Remarks on the finished test: whether its sample rate is verified."""
+        return self._phases.remarks
 
     @property
     def measurement(self) -> Measurement:
@@ -112,22 +124,22 @@ class TapSession:
         """End the test now. `run` raises TapStopped, and the hits so far stay stored."""
         self._phases.stopping.set()
 
-    def choose(self, key: str, tool: str = "") -> None:
-        """Reject a choice: nothing comes after a single test.
+    def choose(self, key: str, tool: str = "") -> None:  # noqa: ARG002 - as of a visit, which has a next tool
+        """Answer the question that is shown before the first hit.
 
         Parameters
         ----------
         key
             Key of a choice.
         tool
-            Name of a tool.
+            Not used: nothing comes after a single test.
 
         Raises
         ------
         ValueError
-            Always.
+            The choice is not shown.
         """
-        raise ValueError(f"{f'{key} {tool}'.strip()!r} is not available. This session has a single test.")
+        self.questions.answer(key)
 
     def run(self) -> TapTest:
         """Take hits until enough are good, commit the test and return it.
@@ -164,7 +176,7 @@ class TapSession:
         """Open the device. DataError for an emulated one in a machine with real tap tests, unless that is accepted."""
         device = open_device()
         asked = find_device_questions(self._folder, device.identity)
-        if set(asked) <= set(self._accept):
+        if set(asked) <= set(self.questions.accepted):
             return device
         device.close()
         cure = f"Tap another machine, or add accept_questions.codes {asked[0]} to store it here"
@@ -191,11 +203,14 @@ class TapSession:
         self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
-        logbook.commit(tap, now)
-        self.across = commit_cross_tap(in_progress, partial(logbook.commit, now=now))
+        commit = partial(logbook.commit, now=now)
+        if self.questions.asked:
+            commit = partial(commit, asked=self.questions.asked)
+        commit(tap)
+        self.across = commit_cross_tap(in_progress, commit)
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]
         try:
-            self.unasked = logbook.accept(self.saved, self._accept)
+            self.unasked = logbook.accept(self.saved, self.questions.accepted)
             self._measurement = logbook.measurement(tap.id)
             outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
@@ -270,6 +285,7 @@ def plan_session(
     operator: str = "",
     resume: bool = True,
     accept: Sequence[str] = (),
+    asks: bool = False,
     conditions: Conditions = acquisition.UNKNOWN_CONDITIONS,
 ) -> TapSession:
     """Plan a session of today. machine.toml supplies what is left empty.
@@ -290,6 +306,8 @@ def plan_session(
         Whether to resume an interrupted test of the same tool and direction.
     accept
         Codes of questions about the recording that are answered already.
+    asks
+        Whether a person can answer questions before the first hit.
     conditions
         Conditions of today.
 
@@ -313,4 +331,4 @@ def plan_session(
     conditions = conditions.with_defaults(machine.tap.conditions(tool))
     what = machine.machine.name, datetime.now(UTC), tool, wanted, operator
     about = Circumstances(*what, folder.toml_text, conditions=conditions)
-    return TapSession(folder, DeviceOpener(machine.daq, port).open, about, resume=resume, accept=accept)
+    return TapSession(folder, DeviceOpener(machine.daq, port).open, about, resume=resume, accept=accept, asks=asks)

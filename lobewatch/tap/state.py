@@ -13,6 +13,8 @@ from lobewatch.arrays import Floats
 class TapStep(enum.StrEnum):
     """Step of a tap test, as a word that can be read from 3 m."""
 
+    ASK = "SPINDLE STOPPED?"
+    """A person must say that the spindle is stopped, or stop it."""
     CHECKING = "CHECKING"
     """The self-check before the first hit runs."""
     TAP = "TAP"

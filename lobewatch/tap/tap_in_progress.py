@@ -15,6 +15,7 @@ import acquisition
 from acquisition import (
     CROSS_TAP,
     Circumstances,
+    DataError,
     Hit,
     HitDecision,
     HitFlags,
@@ -25,9 +26,8 @@ from acquisition import (
 )
 from acquisition.errors import format_os_error, join_sentences
 from acquisition.file_io import make_folder
-from acquisition.hit_fault import HIT_FAULTS
 from acquisition.hit_quality.best_hits import choose_best_hits
-from acquisition.hit_quality.decide_hits import add_decisions, average_decided_hits
+from acquisition.hit_quality.decide_hits import add_decisions
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
 from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
@@ -35,18 +35,10 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
 from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
+from lobewatch.tap.hit_check import add_steady_vibration, average_hits, evaluate_safely, format_peak
+from lobewatch.tap.kept_rate import correct_rate, find_kept_rate
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
-
-
-def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
-    """Call `evaluate`. If it fails, reject the hit as NOT_JUDGED with the reason: one hit must not end a test."""
-    try:
-        return judge()
-    except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
-        failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
-        return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
-
 
 MIN_HITS_FOR_MEAN = 3
 """Hits in a mean with which others are compared."""
@@ -237,6 +229,7 @@ class TapInProgress:
         elif mean is not None and len(references) < len(self.mean.hits):
             mean = acquisition.estimate_frf(references)
         verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
+        verdict = add_steady_vibration(verdict, hit, self.baseline)
         if not verdict.flags:
             self.mean.add(hit)
         return verdict
@@ -275,26 +268,6 @@ def _compare(hit: Hit, others: Sequence[Hit]) -> HitVerdict:
     return HitVerdict.from_findings(evaluate_spectrum(hit, acquisition.estimate_frf(others)))
 
 
-def average_hits(
-    tap_id: str,
-    about: Circumstances,
-    hits: Sequence[Hit],
-    flags: Sequence[HitFlags],
-    decisions: tuple[HitDecision, ...] = (),
-) -> TapTest:
-    """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
-    frf, _ = average_decided_hits(hits, decide_flags(flags, decisions))
-    hits = tuple(replace(hit, cross_hit=None) for hit in hits)
-    return TapTest(tap_id, about, frf, hits, tuple(flags), decisions=decisions)
-
-
-def format_peak(hit: Hit) -> str:
-    """Format the largest force of a hit, or without a force sensor its largest acceleration, with the unit."""
-    if hit.has_force:
-        return f"{hit.force.max():.0f} N"
-    return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"
-
-
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
     """Begin a tap test, or resume the interrupted one of the same tool and direction.
 
@@ -330,18 +303,28 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if resume and newest is None and same and circumstances.created - about.created < spool.MAX_RESUME_AGE:
+        rate, fault = _find_rate(folder, path)
+        is_recent = circumstances.created - about.created < spool.MAX_RESUME_AGE
+        if resume and newest is None and same and is_recent and not fault:
             newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
             for hit in (first, *hits):
-                newest.add_spooled(hit)
+                newest.add_spooled(hit._replace(hit=correct_rate(hit.hit, rate)))
             newest.resume_mean()
             conditions = circumstances.conditions.with_defaults(newest.circumstances.conditions)
             newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             test = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
-            text = f"An interrupted test ({test}) is still in {path}"
+            text = f"An interrupted test ({test}{fault and f', {fault}'}) is still in {path}"
             new.not_resumed.append(join_sentences(text, "Delete this folder if you do not need the test"))
     return newest
+
+
+def _find_rate(folder: MachineFolder, test: Path) -> tuple[float | None, str]:
+    """Return the sample rate that replaces that of the hits, None for their own, and why they cannot be resumed."""
+    try:
+        return find_kept_rate(folder.machine.daq, test), ""
+    except DataError as error:
+        return None, str(error)
 
 
 MIN_CROSS_TAP_HITS = 3

@@ -73,7 +73,10 @@ class TapVisit:
 
     def choose(self, key: str, tool: str = "") -> None:
         """Choose what comes next by the key of a choice. tool: name of the next one. ValueError if not possible."""
-        if not self.is_waiting or key not in [choice.key for choice in self.state.choices]:
+        if not self.is_waiting:
+            self._session.choose(key, tool)
+            return
+        if key not in [choice.key for choice in self.state.choices]:
             raise ValueError(f"{key!r} is not available now. Use a choice that the page shows.")
         if key == NEXT_TOOL_CHOICE.key and not tool.strip():
             raise ValueError("the next tool has no name. Enter a tool name of machine.toml or a new name.")
@@ -82,9 +85,12 @@ class TapVisit:
     def run(self) -> None:
         """Tap until the operator is done. Raises what `TapSession.run` raises."""
         tapped = set[TapDirection]()
+        confirmed = set[str]()
         while True:
+            self._session.questions.is_confirmed |= self._tool in confirmed
             self._session.wakes.add(self._wake)
             self._session.run()
+            confirmed.add(self._tool)
             tapped.add(self._direction)
             self._after(self._session)
             if not self._leads:

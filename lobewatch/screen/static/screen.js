@@ -158,6 +158,7 @@ function showChoices() {
     ...choices.map(({ key, text }) => {
       const button = element("button", text);
       button.type = "button";
+      if (key === "start") button.prepend(element("kbd", "Y"), " ");
       button.addEventListener("click", () => { button.blur(); choose(key); });
       return button;
     }),
@@ -169,7 +170,8 @@ function showChoices() {
 function showButtons() {
   const choosing = Boolean(state?.choices.length);
   at("choices").hidden = !(choosing && mayAlter);
-  at("undo").hidden = at("stop").hidden = choosing || !mayAlter;
+  at("undo").hidden = choosing || !mayAlter;
+  at("stop").hidden = (choosing && state.kind !== "ask") || !mayAlter;
   document.body.classList.toggle("choosing", choosing);
   document.body.classList.toggle("may-alter", mayAlter && !choosing);
 }
@@ -183,11 +185,13 @@ async function choose(key, tool = "") {
   await ask("choose", "POST", { key, tool }).catch((error) => toast(error.message));
 }
 
-// While the sensor is moved, the foot switch chooses the other direction.
+// Before the test and while the sensor is moved, the foot switch selects the first choice.
 function chooseByKey(key) {
   if (at("choices").hidden) return false;
-  const pressed = state.kind === "move" && UNDO_KEYS.includes(key) ? state.choices[0].key : key.toLowerCase();
-  if (!["x", "y"].includes(pressed) || !state.choices.some((choice) => choice.key === pressed)) return false;
+  const first = state.choices[0].key;
+  const keys = { move: UNDO_KEYS, ask: [...UNDO_KEYS, "Enter", "y", "Y"] }[state.kind] ?? [];
+  const pressed = keys.includes(key) ? first : key.toLowerCase();
+  if (!["x", "y", "start"].includes(pressed) || !state.choices.some((choice) => choice.key === pressed)) return false;
   choose(pressed);
   return true;
 }

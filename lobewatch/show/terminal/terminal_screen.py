@@ -174,6 +174,7 @@ MAX_SHOWN_HITS = 6
 KEY_REPEAT_TIME = 0.7
 """Longest time between undo keys (s) that is one key held down, which counts once."""
 STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
+    TapStep.ASK: ("?", "black on #f0e442"),
     TapStep.CHECKING: ("…", "black on #56b4e9"),
     TapStep.TAP: ("▼", "black on #56b4e9"),
     TapStep.WAIT: ("…", "black on #e69f00"),
@@ -185,7 +186,7 @@ STEP_STYLES: Mapping[TapStep, tuple[str, str]] = {
     TapStep.FAILED: ("✗", "black on #ee8238"),
 }
 """Symbol and style of each step, distinct for color-blind people."""
-BELL_COUNTS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
+BELL_COUNTS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3, TapStep.ASK: 1}
 """Number of bells of each step."""
 STATUS_STYLES: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
@@ -197,7 +198,7 @@ DECISION_KEYS: Mapping[str, bool] = {"a": True, "r": False}
 """Keys that accept (True) and reject the last hit, or the hit whose number was typed."""
 MAX_NUMBER_DIGITS = 4
 """Largest number of digits of a typed hit number; chosen."""
-CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
+CHOICE_KEYS: Mapping[str, str] = {"start": "y", "x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
 """Key of each choice."""
 
 
@@ -244,7 +245,7 @@ class TerminalScreen:
             before = state
 
     def handle_key(self, key: str) -> None:
-        """Handle a key; while the sensor is moved, Enter and undo select the first choice."""
+        """Handle a key; before the test and while the sensor is moved, Enter and undo select the first choice."""
         state = self._session.state
         if state.choices and key != "m":
             self._handle_choice_key(state, key)
@@ -257,11 +258,13 @@ class TerminalScreen:
             self._typed_number = ""
 
     def _handle_choice_key(self, state: TapState, key: str) -> None:
-        if state.word is TapStep.MOVE and key in "\nu":
+        if state.word in (TapStep.MOVE, TapStep.ASK) and key in "\nu":
             key = CHOICE_KEYS[state.choices[0].key]
         chosen = [choice.key for choice in state.choices if CHOICE_KEYS[choice.key] == key]
         if chosen:
             self._choose(chosen[0])
+        elif key == "q":
+            self._session.stop()
 
     def _undo(self) -> None:
         now = time.monotonic()
@@ -305,7 +308,8 @@ class TerminalScreen:
 
 def render_state(state: TapState, muted: bool, typed_number: str = "") -> RenderableType:
     """Return one state of a test as it is shown; typed_number: number of a hit that was typed so far."""
-    keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
+    keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo"]
+    keys += ["q stop"] * (not state.choices or state.word is TapStep.ASK)
     keys.append(f"m {'sound' if muted else 'mute'}")
     if not state.choices:
         keys.append(f"a accept, r reject {f'hit {typed_number}' if typed_number else 'last hit, or NUMBER a'}")

@@ -1,0 +1,60 @@
+"""Evaluate a hit of a tap test against the record at rest, and average hits."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import Circumstances, Hit, HitDecision, HitFlags, HitVerdict, TapTest
+from acquisition.hit_fault import HIT_FAULTS
+from acquisition.hit_quality.decide_hits import average_decided_hits
+from acquisition.tap_test import decide_flags
+from lobewatch.tap.self_check import find_quiet_part
+from lobewatch.tap.steady_line import find_steady_line
+
+EXPLAINED_FLAGS = HitFlags.OK | HitFlags.NOT_DECAYED | HitFlags.INCONSISTENT
+"""Flags that a steady vibration explains."""
+
+
+def add_steady_vibration(verdict: HitVerdict, hit: Hit, baseline: Hit | None) -> HitVerdict:
+    """Return the verdict on a hit, or STEADY_VIBRATION if one began after the self-check and explains its flags.
+
+    baseline: record at rest, None without one.
+    """
+    if baseline is None or verdict.flags & ~EXPLAINED_FLAGS:
+        return verdict
+    quiet = find_quiet_part(hit)
+    line = None if quiet is hit else find_steady_line(quiet)
+    fault = HIT_FAULTS[HitFlags.STEADY_VIBRATION]
+    if line is None or line.rms <= fault.limits["rest_ratio"] * float(np.std(baseline.acceleration)):
+        return verdict
+    return HitVerdict.from_findings({HitFlags.STEADY_VIBRATION: fault.state(finding=line.finding)})
+
+
+def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
+    """Call `evaluate`. If it fails, reject the hit as NOT_JUDGED with the reason: one hit must not end a test."""
+    try:
+        return judge()
+    except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
+        failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
+        return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})
+
+
+def average_hits(
+    tap_id: str,
+    about: Circumstances,
+    hits: Sequence[Hit],
+    flags: Sequence[HitFlags],
+    decisions: tuple[HitDecision, ...] = (),
+) -> TapTest:
+    """Average the good hits to a tap test, each as one sensor recorded it. ValueError if none is good."""
+    frf, _ = average_decided_hits(hits, decide_flags(flags, decisions))
+    hits = tuple(replace(hit, cross_hit=None) for hit in hits)
+    return TapTest(tap_id, about, frf, hits, tuple(flags), decisions=decisions)
+
+
+def format_peak(hit: Hit) -> str:
+    """Format the largest force of a hit, or without a force sensor its largest acceleration, with the unit."""
+    if hit.has_force:
+        return f"{hit.force.max():.0f} N"
+    return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"

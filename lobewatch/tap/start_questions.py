@@ -1,0 +1,76 @@
+"""Ask the person with the hammer whether the spindle stands still."""
+
+import queue
+from collections.abc import Callable, Sequence
+
+from acquisition import DataError, Hit
+from acquisition.errors import join_sentences
+from lobewatch.measurement.recording_questions import SPINDLE_TURNING
+from lobewatch.tap.state import Choice, StatePublisher, TapState, TapStep
+from lobewatch.tap.steady_line import find_steady_line
+
+START_CHOICE = Choice("start", "Yes, start")
+"""Answer that begins a test."""
+STILL_CHOICE = Choice("start", "It stands still, continue")
+"""Answer to a steady vibration."""
+
+
+class StartQuestions:
+    """Questions before the first hit. `answer` is for every thread, all else for that of the test."""
+
+    def __init__(self, publisher: StatePublisher[TapState], tool: str, accepted: Sequence[str], *, asks: bool) -> None:
+        """Ask about a tool. accepted: codes that are answered already. asks: whether a person can answer."""
+        self._publisher, self._tool, self._asks = publisher, tool, asks
+        self._answers = queue.SimpleQueue[str]()
+        self.accepted = list(accepted)
+        """Codes of accepted questions."""
+        self.asked: list[str] = []
+        """Codes of questions that the measurement raised."""
+        self.is_confirmed = not asks
+        """True if the person has confirmed tool and spindle in this session, or nobody can."""
+
+    def answer(self, key: str) -> None:
+        """Take the answer to the shown question. ValueError if it is none of its choices."""
+        if key not in [choice.key for choice in self._publisher.state.choices]:
+            raise ValueError(f"{key!r} is not available now. Use a choice that the page shows.")
+        self._answers.put(key)
+
+    def confirm(self, wait: Callable[[], object]) -> None:
+        """Ask once whether the spindle is stopped and the tool is in it. wait: reads on for a moment."""
+        if self.is_confirmed:
+            return
+        self._show(f"Is the spindle stopped? Is tool {self._tool} in it?", START_CHOICE)
+        while not self._is_answered():
+            wait()
+        self.is_confirmed = True
+
+    def settle(self, baseline: Hit, record: Callable[[], Hit]) -> Hit:
+        """Return a record at rest without a line of a turning spindle, or with one that a person has accepted.
+
+        record: makes a new one. DataError if nobody can answer.
+        """
+        while (line := find_steady_line(baseline)) is not None and line.is_asked:
+            self.asked = [SPINDLE_TURNING.code]
+            if SPINDLE_TURNING.code in self.accepted:
+                return baseline
+            if not self._asks:
+                answer = f"If it stands still, add accept_questions.codes {SPINDLE_TURNING.code}"
+                raise DataError(join_sentences(line.finding, "Stop the spindle and repeat the command", answer))
+            self._show(line.text, STILL_CHOICE)
+            baseline = record()
+            if self._is_answered():
+                self.accepted.append(SPINDLE_TURNING.code)
+        self.asked = []
+        self._publisher.show(choices=())
+        return baseline
+
+    def _show(self, reason: str, choice: Choice) -> None:
+        if (self._publisher.state.word, self._publisher.state.reason) != (TapStep.ASK, reason):
+            self._publisher.show(word=TapStep.ASK, reason=reason, choices=(choice,))
+
+    def _is_answered(self) -> bool:
+        if self._answers.empty():
+            return False
+        self._answers.get()
+        self._publisher.show(choices=())
+        return True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -80,6 +80,10 @@ EMULATED_SERIALS = (EMULATED_SERIAL, "EMU-1")
 """Serial numbers of emulated devices, with that of the TAPS/1 emulator."""
 
 
+RECORDING_MODEL_PREFIX = "replay of "
+"""Beginning of the model of a recording that is read like a device."""
+
+
 @dataclass(frozen=True)
 class DeviceIdentity:
     """Identity that a device reports."""
@@ -90,11 +94,18 @@ class DeviceIdentity:
     """Serial number; empty if it has none."""
     firmware: str = ""
     """Version; empty if it has none."""
+    knows_sensors: bool = field(default=False, compare=False, kw_only=True)
+    """True if it is emulated and says that its sensitivities are the true ones of its signals."""
 
     @property
     def is_emulated(self) -> bool:
         """True if the device says that it is emulated."""
         return self.serial in EMULATED_SERIALS
+
+    @property
+    def is_recording(self) -> bool:
+        """True if it is a recording that is read like a device."""
+        return self.model.startswith(RECORDING_MODEL_PREFIX)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,10 @@ from acquisition.errors import DataError, check_name
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
-from acquisition.source import EMULATED_SERIALS
+from acquisition.source import DeviceIdentity
 
+SERIAL_PREFIX = "serial number "
+"""Words before the serial number in the description of a device."""
 CONDITION_RANGES = {
     "temperature_c": (-40.0, 150.0),
     "stick_out_mm": (0.1, 5000.0),
@@ -125,9 +127,16 @@ class Circumstances:
             raise ValueError(f"created={self.created} has no time zone. Give one, as in datetime.now(UTC).")
 
     @property
+    def device_identity(self) -> DeviceIdentity:
+        """Model and serial number of the recording device; empty if unknown."""
+        model, *details = self.device.split(", ")
+        serials = [text.removeprefix(SERIAL_PREFIX) for text in details if text.startswith(SERIAL_PREFIX)]
+        return DeviceIdentity(model, next(iter(serials), ""))
+
+    @property
     def is_emulated(self) -> bool:
         """True if the recording device is emulated."""
-        return any(f"serial number {serial}" in self.device.split(", ") for serial in EMULATED_SERIALS)
+        return self.device_identity.is_emulated
 
 
 @dataclass(frozen=True)

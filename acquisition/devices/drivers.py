@@ -120,7 +120,7 @@ def _emulate_taps(setup: EmulationSetup) -> EmulatorThread:
     channels = tuple(sensor.channel for sensor in setup.inputs)
     signal = setup.signal_at(setup.sample_rate)
     rate, realtime = setup.sample_rate, setup.realtime
-    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, clock=setup.clock)
+    return TapsEmulator(signal, channels, rate, realtime=realtime, tcp=setup.tcp, clock=setup.clock, knows_sensors=True)
 
 
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:

@@ -80,7 +80,8 @@ def _query_port(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | N
 
 def _is_identity(answer: object) -> bool:
     """Return whether an answer is a DeviceIdentity of texts."""
-    return isinstance(answer, DeviceIdentity) and all(isinstance(word, str) for word in vars(answer).values())
+    is_whole = isinstance(answer, DeviceIdentity) and isinstance(answer.knows_sensors, bool)
+    return is_whole and all(isinstance(getattr(answer, name), str) for name in ("model", "serial", "firmware"))
 
 
 def _select_drivers(drivers: Sequence[Driver], vendor: int | None) -> list[Driver]:

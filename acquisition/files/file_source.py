@@ -13,7 +13,7 @@ from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
 from acquisition.hits.pulse import count_pre_hit_samples
-from acquisition.source import ClosedOnExit, DeviceIdentity, Event
+from acquisition.source import RECORDING_MODEL_PREFIX, ClosedOnExit, DeviceIdentity, Event
 
 REPLAY_QUIET_TIME = 1.0
 """Time without a hit before, between and after the hits (s)."""
@@ -60,7 +60,7 @@ class FileSource(ClosedOnExit):
         """Channels of the recording."""
         self.sample_rate = hits[0].sample_rate
         """Scans a second (Hz)."""
-        self.identity = DeviceIdentity(f"replay of {Path(path).name}")
+        self.identity = DeviceIdentity(f"{RECORDING_MODEL_PREFIX}{Path(path).name}")
         """Name of the file."""
         self.events: deque[Event] = deque()
         """Empty: a file has no events."""

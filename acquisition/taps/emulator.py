@@ -98,6 +98,8 @@ class TapsEmulator(TapsServer, EmulatorThread):
         Faults to inject, None for none.
     clock
         Clock that scans follow (s).
+    knows_sensors
+        Whether it says that its sensitivities are the true ones of its signals.
 
     Examples
     --------
@@ -122,11 +124,13 @@ class TapsEmulator(TapsServer, EmulatorThread):
         link: Path | None = None,
         faults: TapsFaults | None = None,
         clock: Callable[[], float] = time.monotonic,
+        knows_sensors: bool = False,
     ) -> None:
         super().__init__(tcp, link)
         self._time = clock
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or TapsFaults()
+        self._identity = replace(EMULATOR_IDENTITY, knows_sensors=knows_sensors)
         self._clock, self._restarted = 0, False
         self._pending_events: deque[Event] = deque()
         self._active_faults: dict[tuple[int, int | None], Event] = {}
@@ -195,7 +199,7 @@ class TapsEmulator(TapsServer, EmulatorThread):
                 del self.wire.pending[place + len(encoded) // 2 :]
 
     def _info(self) -> dict[str, Any]:
-        return protocol.build_info(EMULATOR_IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
+        return protocol.build_info(self._identity, self._channels, self._rate, follows_clock=self._realtime)
 
     def _start(self, n_scans: int) -> None:
         """Start a session and report active faults."""

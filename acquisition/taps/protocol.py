@@ -333,11 +333,16 @@ class TapsServer:
             self._send(MessageType.STATUS, status.encode())
 
 
+KNOWS_SENSORS_KEY = "emulates_sensors"
+"""Key of INFO that is true for an emulated device whose sensitivities are the true ones of its signals."""
+
+
 def build_info(
     identity: DeviceIdentity, channels: Sequence[Channel], rate: float, *, follows_clock: bool
 ) -> dict[str, Any]:
     """Build the body of INFO for a device with one sample rate (Hz)."""
-    return {
+    emulated = {KNOWS_SENSORS_KEY: True} if identity.knows_sensors else {}
+    return emulated | {
         "proto": 1,
         "model": identity.model,
         "serial": identity.serial,

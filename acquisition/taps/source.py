@@ -48,7 +48,8 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
 
 def parse_identity(info: dict[str, Any]) -> DeviceIdentity:
     """Return the identity of the device that sent this INFO."""
-    return DeviceIdentity(*(str(info.get(key) or "") for key in ("model", "serial", "fw")))
+    words = (str(info.get(key) or "") for key in ("model", "serial", "fw"))
+    return DeviceIdentity(*words, knows_sensors=bool(info.get(protocol.KNOWS_SENSORS_KEY)))
 
 
 class ScanStream:

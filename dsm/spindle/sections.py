@@ -22,7 +22,7 @@ class CrossSection(NamedTuple):
     mass_outer: Floats
     """Outer diameter of the mass (m)."""
     material: Floats
-    """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, ...)."""
+    """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and shear_poisson_ratio (-), shape (4, ...)."""
 
     @property
     def rigidity(self) -> Floats:
@@ -55,7 +55,7 @@ class Sections:
     diameters: Floats
     """Outer at both ends, bore at both ends, outer of the mass at both ends (m), shape (6, n_segments)."""
     material: Floats
-    """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, n_segments)."""
+    """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and shear_poisson_ratio (-), shape (4, n_segments)."""
 
     @cached_property
     def is_cone(self) -> Flags:
@@ -91,7 +91,7 @@ def sections_of_segments(segments: Sequence[Segment], common: Material) -> Secti
         (outer, bore), (end_outer, end_bore) = segment.diameters_at(0.0), segment.diameters_at(1.0)
         mass_outer = (outer, end_outer) if segment.mass_diameter is None else 2 * (segment.mass_diameter,)
         material = segment.material or common
-        constants = material.youngs_modulus, material.density, material.shear_modulus, material.poisson_ratio
+        constants = material.youngs_modulus, material.density, material.shear_modulus, material.shear_poisson_ratio
         rows.append((segment.length, outer, end_outer, bore, end_bore, *mass_outer, *constants))
     table = np.array(rows).T
     return Sections(np.concatenate([[0.0], np.cumsum(table[0])]), table[1:7], table[7:])

@@ -46,28 +46,53 @@ class Material:
     Traceback (most recent call last):
         ...
     ValueError: shear_modulus=6e+10 Pa and youngs_modulus=2.1e+11 Pa give Poisson's ratio 0.75, ...
+    >>> bar = Material(youngs_modulus=120e9, density=1550.0, shear_modulus=5e9, axial_poisson_ratio=0.3)  # carbon fibre
+    >>> round(bar.shear_coefficient(0.0), 3)
+    0.86
     """
 
     youngs_modulus: float
-    """Young's modulus E (Pa)."""
+    """Young's modulus E along the axis (Pa)."""
     density: float
     """Density rho (kg/m^3)."""
     shear_modulus: float
-    """Shear modulus G (Pa); used by the Timoshenko theory."""
+    """Shear modulus G of planes along the axis (Pa); used by the Timoshenko theory."""
+    axial_poisson_ratio: float | None = None
+    """Poisson's ratio nu of an orthotropic bar pulled along its axis (-). Default: isotropic, nu = E/2G - 1."""
 
     def __post_init__(self) -> None:
         """Check the constants."""
         require_numbers("", self, MATERIAL_UNITS, positive=True)
-        if not -1 < self.poisson_ratio <= 0.5 * (1 + 1e-9):
-            raise ValueError(
-                f"shear_modulus={self.shear_modulus:g} Pa and youngs_modulus={self.youngs_modulus:g} Pa give Poisson's "
-                f"ratio {self.poisson_ratio:.3g}, which is not between -1 and 0.5"
-            )
+        ratio, slack = self.poisson_ratio, 1e-9
+        if -slack <= ratio <= 0.5 + slack:
+            return
+        if self.axial_poisson_ratio is not None:
+            raise ValueError(f"axial_poisson_ratio={ratio:g} is not between 0 and 0.5")
+        cure = "For an orthotropic bar, such as carbon fibre, give axial_poisson_ratio too."
+        if ratio < 0:
+            cure = 'To leave out shear, set theory to "euler-bernoulli" and remove shear_modulus.'
+        raise ValueError(
+            f"shear_modulus={self.shear_modulus:g} Pa and youngs_modulus={self.youngs_modulus:g} Pa give Poisson's "
+            f"ratio {ratio:.3g}, which is not between 0 and 0.5. {cure}"
+        )
 
     @property
     def poisson_ratio(self) -> float:
-        """Poisson's ratio nu = E/2G - 1 (-)."""
-        return self.youngs_modulus / (2 * self.shear_modulus) - 1
+        """Poisson's ratio nu (-): axial_poisson_ratio, else E/2G - 1."""
+        if self.axial_poisson_ratio is None:
+            return self.youngs_modulus / (2 * self.shear_modulus) - 1
+        return self.axial_poisson_ratio
+
+    @property
+    def shear_poisson_ratio(self) -> float:
+        """Poisson's ratio of the isotropic bar with the same shear coefficient (-).
+
+        The shear stresses of a bent bar depend on its material by nu G/E only, which is nu/(2 + 2 nu) if isotropic.
+        """
+        if self.axial_poisson_ratio is None:
+            return self.poisson_ratio
+        contraction = 2 * self.axial_poisson_ratio * self.shear_modulus
+        return contraction / (self.youngs_modulus - contraction)
 
     def shear_coefficient(self, bore_over_outer: float) -> float:
         """Return the shear coefficient kappa of a ring (-).
@@ -77,13 +102,14 @@ class Material:
         bore_over_outer : float
             Bore over outer diameter (-).
         """
-        return shear_coefficient(self.poisson_ratio, bore_over_outer)
+        return shear_coefficient(self.shear_poisson_ratio, bore_over_outer)
 
 
 def shear_coefficient(poisson_ratio: FloatOrArray, bore_over_outer: FloatOrArray) -> FloatOrArray:
     """Return the shear coefficient kappa of a ring (-); bore_over_outer 0 is a full section.
 
-    Source: G. R. Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966).
+    Source: G. R. Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966). For orthotropic
+    bars: S. Dharmarajan and H. McCutchen, Shear coefficients for orthotropic beams, J. Compos. Mater. 7 (1973).
     """
     nu, ring = poisson_ratio, (1 + bore_over_outer**2) ** 2
     return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * bore_over_outer**2)
@@ -102,9 +128,11 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
         "brass": _isotropic_material(100e9, 8500.0, 0.34),
         "carbide": _isotropic_material(580e9, 14500.0, 0.22),
         "tungsten alloy": _isotropic_material(340e9, 17600.0, 0.28),
+        "carbon fibre": Material(120e9, 1550.0, 5e9, 0.3),
     }
 )
-"""Handbook values at room temperature by name: AISI 304, Ti-6Al-4V, cemented carbide with 10 % cobalt, 93 % W alloy."""
+"""Handbook values at room temperature by name: AISI 304, Ti-6Al-4V, cemented carbide with 10 % cobalt, 93 % W alloy,
+carbon fibres along the axis in epoxy (60 % of the volume)."""
 
 STEEL = MATERIALS["steel"]
 

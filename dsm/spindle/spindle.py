@@ -8,7 +8,6 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
-from dsm.arrays import require_numbers
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.segment import SAME_PLACE, STEEL, Material, Segment, nearest_index, ring_area
 
@@ -53,11 +52,13 @@ class Spindle:
     theory: Theory = "euler-bernoulli"
     """Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments of the shaft."""
     shear_modulus: float | None = None
-    """Shear modulus G (Pa) of segments without a material. Default: E/2.6, for Poisson's ratio 0.3."""
+    """Shear modulus G (Pa) of segments without a material. Default: E/(2 + 2 nu), for Poisson's ratio nu = 0.3."""
     masses: Sequence[LumpedMass] = ()
     """Rigid bodies on the shaft; kept as a tuple."""
     joints: Sequence[Joint] = ()
     """Compliant joints across the shaft; kept as a tuple."""
+    axial_poisson_ratio: float | None = None
+    """Poisson's ratio nu of an orthotropic shaft pulled along its axis (-). Default: isotropic."""
 
     def __post_init__(self) -> None:
         """Check numbers and geometry."""
@@ -67,9 +68,7 @@ class Spindle:
             raise ValueError(f"theory={self.theory!r} is not one of {', '.join(get_args(Theory))}")
         if not 1 <= len(self.segments) <= MAX_SEGMENTS:
             raise ValueError(f"the shaft has {len(self.segments)} segments. Give 1 to {MAX_SEGMENTS} segments.")
-        require_numbers("", self, {"youngs_modulus": "Pa", "density": "kg/m^3"}, positive=True)
-        if self.shear_modulus is not None:
-            require_numbers("", self, {"shear_modulus": "Pa"}, positive=True)
+        _ = self.material  # checks its constants
         for number, segment in enumerate(self.segments, 1):
             segment.check(f"segment {number}: ")
         for kind, parts in (("bearing", self.bearings), ("mass", self.masses), ("joint", self.joints)):
@@ -87,8 +86,10 @@ class Spindle:
     @cached_property
     def material(self) -> Material:
         """Material of segments without a material."""
-        shear = self.youngs_modulus / 2.6 if self.shear_modulus is None else self.shear_modulus
-        return Material(self.youngs_modulus, self.density, shear)
+        ratio, shear = self.axial_poisson_ratio, self.shear_modulus
+        if shear is None:
+            shear = self.youngs_modulus / (2 * (1 + (0.3 if ratio is None else ratio)))
+        return Material(self.youngs_modulus, self.density, shear, ratio)
 
     @cached_property
     def length(self) -> float:

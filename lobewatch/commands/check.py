@@ -13,7 +13,7 @@ def check(
     machine: shared.TappedMachine,
     program: Annotated[list[str] | None, Option(help="Program name, repeatable. Default: all programs.")] = None,
     speed: Annotated[
-        float | None, Option(parser=shared.number, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
+        float | None, Option(parser=shared.rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
     ] = None,
     depth: Annotated[float | None, Option(parser=shared.number, help="Axial depth of cut ap (mm).")] = None,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
@@ -26,6 +26,7 @@ def check(
         list[str] | None,
         Option(help="Key of a number in machine.toml that is correct although implausible, repeatable."),
     ] = None,
+    now: shared.Now = None,
     as_json: Json = False,
 ) -> None:
     """Evaluate cutting programs on the newest tap tests.
@@ -54,7 +55,7 @@ def check(
     if accept:
         for line in accept_settings(MachineFolder(machine), accept):
             notes.print(f"accepted: {line}")
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     with show_progress("checking programs") as progress, time_step("verdicts"):
         verdicts, recommendations = evaluate_requested(logbook, program or (), cut)
         programs = [

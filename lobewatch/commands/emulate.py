@@ -14,7 +14,7 @@ from typer import Option
 
 import acquisition
 from lobewatch.commands import COMMANDS
-from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName
+from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName, number, rpm
 from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help=COMMANDS["emulate"], no_args_is_help=True)
@@ -78,14 +78,18 @@ class EmulateOptions:
         float, Option(min=-50, max=50, help="Error of the sample clock (%), of which the device does not know.")
     ] = 0.0
     """Error of the sample clock (%)."""
+    mass_kg: Annotated[
+        float | None, Option(help="Hung mass that is hit instead of the spindle (kg), for lobewatch sensors.")
+    ] = None
+    """Hung mass that is hit instead of the spindle (kg). None for the spindle."""
     cut: Annotated[
         str | None,
         Option(metavar="PROGRAM", help="Program of an emulated cut. Default: tap tests, no cut."),
     ] = None
     """Name of the program to cut. None for tap tests."""
-    speed: Annotated[float | None, Option(help="Spindle speed of the cut (rpm).")] = None
+    speed: Annotated[float | None, Option(parser=rpm, help="Spindle speed of the cut (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, Option(help="Axial depth of the cut ap (mm).")] = None
+    depth: Annotated[float | None, Option(parser=number, help="Axial depth of the cut ap (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""
@@ -148,7 +152,20 @@ def _run_emulator(name: str, options: EmulateOptions) -> None:
     shared = {"driver": driver, "folder": folder, "spindle": spindle, "seed": seed}
     shared |= {"realtime": not options.fast, "tcp": options.tcp}
     cut = options.cut
-    _serve(_emulate_tap(options, shared) if cut is None else _emulate_cut(options, cut, shared), options)
+    if options.mass_kg is not None:
+        _serve(_emulate_mass(options.mass_kg, cut, shared), options)
+    else:
+        _serve(_emulate_tap(options, shared) if cut is None else _emulate_cut(options, cut, shared), options)
+
+
+def _emulate_mass(mass: float, cut: str | None, shared: Mapping[str, Any]) -> Emulation:
+    """Emulate hits on a hung mass. `shared` holds the arguments that tap tests take too."""
+    if cut is not None:
+        raise ValueError("--mass-kg cannot be used with --cut. Leave out one of the two options.")
+    from lobewatch.tap.emulated_mass import emulate_mass
+
+    device = emulate_mass(mass=mass, **{key: value for key, value in shared.items() if key != "spindle"})
+    return device, {"mass_kg": mass}, f"a mass of {mass:g} kg hangs in its place", "sensors", f" --mass-kg {mass:g}"
 
 
 def _emulate_tap(options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:

@@ -78,6 +78,9 @@ def init(
     write_machine_file(machine, text)
     payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'changed' if edit else 'created'} {toml}"
     emit(payload, as_json, text, f"next: {next_step}")
+    if not as_json:
+        command = f"lobewatch sensors {shlex.quote(str(machine))} --mass-kg KG"
+        notes.print(f"then check the sensors with a known mass (two minutes): {command}", markup=False)
 
 
 def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options
+from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options, rpm
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
 
 if TYPE_CHECKING:
@@ -25,7 +25,9 @@ def listen(
     machine: Machine,
     program: Annotated[str, Option(help="Program name.")] = "",
     cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
-    speed: Annotated[float | None, Option(help="Commanded spindle speed (rpm). Default: from the program.")] = None,
+    speed: Annotated[
+        float | None, Option(parser=rpm, help="Commanded spindle speed (rpm). Default: from the program.")
+    ] = None,
     depth: CutDepth = None,
     power: CutPower = None,
     file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,

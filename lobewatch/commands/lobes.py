@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from lobewatch.commands.shared_options import TappedMachine
+from lobewatch.commands.shared_options import Now, TappedMachine
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
@@ -24,6 +24,7 @@ def lobes(
     figure: Annotated[Path | None, Option(help="Lobe diagram (.svg, .png, .pdf).")] = None,
     radial: Annotated[Path | None, Option(help="Figure of the limit over speed and radial depth ae.")] = None,
     waterfall: Annotated[Path | None, Option(help="Figure of the limit over speed and time.")] = None,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Show stability lobes and stable pockets.
@@ -42,7 +43,7 @@ def lobes(
     from lobewatch.show.programs.advice import comparison_json, comparison_texts
     from lobewatch.tool import DynamicsSource, LobeMethod
 
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     drawn = figure or radial or waterfall
     alone = None if drawn else chart_speed_pockets(logbook, tool, cut)
     if alone is not None:

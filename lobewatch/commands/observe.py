@@ -4,18 +4,18 @@ from typing import Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, Machine
+from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, Machine, number, rpm
 from lobewatch.show.terminal.output import Json, emit, print_remarks
 
 
 def observe(
     machine: Machine,
     program: Annotated[str, Option(help='Program name, or "reference cut".')],
-    speed: Annotated[float | None, Option(help="Spindle speed (rpm). Default: from the program.")] = None,
+    speed: Annotated[float | None, Option(parser=rpm, help="Spindle speed (rpm). Default: from the program.")] = None,
     depth: CutDepth = None,
     stable: Annotated[bool, Option("--stable", help="The cut was stable.")] = False,
     chatter: Annotated[bool, Option("--chatter", help="The cut chattered.")] = False,
-    frequency: Annotated[float | None, Option(help="Chatter frequency (Hz), if known.")] = None,
+    frequency: Annotated[float | None, Option(parser=number, help="Chatter frequency (Hz), if known.")] = None,
     power: CutPower = None,
     date: CutDate = None,
     as_json: Json = False,

@@ -4,21 +4,33 @@ from typing import Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import Flutes, Material, MillingDirection, TappedMachine, cut_fields
+from lobewatch.commands.shared_options import (
+    Flutes,
+    Material,
+    MillingDirection,
+    Now,
+    TappedMachine,
+    cut_fields,
+    number,
+    rpm,
+)
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
 
 def pitch(
     machine: TappedMachine,
-    speed: Annotated[float, Option(help="Spindle speed (rpm).")],
+    speed: Annotated[float, Option(parser=rpm, help="Spindle speed (rpm).")],
     tool: Annotated[str | None, Option(help="Name of the cutter.")] = None,
-    depth: Annotated[float | None, Option(help="Axial depth of cut ap (mm) to give verdicts for.")] = None,
+    depth: Annotated[
+        float | None, Option(parser=number, help="Axial depth of cut ap (mm) to give verdicts for.")
+    ] = None,
     material: Material = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, Option(help="Tool diameter (mm).")] = None,
-    radial: Annotated[float | None, Option(help="Radial depth of cut ae (mm).")] = None,
+    diameter: Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")] = None,
+    radial: Annotated[float | None, Option(parser=number, help="Radial depth of cut ae (mm).")] = None,
     direction: MillingDirection = None,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Propose unequal pitches for a cutter at one speed.
@@ -37,7 +49,7 @@ def pitch(
     from lobewatch.show.programs.recommendations import pitches_json, pitches_texts
 
     cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     with show_progress("comparing pitches"), time_step("lobes"):
         proposal = propose_requested_pitch(logbook, cut)
     remarks = logbook.remarks

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import Diameter, Flutes, Material, TappedMachine, cut_fields, number
+from lobewatch.commands.shared_options import Diameter, Flutes, Material, Now, TappedMachine, cut_fields, number, rpm
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
@@ -20,11 +20,12 @@ def recommend(
         Literal["up", "down"] | None, Option(help="Up or down milling. Default: the direction with the lower limit.")
     ] = None,
     depth: Annotated[float | None, Option(parser=number, help="Required axial depth of cut ap (mm).")] = None,
-    speed: Annotated[float | None, Option(parser=number, help="Present spindle speed (rpm).")] = None,
+    speed: Annotated[float | None, Option(parser=rpm, help="Present spindle speed (rpm).")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
     feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth (mm).")] = None,
     save: Annotated[str | None, Option(help="Name of a new program in machine.toml.")] = None,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
@@ -47,7 +48,7 @@ def recommend(
 
     cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     cut["feed_per_tooth_mm"] = feed_per_tooth
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     if save is not None:
         check_program_name(logbook.machine, save)
     with show_progress("searching stable speeds and depths"), time_step("lobes"):

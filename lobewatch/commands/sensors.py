@@ -13,12 +13,14 @@ def sensors(
     machine: Machine,
     port: Annotated[str, Option(help="Serial port of the DAQ, or socket://HOST:PORT. Default: [daq] port.")] = "",
     mass_kg: Annotated[float | None, Option(help="Suspended mass with accelerometer (kg), to check F = m a.")] = None,
+    operator: Annotated[str, Option(help="Name of the operator of the mass check.")] = "",
     skew: Annotated[bool, Option("--skew", help="Measure the skew of two inputs joined to one signal.")] = False,
     as_json: Json = False,
 ) -> None:
     """Check hammer, accelerometer and DAQ.
 
     Without options: channels, calibration dates, implausible values, and the sample rate against the clock.
+    The journal keeps the check with a known mass. It counts for all tap tests with the same DAQ and sensitivities.
 
     Examples
     --------
@@ -39,7 +41,7 @@ def sensors(
         raise ValueError("--mass-kg and --skew need different cabling. Leave out one of the two options.")
     with folder.locked(), open_device(folder.machine.daq, port) as device:
         if mass_kg is not None:
-            mass_check = check_mass(folder, port, device, mass_kg, print_note)
+            mass_check = check_mass(folder, port, device, mass_kg, print_note, operator)
             emit(show.mass_check_json(mass_check), as_json, *show.mass_check_texts(mass_check))
         elif skew:
             skew_check = check_skew(folder, port, device, print_note)

@@ -2,7 +2,6 @@
 
 import functools
 import inspect
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -13,16 +12,36 @@ from typer import Argument, BadParameter, Option
 
 import acquisition
 from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.machine.settings.number_text import format_number, list_readings, read_number, read_numbers
 
 
 def number(text: str | float) -> float:
-    """Parse a number. The error for a decimal comma shows the number with a point."""
+    """Parse a number with a decimal point, and with separators between thousands if it has no other value.
+
+    The error for a comma shows the possible values.
+    """
     try:
         return float(text)
     except ValueError:
-        comma = re.fullmatch(r"\s*([+-]?\d+),(\d+)\s*", str(text))
-        hint = f". Write {comma[1]}.{comma[2]} with a decimal point." if comma else ""
+        readings = list_readings(str(text))
+        if len(readings) == 1 and read_number(str(text).strip(), ".") is not None:
+            return readings[0]
+        hint = f". Write {' or '.join(map(format_number, readings))}." if readings else ""
         raise BadParameter(f"{text!r} is not a number{hint}") from None
+
+
+def rpm(text: str | float) -> float:
+    """Parse a spindle speed, whose point before three digits may separate thousands."""
+    if len(list_readings(str(text))) < 2:
+        return number(text)
+    from lobewatch.machine.settings.setup_tables import SpeedTable
+    from lobewatch.machine.settings.toml import find_plausible_ranges
+
+    ranges = find_plausible_ranges(SpeedTable)
+    try:
+        return read_numbers([str(text).strip()], [(ranges["low_rpm"].low, ranges["high_rpm"].high)])[0]
+    except ValueError as error:
+        raise BadParameter(str(error)) from None
 
 
 Command = Callable[..., None]
@@ -38,7 +57,14 @@ ExcludableEntry = Annotated[
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
-CutDepth = Annotated[float | None, Option(help="Axial depth of cut ap (mm). Default: from the program.")]
+CutDepth = Annotated[float | None, Option(parser=number, help="Axial depth of cut ap (mm). Default: from the program.")]
+Now = Annotated[
+    datetime | None,
+    Option(
+        callback=lambda value: value and value.astimezone(),
+        help="Date that the age of tap tests is counted to, for tests and scripts (local time). Default: now.",
+    ),
+]
 CutDate = Annotated[datetime | None, Option(help="Date of the cut (local time). Default: now.")]
 Seed = Annotated[int, Option(help="Seed of the random numbers.")]
 ReclampingScatter = Annotated[float, Option(help="Reclamping repeatability of f1: standard deviation (%), 0 to 5.")]
@@ -46,7 +72,9 @@ Material = Annotated[str | None, Option(help="Material in machine.toml or lobewa
 Flutes = Annotated[int | None, Option(help="Number of flutes.")]
 CutPower = Annotated[
     float | None,
-    Option(help="Cutting power (kW): drive display in the cut minus drive display in air at the same speed."),
+    Option(
+        parser=number, help="Cutting power (kW): drive display in the cut minus drive display in air at the same speed."
+    ),
 ]
 AddedModes = Annotated[list[str] | None, Option(help="Fit another mode near this frequency (Hz), repeatable.")]
 DroppedModes = Annotated[list[str] | None, Option(help="Leave out the mode at this frequency (Hz), repeatable.")]

@@ -1,11 +1,12 @@
 """Command `lobewatch status`: status of all machines, worst first."""
 
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import AsCsv, FleetFolder
+from lobewatch.commands.shared_options import AsCsv, FleetFolder, Now
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.show.terminal.output import Json, emit, results
 
@@ -26,6 +27,7 @@ def status(
     prometheus: Annotated[Path | None, Option(help="File for the textfile collector of Prometheus.")] = None,
     jobs: Annotated[int, Option(min=1, max=64, help="Number of parallel processes.")] = 1,
     scheduler: Annotated[str, Option(help="Address of a Dask scheduler whose workers can read FOLDER.")] = "",
+    now: Now = None,
     as_csv: AsCsv = False,
     as_json: Json = False,
 ) -> None:
@@ -49,8 +51,8 @@ def status(
         raise ValueError(f"--forget {forget} needs --notify. Add --notify.")
     fleet = Fleet(find_machines(folder), with_option_names)
     if jobs > 1 or scheduler:
-        _make_missing_summaries(fleet, jobs, scheduler)
-    assessed = fleet.assess_machines()
+        _make_missing_summaries(fleet, jobs, scheduler, now)
+    assessed = fleet.assess_machines(now)
     rows = fleet_rows(assessed)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
@@ -75,7 +77,7 @@ def status(
     raise Exit(1 if needs_care else 2 * (failures > 0))
 
 
-def _make_missing_summaries(fleet: "Fleet", jobs: int, scheduler: str) -> None:
+def _make_missing_summaries(fleet: "Fleet", jobs: int, scheduler: str, now: datetime | None) -> None:
     """Make missing summaries in other processes."""
     from functools import partial
 
@@ -85,4 +87,5 @@ def _make_missing_summaries(fleet: "Fleet", jobs: int, scheduler: str) -> None:
 
     workers = Workers(jobs, scheduler)
     print_remarks(workers.remarks)
-    fleet.make_missing_summaries(partial(summarize_in_parallel, workers=workers, render_text=with_option_names))
+    make = partial(summarize_in_parallel, workers=workers, render_text=with_option_names)
+    fleet.make_missing_summaries(make, now)

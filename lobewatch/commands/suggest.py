@@ -4,7 +4,7 @@ from typing import Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import TappedMachine
+from lobewatch.commands.shared_options import Now, TappedMachine
 from lobewatch.show.terminal.output import Json, emit
 
 
@@ -12,6 +12,7 @@ def suggest(
     machine: TappedMachine,
     program: Annotated[str, Option(help="Program name.")],
     cuts: Annotated[int, Option(min=1, help="Total number of test cuts.")] = 5,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Suggest the next test cut of a program.
@@ -30,7 +31,7 @@ def suggest(
     from lobewatch.show.cuts import recorded_cuts as show
     from lobewatch.show.terminal.output import remark_lines
 
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     table = find_program(logbook.machine, program)
     assembly = logbook.assembly(table.tool)
     if assembly.without_stiffness and not assembly.directions:

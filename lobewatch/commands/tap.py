@@ -2,12 +2,17 @@
 
 import contextlib
 import sys
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
 from lobewatch.commands.shared_options import Machine
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, show_address
+from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, print_remarks, show_address
+
+if TYPE_CHECKING:
+    from lobewatch.machine import MachineFolder
+    from lobewatch.tap.visit import TapVisit
 
 
 def tap(
@@ -56,15 +61,15 @@ def tap(
     """
     from acquisition import Conditions, TapDirection, parse_direction
     from lobewatch.logbook import Logbook
-    from lobewatch.machine import MachineFolder
     from lobewatch.notify.publish_status import publish_status
+    from lobewatch.show.mass_check_offer import offer_mass_check
     from lobewatch.show.measurement import emit_tap_results
     from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped
     from lobewatch.tap.session import TapSession, plan_session
     from lobewatch.tap.visit import TapVisit, choose_first_direction
 
-    folder, finished = MachineFolder(machine), list[TapSession]()
+    folder, finished = _open_folder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     is_single = bool(direction or as_json or port.startswith("file:"))
     asks = screen or (notes.is_terminal and sys.stdin.isatty())
@@ -93,10 +98,7 @@ def tap(
     try:
         with contextlib.ExitStack() as screens:
             if screen:
-                from lobewatch.screen import ScreenServer  # imports aiohttp
-
-                server = screens.enter_context(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
-                show_address(server.url, server.watch_url)
+                _open_screen(screens, visit, listen, token, watch_token)
             screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
             visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
@@ -104,3 +106,25 @@ def tap(
             notes.print(f"stopped with {visit.state.good} good hits. Run the same command again to continue the test.")
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)
+    if is_guided and not screen:
+        offer_mass_check(folder, finished[-1].saved[0], port, operator)
+
+
+def _open_folder(path: Path) -> "MachineFolder":
+    """Open a machine folder, and print a note if another folder next to it is a copy."""
+    from lobewatch.fleet.copied_folders import find_copies
+    from lobewatch.machine import MachineFolder
+
+    folder = MachineFolder(path)
+    print_remarks(find_copies({path.resolve().name: path}).values())
+    return folder
+
+
+def _open_screen(
+    screens: contextlib.ExitStack, visit: "TapVisit", listen: str, token: str | None, watch_token: str | None
+) -> None:
+    """Serve a visit in the browser until the context ends, and print the address."""
+    from lobewatch.screen import ScreenServer  # imports aiohttp
+
+    server = screens.enter_context(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token))
+    show_address(server.url, server.watch_url)

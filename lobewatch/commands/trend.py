@@ -4,7 +4,7 @@ from typing import Annotated
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import Machine
+from lobewatch.commands.shared_options import Machine, Now
 from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 
@@ -17,6 +17,7 @@ def trend(
         str | None, Option(help="Direction of the series: x or y. Default: direction of the larger drop.")
     ] = None,
     as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout.")] = False,
+    now: Now = None,
     as_json: Json = False,
 ) -> None:
     """Show the frequency trend of a series.
@@ -36,7 +37,7 @@ def trend(
 
     if as_csv and as_json:
         raise ValueError("--csv cannot be used with --json. Leave out one of the two options.")
-    logbook = Logbook.open(machine)
+    logbook = Logbook.open(machine, now)
     machine_outlook = forecast_machine(logbook)
     series = machine_outlook.series(tool, direction)
     if as_csv:

@@ -13,6 +13,7 @@ import lobewatch.machine as machine
 from acquisition import DataError, Remark
 from acquisition.errors import format_error
 from lobewatch.fleet import machine_summary
+from lobewatch.fleet.copied_folders import find_copies
 from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary, read_summary
 from lobewatch.machine.folder_files import compute_change_mark, format_path
 from lobewatch.monitoring.status_rules import StatusLevel
@@ -125,7 +126,8 @@ class Fleet:
         now = now or datetime.now(UTC)
         with self._lock:
             self._renewals_left = MAX_RENEWALS_PER_POLL
-            machines = [self._assess_machine(key, path, now) for key, path in self.machines.items()]
+            copies = find_copies(self.machines)
+            machines = [self._assess_machine(key, path, now, copies.get(key)) for key, path in self.machines.items()]
         return sorted(machines, key=_sort_key)
 
     def verify_until(self, end: threading.Event) -> None:
@@ -152,9 +154,9 @@ class Fleet:
             if end.wait(VERIFY_INTERVAL):
                 return
 
-    def _assess_machine(self, key: str, path: Path, now: datetime) -> FleetMachine:
-        summary = self._current_summary(key, path, now)
-        return FleetMachine(key, path, summary, summary.status_at(now, path, self._damage.get(key, ())))
+    def _assess_machine(self, key: str, path: Path, now: datetime, copy: Remark | None) -> FleetMachine:
+        summary, copies = self._current_summary(key, path, now), () if copy is None else (copy,)
+        return FleetMachine(key, path, summary, summary.status_at(now, path, self._damage.get(key, ()), copies))
 
     def _current_summary(self, key: str, path: Path, now: datetime) -> MachineSummary:
         """Return the cached summary if it is up to date, else renew it."""

@@ -13,6 +13,7 @@ import msgspec
 from acquisition import Remark
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from lobewatch.machine.folder_files import compute_change_mark
+from lobewatch.measurement import tap_age
 from lobewatch.monitoring import status_rules
 from lobewatch.monitoring.status_rules import Alarm, add_acknowledgements
 from lobewatch.monitoring.threshold_dates import LimitForecasts, ProgramForecast
@@ -105,7 +106,9 @@ class MachineSummary(
     tap_tests: int = 0
     """Number of rows of the history."""
     programs: dict[str, str] = {}
-    """Verdict on each program, by name."""
+    """Verdict on each program as of its tap tests, by name; `programs_at` gives those of a time."""
+    tap_times: dict[str, datetime] = {}
+    """Time of the newest tap test behind each program, by name; empty without an agreed tap interval."""
     forecasts: dict[str, ProgramForecast] = {}
     """Forecast of each program, by name."""
     limits: LimitForecasts = ()
@@ -123,13 +126,26 @@ class MachineSummary(
         """File of the newest tap test in the folder, or empty."""
         return f"taps/{self.newest_tap_id}.h5" if self.newest_tap_id else ""
 
-    def status_at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> DatedStatus:
-        """Return the status at a time, with damage found since. `path` is that of the folder."""
-        left, remarks = None, self.remarks
+    def programs_at(self, now: datetime) -> dict[str, str]:
+        """Return the verdict on each program at a time: not stable but doubtful if its tap tests are too old."""
+        return self.programs | dict.fromkeys(self._outdated_programs(now), "doubtful")
+
+    def _outdated_programs(self, now: datetime) -> list[str]:
+        """Return the names of stable programs whose tap tests are too old."""
+        stable = [name for name, verdict in self.programs.items() if verdict == "stable" and name in self.tap_times]
+        return [name for name in stable if tap_age.is_too_old(self.tap_times[name], now, self.interval_days)]
+
+    def status_at(
+        self, now: datetime, path: Path | str, damage: Sequence[Remark] = (), copies: Sequence[Remark] = ()
+    ) -> DatedStatus:
+        """Return the status at a time, with damage found since and copies of the folder, whose path is `path`."""
+        left, remarks = None, status_rules.sort_by_severity([*self.remarks, *copies])
         if self.time is not None:
             left = status_rules.count_days_left(self.time, self.interval_days, now)
             dated = status_rules.date_remarks(self.newest_tap_id, self.time, self.interval_days, now, path)
-            remarks = status_rules.sort_by_severity([*remarks, *dated])
+            old = self._outdated_programs(now)
+            aged = [tap_age.too_old_remark(name, self.tap_times[name], now, self.interval_days) for name in old]
+            remarks = status_rules.sort_by_severity([*remarks, *dated, *aged])
         if damage:
             remarks = status_rules.add_damage_remarks(remarks, damage)
         acknowledged = add_acknowledgements(remarks, self.alarms, now)

@@ -25,6 +25,7 @@ from lobewatch.machine.folder_files import compute_change_mark
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.share_work import Workers, share_work
+from lobewatch.measurement.tap_age import TOO_OLD_CODE
 from lobewatch.monitoring import SeriesStatus, series_points
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.series_history import build_series_history
@@ -34,7 +35,7 @@ from lobewatch.monitoring.trend import Trend, point_days
 
 MAX_SERIES_POINTS = 60
 """Number of points of a series that a summary keeps; chosen, more than a small chart shows."""
-DATE_REMARK_CODES = ("overdue", "tap-in-future")
+DATE_REMARK_CODES = ("overdue", "tap-in-future", TOO_OLD_CODE)
 """Codes of the reasons that `MachineSummary.status_at` adds."""
 MAX_MACHINES_READ = 500
 """Number of other machines that scatter is learned from at most; chosen."""
@@ -137,7 +138,7 @@ def summarize_machine(logbook: Logbook, now: datetime | None = None, render_text
 
 def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: RenderText) -> MachineSummary:
     machine, rows, status = logbook.machine, logbook.history.current, forecast.status
-    last, interval = status.last_tap, machine.machine.tap_interval_days
+    last, interval = status.last_tap, machine.machine.interval_days
     return MachineSummary(
         name=machine.machine.name,
         remarks=tuple(
@@ -154,10 +155,17 @@ def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: Ren
         last_tap="" if last is None else last.isoformat(),
         tap_tests=len(logbook.history.rows),
         programs={name: verdict.stability.value for name, verdict in (rows[-1].verdicts or {}).items()} if rows else {},
+        tap_times=_collect_tap_times(logbook) if machine.machine.tap_interval_days is not None else {},
         forecasts=dict(forecast.programs),
         limits=forecast.limits,
         series=tuple(map(_summarize_series, status.series)),
     )
+
+
+def _collect_tap_times(logbook: Logbook) -> dict[str, datetime]:
+    """Return the time of the newest tap test behind each program."""
+    times = {program.name: logbook.history.newest_time(program.tool) for program in logbook.machine.program}
+    return {name: time for name, time in times.items() if time is not None}
 
 
 def _summarize_series(series: SeriesStatus) -> SeriesSummary:

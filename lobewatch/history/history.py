@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import UNKNOWN_CONDITIONS, Conditions, Remark
+from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Remark
 from lobes import SldHistory, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
@@ -148,6 +148,17 @@ class History:
     def questions(self) -> dict[str, tuple[str, ...]]:
         """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
+
+    def newest_time(self, tool: str) -> datetime | None:
+        """Return the time of the newest tap test of a tool in x or y, or of any tool if it was never tapped.
+
+        Parameters
+        ----------
+        tool
+            Name of the tool.
+        """
+        rows = [row for row in self.current if row.direction != CROSS_TAP]
+        return max((row.time for row in [row for row in rows if row.tool == tool] or rows), default=None)
 
     def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict] | None) -> History:
         """Return the history with the verdicts after one of its rows.

@@ -5,16 +5,20 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from lobewatch.cuts.learning.program_learning import evaluate_at_speed
+from lobewatch.history.chain_checks import ChainChecks
 from lobewatch.history.history import History
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import NotTappedError, TapMeasurements, UsableTaps
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.measurement.chain_check import ChainCheck
+from lobewatch.measurement.tap_age import is_too_old, old_remark, tap_age_days, too_old_remark
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts import Advice, StoredVerdict, Verdict, advise
 from lobewatch.verdicts.setting_robustness import build_stored_verdict, is_verdict_missing
+from lobewatch.verdicts.verdict import apply_tap_age
 
 MAX_CACHED_VERDICT_SETS = 8
 """Number of tap tests whose verdicts stay in memory, most recently used last."""
@@ -28,7 +32,12 @@ class Analysis:
     """
 
     def __init__(
-        self, folder: MachineFolder, files: UsableTaps, cache: HistoryCache, measurements: TapMeasurements
+        self,
+        folder: MachineFolder,
+        files: UsableTaps,
+        cache: HistoryCache,
+        measurements: TapMeasurements,
+        now: datetime | None = None,
     ) -> None:
         """Start without any result.
 
@@ -42,11 +51,19 @@ class Analysis:
             history.rows.
         measurements
             Measured tap tests.
+        now
+            Time that ages are counted to. None for the present time.
         """
+        self._now = now
         self.folder, self.files, self.measurements = folder, files, measurements
         self._cache = cache
         self._history: History | None = None
         self._verdicts: dict[str | None, dict[str, Verdict]] = {}
+
+    @property
+    def now(self) -> datetime:
+        """Time that ages are counted to."""
+        return self._now or datetime.now(UTC)
 
     @property
     def machine(self) -> Machine:
@@ -117,6 +134,8 @@ class Analysis:
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
         """Combine the newest x and y of a tool, or predict the tool by the model if it was never tapped.
 
+        Without `until` it is as of now, with the age of its tap tests.
+
         Parameters
         ----------
         tool
@@ -136,7 +155,37 @@ class Analysis:
         assembly = self.measurements.assembly_of(tool, places, rows)
         is_now = places[-1] is self.files.places[-1]
         damage = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
-        return replace(assembly, questions=(*assembly.questions, *damage))
+        checked = self.chain_checks.attach(replace(assembly, questions=(*assembly.questions, *damage)))
+        return self._with_age(checked) if until is None else checked
+
+    def _with_age(self, assembly: Assembly) -> Assembly:
+        """Return an assembly with the age of its tap tests, and the remark on old ones."""
+        time, now, table = self.history.newest_time(assembly.tool), self.now, self.machine.machine
+        if time is None:
+            return assembly
+        aged = replace(assembly, age_days=tap_age_days(time, now))
+        if not is_too_old(time, now, table.interval_days):
+            return aged
+        if table.tap_interval_days is None:
+            return replace(aged, remarks=(*aged.remarks, old_remark(aged.tool, time, now)))
+        return replace(aged, unchecked=(*aged.unchecked, too_old_remark(aged.tool, time, now, table.interval_days)))
+
+    @property
+    def chain_checks(self) -> ChainChecks:
+        """Checks of the sensors behind the tap tests."""
+        files, rows = self.files, self.history.rows
+        of_files = files.by_id, files.contents.mass_checks, self.folder.path
+        return ChainChecks(self.machine, rows, *of_files, self.measurement)
+
+    def chain_check(self, tap_id: str) -> ChainCheck:
+        """Return the check of the sensors behind one tap test.
+
+        Parameters
+        ----------
+        tap_id
+            Identity of the tap test.
+        """
+        return self.chain_checks.check(tap_id)
 
     def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
         """Return the assembly of a tool, or the reason why there is none.
@@ -179,6 +228,8 @@ class Analysis:
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """Evaluate programs on the newest tap tests of their tools.
 
+        Without `until` the verdicts are as of now, and at most doubtful if the tap tests are too old.
+
         Parameters
         ----------
         until
@@ -192,14 +243,19 @@ class Analysis:
             One verdict for each program, in the order of machine.toml.
         """
         tables = [table for table in self.machine.program if names is None or table.name in names]
-        rows = self.history.rows
-        until = rows[-1].tap_id if until is None and self.history.current else until
+        rows, is_now = self.history.rows, until is None
+        until = self._newest_id if is_now else until
         verdicts = self._cached_verdicts(until)
         missing = [table for table in tables if table.name not in verdicts]
         tools = {tool: self.assembly_or_reason(tool, until) for tool in {table.tool for table in missing}}
         cuts = self.cuts if until in (None, *(row.tap_id for row in rows[-1:])) else ()
         verdicts |= {table.name: evaluate_at_speed(table, tools[table.tool], self.machine, cuts) for table in missing}
-        return [verdicts[table.name] for table in tables]
+        found = [verdicts[table.name] for table in tables]
+        return [*map(self._as_of_now, found)] if is_now else found
+
+    def _as_of_now(self, verdict: Verdict) -> Verdict:
+        aged = verdict.assembly if verdict.assembly is None else self._with_age(verdict.assembly)
+        return verdict if aged is None else apply_tap_age(verdict, aged)
 
     def verdict_for(self, table: ProgramTable) -> Verdict:
         """Evaluate a program that is not in machine.toml.
@@ -209,7 +265,13 @@ class Analysis:
         table
             Program to evaluate.
         """
-        return evaluate_at_speed(table, self.assembly_or_reason(table.tool), self.machine, self.cuts)
+        tool = self.assembly_or_reason(table.tool, self._newest_id)
+        return self._as_of_now(evaluate_at_speed(table, tool, self.machine, self.cuts))
+
+    @property
+    def _newest_id(self) -> str | None:
+        """Identity of the newest tap test; None without one since the baseline."""
+        return self.history.rows[-1].tap_id if self.history.current else None
 
     def _cached_verdicts(self, tap_id: str | None) -> dict[str, Verdict]:
         """Return the cached verdicts after a tap test, by program."""
@@ -284,6 +346,8 @@ class Analysis:
         now
             Time of the assessment. None for the present time.
         """
-        files, time = self.files, now or datetime.now(UTC)
+        files, time = self.files, now or self.now
         acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
-        return assess_status(self.machine, self.history, time, self.folder.path, files.remarks, acknowledged, scatter)
+        chain = [*self.chain_checks.newest_remarks(self.history.current)]
+        of_files = files.remarks, acknowledged, scatter, chain
+        return assess_status(self.machine, self.history, time, self.folder.path, *of_files)

@@ -270,6 +270,6 @@ def _shared_factor_remarks(joint_fit: JointFit) -> Iterator[Remark]:
 def _time_gap_remarks(taps: Sequence[tool_modes.TappedTool], machine: Machine) -> Iterator[Remark]:
     times = [tap.time for tap in taps]
     days = (max(times) - min(times)) / timedelta(days=1)
-    if days > machine.machine.tap_interval_days:
+    if days > machine.machine.interval_days:
         text = f"tools tapped {days:.0f} days apart, so the bearings may have changed"
         yield Remark("taps-apart", ", ".join(tap.tool for tap in taps), text, "Tap all of these tools on one day")

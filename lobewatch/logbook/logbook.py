@@ -61,14 +61,17 @@ class Logbook:
     ('unknown', ['never-tapped'])
     """
 
-    def __init__(self, folder: MachineFolder) -> None:
+    def __init__(self, folder: MachineFolder, now: datetime | None = None) -> None:
         """Read nothing yet.
 
         Parameters
         ----------
         folder
             Folder of the machine.
+        now
+            Time that ages are counted to. None for the present time.
         """
+        self._now = now
         self.folder = folder
         """Folder of the machine."""
         self.files = UsableTaps(folder)
@@ -80,20 +83,22 @@ class Logbook:
         self._next_row_saving = 0.0
 
     @classmethod
-    def open(cls, path: Path | str) -> Self:
+    def open(cls, path: Path | str, now: datetime | None = None) -> Self:
         """Open the logbook of a machine folder.
 
         Parameters
         ----------
         path
             Path of the machine folder.
+        now
+            Time that ages are counted to. None for the present time.
 
         Raises
         ------
         DataError
             If there is no machine folder at this path.
         """
-        return cls(MachineFolder(path))
+        return cls(MachineFolder(path), now)
 
     @property
     def machine(self) -> Machine:
@@ -215,6 +220,7 @@ class Logbook:
     initial_verdict = _answered_by(Analysis.initial_verdict)
     advice = _answered_by(Analysis.advice)
     status = _answered_by(Analysis.status)
+    chain_check = _answered_by(Analysis.chain_check)
 
     def commit(self, tap: TapTest, now: datetime | None = None, asked: Sequence[str] = ()) -> None:
         """Store a tap test permanently.
@@ -397,4 +403,4 @@ class Logbook:
         self._current_analysis, self._mark = None, self.folder.change_mark
 
     def _make_analysis(self, measurements: TapMeasurements) -> Analysis:
-        return Analysis(self.folder, self.files, self._cache, measurements)
+        return Analysis(self.folder, self.files, self._cache, measurements, self._now)

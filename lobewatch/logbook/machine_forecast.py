@@ -4,7 +4,7 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 
 from acquisition import DataError
 from lobewatch.logbook.analysis import Analysis
@@ -44,7 +44,7 @@ class MachineForecast:
 def forecast_machine(logbook: Logbook, now: datetime | None = None) -> MachineForecast:
     """Forecast a machine. DataError if it was never tapped."""
     logbook.newest_tap()
-    return logbook.query(forecast_from_analysis, now or datetime.now(UTC))
+    return logbook.query(forecast_from_analysis, now or logbook.analysis.now)
 
 
 def forecast_from_analysis(analysis: Analysis, now: datetime) -> MachineForecast:

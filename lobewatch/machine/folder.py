@@ -25,6 +25,7 @@ from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.machine.journal.entries import CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, journal_damage_remark, make_entry
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
@@ -57,6 +58,8 @@ class FolderContents:
     """Acknowledgements of alarms, oldest first."""
     fleet_scatters: tuple[FleetScatter, ...] = ()
     """Scatter of the other machines of the fleet, oldest first."""
+    mass_checks: tuple[MassCheckEntry, ...] = ()
+    """Checks with a known mass, oldest first."""
 
     def with_tap(self, entry: TapEntry) -> Self:
         """Return the contents with a newly committed tap test."""
@@ -102,7 +105,8 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     scatters = tuple(msgspec.convert(line, FleetScatter) for line in lines if line["kind"] == "scatter")
     cuts, events = journal_entries.read_committed_cuts(reading), journal_entries.read_events(lines)
     tests = tuple(taps), _sort_by_time(lost), tuple(remarks)
-    return FolderContents(*tests, events, len(reading.lines), cuts, acknowledged, scatters)
+    checks = journal_entries.read_mass_checks(lines)
+    return FolderContents(*tests, events, len(reading.lines), cuts, acknowledged, scatters, checks)
 
 
 def _list_tap_sizes(folder: Path) -> dict[str, int]:
@@ -333,7 +337,7 @@ class MachineFolder:
         make_folder(path.parent)
         content = write_tap(path, tap)
         entry = TapEntry.of(tap, content)
-        entry = msgspec.structs.replace(entry, asked=(*entry.asked, *asked))
+        entry = msgspec.structs.replace(entry, asked=(*entry.asked, *asked), chain=SensorChain.of_tap(tap))
         known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
         counting = {decision.hit for decision in tap.decisions}
         changes = [HitDecision(decision.hit, "undo") for decision in known if decision.hit not in counting]

@@ -17,6 +17,7 @@ from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
 from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import JournalReading, make_entry
+from lobewatch.machine.journal.mass_checks import MASS_CHECK_KIND, MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine_file
@@ -86,7 +87,7 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEve
 
 
 def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.ExcludableEntry:
-    """Exclude a tap test from its series, or a test cut from learning.
+    """Exclude a tap test from its series, a test cut from learning, or a check with a known mass.
 
     name: identity, file, or a part of the identity that no other entry has. Raises ValueError if it is excluded, or
     without a reason.
@@ -105,7 +106,7 @@ def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.Exclud
 
 
 def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
-    """Include an excluded tap test or test cut again; ValueError if it is not excluded."""
+    """Include an excluded tap test, test cut or mass check again; ValueError if it is not excluded."""
     with folder.locked():
         entry = _find_entry(folder, name)
         if not entry.excluded:
@@ -116,7 +117,8 @@ def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
 
 def _find_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
     contents = folder.contents()
-    return lines.find_excludable_entry(name, [*contents.taps, *contents.lost], contents.cuts, str(folder.path))
+    others: list[CutEntry | MassCheckEntry] = [*contents.cuts, *contents.mass_checks]
+    return lines.find_excludable_entry(name, [*contents.taps, *contents.lost], others, str(folder.path))
 
 
 def store_mode_edits(folder: MachineFolder, tap_ids: Sequence[str], edits: ModeEdits) -> None:
@@ -131,6 +133,15 @@ def store_hit_decisions(folder: MachineFolder, tap_id: str, decisions: Sequence[
     """Write decisions on hits of a tap test to the journal; the tap test may be in progress."""
     with folder.locked():
         folder.journal.append(*lines.make_hit_entries(tap_id, decisions))
+
+
+def store_mass_check(folder: MachineFolder, check: MassCheckEntry) -> MassCheckEntry:
+    """Write a check with a known mass to the journal, and return it with its identity."""
+    with folder.locked():
+        number = sum(line["kind"] == MASS_CHECK_KIND for line in folder.journal.read().other_entries) + 1
+        check = msgspec.structs.replace(check, id=f"m{number}")
+        folder.journal.append(check.line)
+    return check
 
 
 def lobewatch_version() -> str:

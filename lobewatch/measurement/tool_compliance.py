@@ -142,6 +142,19 @@ def compare_with_tool(modes: Sequence[Mode], tool: ToolBeam | None, highest_freq
     return ToolAgreement.TOO_STIFF if is_stiff else ToolAgreement.AGREES
 
 
+def has_plausible_size(modes: Sequence[Mode], tool: ToolBeam | None, highest_frequency: float) -> bool:
+    """Tell whether the compliance at the tip is that of the tool, so that no sensitivity is wrong by a factor of 3.
+
+    The true compliance is at least that of the tool alone, and at most that in a soft spindle. So three times the
+    least and a third of the most must be outside of the accepted range. Arguments as of `compare_with_tool`.
+    """
+    if tool is None or highest_frequency < tool.frequency:
+        return False
+    most = 1 + SUPPORT_COMPLIANCE / tool.compliance
+    low, high = max(MIN_COMPLIANCE_RATIO, most / TOOL_COMPLIANCE.limit), MIN_COMPLIANCE_RATIO * TOOL_COMPLIANCE.limit
+    return low < sum_compliance(modes) / tool.compliance < high
+
+
 def sum_compliance(modes: Sequence[Mode]) -> float:
     """Return the sum of 1/K of the driving-point modes with a known stiffness (m/N), 0 without any."""
     return sum(1 / mode.stiffness for mode in modes if mode.stiffness > 0)

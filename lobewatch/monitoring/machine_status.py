@@ -17,6 +17,7 @@ from lobewatch.machine import LimitsTable, Machine
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
+from lobewatch.measurement.tap_age import is_too_old, too_old_remark
 from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SeriesChange
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
@@ -166,11 +167,12 @@ def assess_status(
     files: Sequence[Remark] = (),
     acknowledgements: Sequence[Acknowledgement] = (),
     scatter: FleetScatter | None = None,
+    chain: Sequence[Remark] = (),
 ) -> MachineStatus:
     """Assess the status of a machine at a time; the last row has the verdict on every program.
 
     path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first;
-    scatter: that of other machines.
+    scatter: that of other machines; chain: on newest tap tests whose sensors nothing has checked.
     """
     rows = history.current
     if not rows and files:
@@ -181,14 +183,16 @@ def assess_status(
         return _build_status(now, [rules.NEVER_TAPPED.remark("", since=since)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
-    newest, interval = rows[-1], machine.machine.tap_interval_days
+    newest, interval = rows[-1], machine.machine.interval_days
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
     remarks += question_remarks({row.tap_id: row.questions for row in history.rows}, path, [row.tap_id for row in rows])
+    remarks += chain
     programs = [*_program_remarks(rows, machine)]
     raised += [_trigger_program_alarm(remark, rows) for remark in programs if rules.is_alarm(remark)]
     remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]
+    remarks += _old_program_remarks(history, machine, now)
     remarks += _direction_remarks(rows)
     series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
     left = rules.count_days_left(newest.time, interval, now)
@@ -241,6 +245,16 @@ def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[R
             yield rules.PROGRAM_UNKNOWN.remark(name, stability=stability)
         elif ruling.stability is Stability.DOUBTFUL:
             yield rules.PROGRAM_DOUBTFUL.remark(name, tap, stability=stability)
+
+
+def _old_program_remarks(history: History, machine: Machine, now: datetime) -> Iterator[Remark]:
+    """Yield a remark for each stable program whose tap tests are too old for the agreed interval."""
+    interval, verdicts = machine.machine.tap_interval_days, history.current[-1].verdicts or {}
+    for program in machine.program:
+        time = history.newest_time(program.tool)
+        is_stable = program.name in verdicts and verdicts[program.name].stability is Stability.STABLE
+        if is_stable and interval is not None and time is not None and is_too_old(time, now, interval):
+            yield too_old_remark(program.name, time, now, interval)
 
 
 def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> TriggeredAlarm:

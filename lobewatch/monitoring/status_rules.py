@@ -16,6 +16,7 @@ import msgspec
 from acquisition import Remark
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, format_alarm_id
 from lobewatch.measurement.clock_questions import CLOCK_QUESTIONS, future_tap_remarks
+from lobewatch.measurement.tap_age import TOO_OLD_CODE
 
 
 class Alarm(msgspec.Struct, frozen=True, rename={"triggered_by": "raised_by", "triggered_at": "raised"}):
@@ -199,6 +200,9 @@ ONE_DIRECTION = StatusRule(
     "tapped in direction {direction} only",
     "Tap direction {missing} of this tool as well, because verdicts need both directions",
 )
+FOLDER_COPIED = StatusRule(
+    "folder-copied", GOOD, "same tap tests as folder {folders}", "Keep one of these folders and move its copy elsewhere"
+)
 EVENT_CALL = 'folder_updates.add_event {folder} "what was done" add_event.new_baseline'
 """Call that records a repair in the journal of a folder."""
 
@@ -218,8 +222,9 @@ STATUS_RULES = (
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),
-    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future"),
-    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
+    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future", TOO_OLD_CODE),
+    *_rules_of("chain-not-checked"),
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}

@@ -75,7 +75,7 @@ def _sample_series(machine: FleetMachine) -> Iterator[MetricSample]:
             yield "frequency_fall_ratio", labels, series.drop / 100.0
         if series.frequency is not None:
             yield "frequency_hertz", labels, series.frequency
-    for program, verdict in machine.summary.programs.items():
+    for program, verdict in machine.summary.programs_at(machine.current.time).items():
         yield "program_word", {"program": program, "word": verdict}, 1.0
 
 

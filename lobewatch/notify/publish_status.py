@@ -178,7 +178,7 @@ def make_message_content(machine: FleetMachine) -> dict[str, Any]:
         "frequency_hz": worst.frequency if worst else None,
         "next_limit": build_limit_row(find_next_limit(summary.limits)),
         "forecast": build_forecast_rows(summary.forecasts, summary.limits),
-        "programs": summary.programs,
+        "programs": summary.programs_at(current.time),
         "last_tap": summary.last_tap or None,
         "due": due and due.isoformat(),
         "is_overdue": current.days_left is not None and current.days_left < 0,

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import acquisition
-from acquisition import Channel, Device, Hit, Remark, SensorDataLocation
+from acquisition import Channel, Device, Remark, SensorDataLocation
 from lobewatch.machine.daq_rates import apply_measured_rate, check_device_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.device_connection import DeviceConnection, collect_codes, find_sensor_data
-from lobewatch.tap.self_check import SENSOR_ERROR_CODES, find_quiet_part, sensor_remarks
-from lobewatch.tap.trial_hits import TrialHits
+from lobewatch.machine.journal.mass_checks import MassCheckEntry
+from lobewatch.tap.device_connection import collect_codes, find_sensor_data
+from lobewatch.tap.mass_check import measure_mass, store_mass_result
+from lobewatch.tap.self_check import SENSOR_ERROR_CODES, sensor_remarks
 
 RATE_MEASUREMENT_SECONDS = 5.0
 """Length of the rate measurement (s)."""
@@ -79,10 +80,6 @@ def _aliasing_remarks(declared: bool | None, rate: float) -> list[Remark]:
     return [Remark("no-anti-alias", "", text, cure)]
 
 
-MASS_CHECK_BASELINE_SECONDS = 0.5
-"""Length of the record before the first hit (s)."""
-
-
 class MassCheck(NamedTuple):
     """Result of the check with a hung mass, and where to correct a sensitivity."""
 
@@ -90,10 +87,19 @@ class MassCheck(NamedTuple):
     """Ratio of force to mass times acceleration, and conclusions."""
     place: SensorDataLocation | None
     """Location of the sensitivities in the device, None if machine.toml has them."""
+    entry: MassCheckEntry | None = None
+    """Line in the journal, None if the result says nothing of the sensitivities."""
 
 
-def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, tell: Callable[[str], None]) -> MassCheck:
-    """Take as many good hits as a tap test on a freely hung mass and compare force with mass times acceleration.
+def check_mass(
+    folder: MachineFolder,
+    port: str,
+    device: Device,
+    mass: float,
+    tell: Callable[[str], None],
+    operator: str = "",
+) -> MassCheck:
+    """Compare force with mass times acceleration on a freely hung mass, and write the result to the journal.
 
     Parameters
     ----------
@@ -107,30 +113,17 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
         Total moving mass (kg).
     tell
         Function called with instructions and the verdict on each hit.
+    operator
+        Name of the operator.
 
     Returns
     -------
     MassCheck
-        Calibration, and where to correct a sensitivity.
+        Calibration, where to correct a sensitivity, and the line in the journal.
     """
-    wanted = folder.machine.tap.hits
-    check_device_rate(folder, device)
-    tell(
-        f"HIT the suspended mass opposite the accelerometer {wanted} times. Let the mass come to rest before each hit."
-    )
-    good: list[Hit] = []
-    device.start()
-    baseline = find_quiet_part(DeviceConnection(device).record(device.blocks(), MASS_CHECK_BASELINE_SECONDS))
-    for hit in acquisition.capture_hits(device, TrialHits(folder.machine.tap, baseline).trigger):
-        verdict = acquisition.evaluate_hit(hit)
-        if not verdict.flags:
-            good.append(hit)
-        text = f"✗ {verdict.flags.words.upper()}  {verdict.text}" if verdict.flags else "✓ GOOD"
-        tell(f"{len(good):3d} / {wanted}  {text}")
-        if len(good) >= wanted:
-            break
-    device.stop()
-    return MassCheck(acquisition.calibrate_by_mass(good, mass), find_sensor_data(folder.machine.daq, port))
+    result = measure_mass(folder, device, mass, tell)
+    entry = store_mass_result(folder, device, result, operator)
+    return MassCheck(result, find_sensor_data(folder.machine.daq, port), entry)
 
 
 SKEW_RECORDING_SECONDS = 2.0

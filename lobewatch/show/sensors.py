@@ -1,12 +1,13 @@
 """Show serial ports with their devices, sensors with checks, and findings on the computer."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.markup import escape
 
 from acquisition import STANDARD_GRAVITY, Channel, PortInfo, PortScan, ScannedPort, explain_no_ports
 from dsm import format_with_error
+from lobewatch.measurement.chain_check import ChainCheck, find_weakest_check
 from lobewatch.sensors.computer_check import Finding
 from lobewatch.sensors.sensor_checks import MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick
@@ -114,6 +115,8 @@ def mass_check_json(check: MassCheck) -> JsonObject:
         "force_sensitivity_v_per_n": result.force_sensitivity,
         "acceleration_sensitivity_v_per_m_s2": result.acceleration_sensitivity,
         "remarks": result.remarks,
+        "journal": check.entry and check.entry.id,
+        "passed": check.entry and check.entry.passed,
     }
 
 
@@ -163,7 +166,7 @@ def mass_check_texts(check: MassCheck) -> list[str]:
     """Return the result of the mass check, and the change to make."""
     ratio = check.calibration.ratio
     if check.calibration.sizes_agree:
-        return [str(check.calibration)]
+        return [str(check.calibration), *_journal_lines(check)]
     force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
     if check.place is not None:
         force, acceleration = (
@@ -172,7 +175,17 @@ def mass_check_texts(check: MassCheck) -> list[str]:
         )
         place = check.place.place
     change = f"In {place}, multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}"
-    return [str(check.calibration), change]
+    return [str(check.calibration), change, *_journal_lines(check)]
+
+
+def _journal_lines(check: MassCheck) -> list[str]:
+    """Return what the check means for tap tests."""
+    if check.entry is None:
+        return ["Not stored, because the result is no measure of the sensitivities. Repeat the check."]
+    counts = "counts for all tap tests with this DAQ and these sensitivities"
+    if not check.entry.passed:
+        counts = "tap tests with this DAQ and these sensitivities since the last good check do not count as checked"
+    return [f"Stored as {check.entry.id}: {counts}"]
 
 
 def skew_check_texts(check: SkewCheck) -> list[str]:
@@ -186,6 +199,18 @@ def skew_check_texts(check: SkewCheck) -> list[str]:
         f"({skew.skew * check.sample_rate:.4f} samples) after channel 0 (entered so far: {channel.skew * 1e6:.3f} us)",
         f"Enter {entry}, and 0 for channel 0",
     ]
+
+
+def sensor_rows(channels: Sequence[Channel], checks: Sequence[ChainCheck]) -> Iterator[tuple[str, str]]:
+    """Yield a row of the report for each sensor of a tap test, and one on the check of both."""
+    for channel in channels:
+        name, unit = ("hammer", "N") if channel.quantity == "force" else ("accelerometer", "(m/s²)")
+        number = f"serial number {channel.serial_number or 'unknown'}"
+        calibrated = f"calibrated {channel.calibration_date}" if channel.calibration_date else "calibration unknown"
+        yield name, f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
+    check = find_weakest_check(checks)
+    if check is not None and check.is_recorded:
+        yield "sensor chain", check.text
 
 
 def findings_json(findings: Sequence[Finding]) -> JsonObject:

@@ -19,6 +19,7 @@ from lobewatch.machine.folder_updates import add_event
 from lobewatch.measurement import Measurement
 from lobewatch.monitoring.threshold_dates import ThresholdDates
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
+from lobewatch.tap.emulated_mass import DEMO_MASS, build_hung_mass, check_emulated_mass
 from lobewatch.tap.emulated_spindle import (
     MountingVariation,
     SpindleWear,
@@ -118,9 +119,17 @@ def _find_last_month(now: datetime) -> int:
 def age_spindle(
     folder: MachineFolder, wear: SpindleWear, seed: int, mounting: MountingVariation, *, tcp: bool = False
 ) -> Iterator[TakenTap]:
-    """Take the tap tests of `plan_taps`, each through a real port: a pseudo-terminal, or TCP on loopback."""
+    """Check the sensors with a mass, then take the tap tests of `plan_taps`.
+
+    Each test, and the check the day before the first, runs through a real port: a pseudo-terminal, or TCP on loopback.
+    """
     random = np.random.default_rng(seed)
     plans = plan_taps(folder, wear, random, mounting, datetime.now(UTC))
+    with (
+        open_synchronized_device(build_hung_mass(DEMO_MASS), np.random.default_rng(seed), tcp=tcp) as open_device,
+        threadpool_limits(limits=1),
+    ):
+        check_emulated_mass(folder, open_device, plans[0].date - timedelta(days=1))
     for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
         if wear.replaced_at is not None and number == len(DEMO_DIRECTIONS) * wear.replaced_at:
             add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)

@@ -12,6 +12,7 @@ from acquisition.channel import ChannelQuantity
 from acquisition.devices.registry import convert_driver_errors
 from acquisition.hit import TapInputs
 from acquisition.sensors.stream_rate import StreamRate
+from acquisition.tap_test import SERIAL_PREFIX
 from lobewatch.machine.settings.setup_tables import DaqTable
 
 REPLAY_PREFIX = "file:"
@@ -65,7 +66,7 @@ def describe_device(device: Device) -> str:
     """Describe model, serial number, firmware and loss detection, as far as known."""
     identity = device.identity
     texts = identity.serial, identity.firmware, device.loss_detection
-    details = zip(("serial number ", "firmware ", "loss detection: "), texts, strict=True)
+    details = zip((SERIAL_PREFIX, "firmware ", "loss detection: "), texts, strict=True)
     return ", ".join([identity.model, *(name + value for name, value in details if value)])
 
 

@@ -23,6 +23,7 @@ from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.spindle_tables import SpindleTable
 from lobewatch.monitoring.level_model import STEEL_FREQUENCY_PER_KELVIN
 from lobewatch.tap.emulated_faults import NO_FAULTS, EmulatedFaults
+from lobewatch.tap.mass_check import store_emulator_check
 
 EMULATED_MODES = 8
 """Number of modes simulated. All higher ones are a static flexibility."""
@@ -134,7 +135,7 @@ def emulate_machine(
 
     spindle: replaces that of machine.toml, with the same damping. axes_angle: angle from x (deg) of its principal
     directions as in `rotate_structure`, None for a round spindle, the same in x and y. faults: of the tap test.
-    serving: as of `emulate_device`.
+    serving: as of `emulate_device`. The check of its sensors is in the journal then.
     DataError if machine.toml lacks the sensors of a device that does not describe them itself.
     """
     table, random = get_spindle_table(folder), np.random.default_rng(seed)
@@ -148,6 +149,7 @@ def emulate_machine(
         return faults.apply(map_signal_to_inputs(inputs, hammered, direction), inputs, rate)
 
     device = emulate_device(folder, driver, signal_of, clock_error=faults.clock_error, **serving)
+    store_emulator_check(folder, tuple(sensor.channel for sensor in get_emulated_inputs(folder, driver)))
     return EmulatedMachine(device, float(structure.frequency[0]), float(structure.stiffness[0]))
 
 

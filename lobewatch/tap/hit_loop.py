@@ -24,6 +24,7 @@ from lobewatch.tap.device_connection import (
 from lobewatch.tap.hit_check import add_steady_vibration, evaluate_safely
 from lobewatch.tap.live_curves import build_curves
 from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
+from lobewatch.tap.mass_check import check_mass_entry, store_emulator_check
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
 from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep
@@ -107,6 +108,8 @@ class TapPhases:
         try:
             self._check_rate(device)
             connection = DeviceConnection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
+            if device.identity.knows_sensors:
+                store_emulator_check(self._folder, device.channels)
             tap.accept_device(device.sample_rate, connection.inputs.channels, describe_device(device))
             device.start()
             device.events.clear()
@@ -161,6 +164,7 @@ class TapPhases:
         checks = [*self._publisher.state.checks]
         checks += _run_guarded_checks(baseline, trigger.level if trigger else None, free)
         checks.append(check_calibration(connection.inputs.channels, machine.daq.calibration_interval_months))
+        checks += filter(None, [check_mass_entry(self._folder, connection)])
         if not baseline.has_force:
             checks.append(check_detectable_band(baseline, machine, self._tap.circumstances.tool))
         failed = [f"{check.name}: {check.text}" for check in checks if not check.passed]

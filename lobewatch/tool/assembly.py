@@ -15,6 +15,7 @@ from dsm import Calibration, calibrate, modes_at
 from lobes import Cut, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
+from lobewatch.measurement.chain_check import ChainCheck
 from lobewatch.measurement.coverage import describe_uncovered, label_direction, peak_remark
 from lobewatch.measurement.hit_choice import HIT_DECISION_CODES
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
@@ -148,11 +149,17 @@ class Assembly:
     """Remarks that say the modes do not cover the measurement; no answer silences them."""
     hit_remarks: tuple[Remark, ...] = ()
     """Remarks on decisions on hits of these tap tests."""
+    age_days: float | None = None
+    """Age of its newest tap test (days), from the clock; None as of that test."""
+    chain_checks: tuple[ChainCheck, ...] = ()
+    """Checks of the sensors behind its tap tests."""
+    unchecked: tuple[Remark, ...] = ()
+    """Remarks on what a check or another tap test must still confirm; until then no program is stable."""
 
     @property
     def is_complete(self) -> bool:
-        """True if both directions are known from tap tests without open questions, and their modes cover them."""
-        return len(self.directions) == 2 and not self.questions and not self.uncovered
+        """True if both directions are known from tap tests without open questions, covered by modes and checked."""
+        return len(self.directions) == 2 and not (self.questions or self.uncovered or self.unchecked)
 
     @property
     def missing_direction(self) -> tuple[str, str]:

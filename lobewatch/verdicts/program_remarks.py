@@ -13,7 +13,14 @@ from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
 from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
-from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCERTAINTY_CAUSES, UNTAPPED, WORKPIECE
+from lobewatch.verdicts.uncertainty_causes import (
+    COVERAGE,
+    QUESTION,
+    UNCERTAINTY_CAUSES,
+    UNCHECKED,
+    UNTAPPED,
+    WORKPIECE,
+)
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
 MISSING_TOOL_FACTS = {
@@ -144,6 +151,8 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
         return QUESTION.name
     if case.assembly.uncovered:
         return COVERAGE.name
+    if case.assembly.unchecked:
+        return UNCHECKED.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
     samples, uncertainty = result.samples, result.samples.uncertainty
@@ -168,5 +177,12 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
     if assembly.uncovered:
         values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
+    if assembly.unchecked:
+        values["unchecked"], values["unchecked_remedy"] = describe_uncovered(assembly.unchecked)
     values |= {"missing": missing, "missing_remedy": missing_remedy}
-    return Remark("doubt-decides", table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+    return decisive_remark(table.name, record.sentence.format_map(values), record.remedy.format_map(values))
+
+
+def decisive_remark(program: str, text: str, cure: str) -> Remark:
+    """Return the remark on the decisive cause of a doubtful verdict."""
+    return Remark("doubt-decides", program, text, cure)

@@ -82,7 +82,7 @@ class SettingSearch:
     @cached_property
     def needed_drop(self) -> float:
         """Relative frequency drop at which a setting must stay stable: two tap intervals at the rate so far."""
-        days = N_TAP_INTERVALS * self.case.machine.machine.tap_interval_days
+        days = N_TAP_INTERVALS * self.case.machine.machine.interval_days
         drops = [expected_frequency_drop(series, days) for series in self.case.assembly.series.values()]
         needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, robustness.MIN_ROBUST_DROP) for drop in drops]
         return max(needed, default=DEFAULT_NEEDED_DROP)

@@ -45,6 +45,7 @@ COEFFICIENTS = Cause(
 WEAR = Cause("wear", "result depends on tool wear (chatter above Kt {kt} N/mm2)", 'Use new edges and set wear = "new"')
 QUESTION = Cause("question", "a tap test has an open question ({questions})", "Answer the question, or tap again")
 COVERAGE = Cause("coverage", "the modes do not cover the measurement ({uncovered})", "{uncovered_remedy}")
+UNCHECKED = Cause("unchecked", "{unchecked}", "{unchecked_remedy}")
 WORKPIECE = Cause(
     "workpiece",
     "the thin wall deflects and its modes are unknown",

@@ -14,12 +14,14 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.measurement.coverage import describe_uncovered
+from lobewatch.measurement.tap_age import OLD_CODE, TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
+from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -182,6 +184,10 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     """Build the verdict on a program from its Monte Carlo result."""
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
+    if stability is Stability.STABLE:
+        unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
+        remarks += dict.fromkeys(filter(None, unrecorded))
+        remarks += (remark for remark in case.assembly.remarks if remark.code == OLD_CODE)
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -209,6 +215,18 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     )
 
 
+def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
+    """Return a verdict as of now: at most doubtful if its tap tests are too old. aged: its tool with the age."""
+    old = [remark for remark in aged.remarks if remark.code == OLD_CODE and verdict.stability is Stability.STABLE]
+    too_old = [remark for remark in aged.unchecked if remark.code == TOO_OLD_CODE and verdict.samples is not None]
+    verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *old, *too_old))
+    if not too_old or not verdict.is_stable or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
+        return verdict
+    others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
+    advice = program_remarks.decisive_remark(verdict.program.name, *describe_uncovered(aged.unchecked))
+    return replace(verdict, stability=Stability.DOUBTFUL, decisive_cause=UNCHECKED.name, remarks=(*others, advice))
+
+
 def _unknown_verdict(
     table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None, further: tuple[Remark, ...] = ()
 ) -> Verdict:
@@ -227,7 +245,7 @@ def classify_stability(case: ProgramCase, result: MonteCarloResult) -> Stability
 
 
 def is_compliance_known(table: CutTable, assembly: Assembly) -> bool:
-    """Return whether the compliance is known: both directions tapped and covered, no open question, no thin wall."""
+    """Return whether the compliance is known: both directions tapped and checked, no open question, no thin wall."""
     return find_open_question(table, assembly) is None
 
 
@@ -241,16 +259,16 @@ def find_open_question(table: CutTable, assembly: Assembly) -> tuple[str, str] |
         codes = dict.fromkeys(question.code for question in assembly.questions)
         cure = "Tap again" if "newest-damaged" in codes else "Answer the open questions about the tap tests"
         return f"a tap test has an open question ({', '.join(codes)})", cure
-    if assembly.uncovered:
-        return describe_uncovered(assembly.uncovered)
-    return None
+    remarks = assembly.uncovered or assembly.unchecked
+    return describe_uncovered(remarks) if remarks else None
 
 
 def _verdict_remarks(case: ProgramCase) -> Iterator[Remark]:
     machine, table = case.machine, case.table
     yield from (remark for remark in case.assembly.remarks if remark.code in (*DIRECTION_CODES, "predicted"))
     yield from case.at_speed.remarks
-    yield from (*case.assembly.questions, *case.assembly.uncovered, *case.assembly.hit_remarks)
+    assembly = case.assembly
+    yield from (*assembly.questions, *assembly.uncovered, *assembly.unchecked, *assembly.hit_remarks)
     yield from program_remarks.tool_limit_remarks(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and find_feed_per_tooth(machine, table) is None:
         yield Remark(

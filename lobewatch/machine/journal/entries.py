@@ -12,6 +12,7 @@ from acquisition import HitDecision
 from acquisition.hit_quality.decide_hits import merge_decisions
 from lobes import Cut
 from lobewatch.machine.journal.journal import JournalEntry, JournalReading, make_entry
+from lobewatch.machine.journal.mass_checks import MASS_CHECK_KIND, MassCheckEntry
 from lobewatch.machine.journal.tap_entry import FIELDS_OF_OTHER_LINES, NO_MODE_EDITS, TapEntry, decode_tap_entries
 from lobewatch.machine.settings.drive_power import CutPower
 from modal import ModeEdits
@@ -145,18 +146,20 @@ def read_events(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent,
     return tuple(sorted(events.values(), key=lambda event: event.time))
 
 
-ExcludableEntry = TapEntry | CutEntry
+ExcludableEntry = TapEntry | CutEntry | MassCheckEntry
 """Entry that can be excluded."""
 
 
-def find_excludable_entry(name: str, taps: Sequence[TapEntry], cuts: Sequence[CutEntry], path: str) -> ExcludableEntry:
-    """Find the test cut of an identity, or the tap test of an identity, a part of it, or a file.
+def find_excludable_entry(
+    name: str, taps: Sequence[TapEntry], others: Sequence[CutEntry | MassCheckEntry], path: str
+) -> ExcludableEntry:
+    """Find the test cut or mass check of an identity, or the tap test of an identity, a part of it, or a file.
 
     Raises ValueError if there is none or there are several.
     """
-    for cut in cuts:
-        if cut.id == name:
-            return cut
+    for other in others:
+        if other.id == name:
+            return other
     part = name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
     matches = [tap for tap in taps if tap.id == part] or [tap for tap in taps if part and part in tap.id]
     if len(matches) == 1:
@@ -221,6 +224,14 @@ def read_committed_taps(reading: JournalReading) -> dict[str, TapEntry]:
         changes = dict(zip(FIELDS_OF_OTHER_LINES, later, strict=True))
         entries[name] = msgspec.structs.replace(entries[name], **changes)
     return entries
+
+
+def read_mass_checks(entries: Sequence[Mapping[str, Any]]) -> tuple[MassCheckEntry, ...]:
+    """Read the checks with a known mass, oldest first."""
+    excluded = read_exclusion_reasons(entries)
+    lines = [line for line in entries if line["kind"] == MASS_CHECK_KIND]
+    checks = [msgspec.convert({**line, "excluded": excluded.get(line["id"], "")}, MassCheckEntry) for line in lines]
+    return tuple(sorted(checks, key=attrgetter("date")))
 
 
 def read_given_up_ids(reading: JournalReading) -> set[str]:

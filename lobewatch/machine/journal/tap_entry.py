@@ -11,6 +11,7 @@ from typing import Any, Self
 import msgspec
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, HitDecision, Remark, TapTest
+from lobewatch.machine.journal.mass_checks import SensorChain
 from modal import ModeEdits
 
 NO_MODE_EDITS = ModeEdits()
@@ -65,6 +66,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Codes of the questions about its time and device at the commit; empty in lines of older versions."""
     operator: str = ""
     """Name of the operator; empty if unknown and in lines of older versions."""
+    chain: SensorChain | None = None
+    """Measurement chain; None in lines of older versions, for replayed tests and without a force sensor."""
     accepted: tuple[str, ...] = ()
     """Codes of its accepted questions, from other lines."""
     excluded: str = ""
@@ -112,8 +115,10 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in FIELDS_OF_OTHER_LINES}
-        return {"kind": "tap", **fields, "conditions": self.conditions.specified, "asked": list(self.asked)}
+        left_out = (*FIELDS_OF_OTHER_LINES, "chain")
+        fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in left_out}
+        chain = {} if self.chain is None else {"chain": msgspec.to_builtins(self.chain)}
+        return {"kind": "tap", **fields, "conditions": self.conditions.specified, "asked": list(self.asked), **chain}
 
     @property
     def file(self) -> str:

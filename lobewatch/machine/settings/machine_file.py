@@ -317,7 +317,7 @@ def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
         toml.check_control_characters(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {join_sentences(str(error), toml.suggest_decimal_point(text))}") from error
+        raise DataError(f"{name}: {join_sentences(str(error), toml.suggest_plain_number(text))}") from error
     except msgspec.ValidationError as error:
         raise DataError(f"{name}: {toml.explain_validation_error(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:

@@ -19,6 +19,8 @@ SENSOR_MASS_STD_RATIO = 0.02
 """Relative standard error of the sensor mass from a data sheet or a scale; chosen."""
 CABLE_MASS_SHARE, CABLE_MASS_STD_RATIO = 0.5, 0.25
 """Share of the cable mass that moves with the sensor, and its standard error; chosen."""
+DEFAULT_TAP_INTERVAL_DAYS = 30.0
+"""Interval of tap tests (days) where machine.toml sets none; chosen, a month."""
 MAX_SENSOR_MASS_G = 2000.0
 """Largest plausible sensor mass (g)."""
 
@@ -52,10 +54,15 @@ class MachineTable(TomlTable, frozen=True):
 
     name: Annotated[str, Meta(min_length=1)]
     """Name of the machine."""
-    tap_interval_days: Annotated[Positive, Plausible(0.5, 400)] = 30.0
-    """Planned interval of tap tests (days)."""
+    tap_interval_days: Annotated[Positive, Plausible(0.5, 400)] | None = None
+    """Agreed interval of tap tests (days); None: nobody has set one."""
     accepted: tuple[str, ...] = ()
     """Accepted questions about implausible settings."""
+
+    @property
+    def interval_days(self) -> float:
+        """Interval of tap tests (days), agreed or by default."""
+        return DEFAULT_TAP_INTERVAL_DAYS if self.tap_interval_days is None else self.tap_interval_days
 
 
 class TapTable(TomlTable, frozen=True):
@@ -176,6 +183,7 @@ class ChannelTable(TomlTable, frozen=True):
     gain: Annotated[Positive, Plausible(0.2, 199)] = 1.0
     iepe: bool = True
     direction: TapDirection | Literal[""] = ""
+    model: str = ""
     serial_number: str = ""
     calibration_date: date | None = None
     skew_us: Annotated[float, Meta(ge=-1e6, le=1e6), Plausible(0.05, 49)] = 0.0

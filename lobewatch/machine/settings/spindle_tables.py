@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 
 from acquisition.errors import join_sentences
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
@@ -124,7 +124,10 @@ class SpindleTable(TomlTable, frozen=True):
     joints: tuple[JointTable, ...] = ()
     theory: Theory = "euler-bernoulli"
     youngs_modulus_gpa: Annotated[Positive, Plausible(10, 700)] = 210.0
-    shear_modulus_gpa: Annotated[Positive, Plausible(5, 300)] | None = None
+    shear_modulus_gpa: Annotated[Positive, Plausible(2, 300)] | None = None
+    axial_poisson_ratio: Annotated[float, Meta(ge=0, le=0.5), Plausible(0.01, 0.5)] | UnsetType = (
+        UNSET  # not in old hashes
+    )
     density_kg_per_m3: Annotated[Positive, Plausible(1000, 20_000)] = 7850.0
     damping_ratio: Annotated[float, Meta(gt=0, lt=1), Plausible(0.001, 0.3)] = 0.03
     tool_length_mm: Annotated[Positive, Plausible(3, 1000)] | None = None
@@ -159,6 +162,7 @@ class SpindleTable(TomlTable, frozen=True):
             shear_modulus=None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9,
             masses=[mass.build() for mass in self.masses],
             joints=[joint.build() for joint in self.joints],
+            axial_poisson_ratio=None if self.axial_poisson_ratio is UNSET else self.axial_poisson_ratio,
         )
 
 

@@ -17,6 +17,7 @@ from msgspec import Meta, Struct
 from acquisition import DataError, check_name
 from acquisition.errors import join_sentences
 from acquisition.file_io import read_regular_file
+from lobewatch.machine.settings.number_text import SEPARATED_NUMBER_PATTERN, format_number, list_readings
 
 Positive = Annotated[float, Meta(gt=0, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
@@ -94,10 +95,13 @@ def _join_type_names(match: re.Match[str]) -> str:
     return " or ".join(TYPE_NAMES.get(kind, kind) for kind in match[1].split(" | ") if kind != "null")
 
 
-def suggest_decimal_point(text: str) -> str:
-    """Return the remedy for a decimal comma, the usual cause of invalid TOML; empty without one."""
-    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
-    return f"Write {match[1]}.{match[2]} with a decimal point" if match else ""
+def suggest_plain_number(text: str) -> str:
+    """Return the remedy for a decimal comma or for separated thousands in invalid TOML; empty without one."""
+    for match in re.finditer(rf"=\s*([+-]?{SEPARATED_NUMBER_PATTERN})\s*(?:#|\n|,|\}}|$)", text):
+        readings = list_readings(match[1])
+        if readings and not re.fullmatch(r"[\d.+-]+", match[1]):
+            return f"Write {' or '.join(map(format_number, readings))} in TOML"
+    return ""
 
 
 def suggest_spelling(word: str, words: Iterable[str]) -> str:

@@ -17,6 +17,7 @@ from acquisition import (
 )
 from acquisition.devices.registry import convert_driver_errors
 from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.machine.settings.number_text import NUMBER_TOKEN_PATTERN, ValueLimits, format_number, read_numbers
 from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
 
 
@@ -165,7 +166,6 @@ OPEN_ANSWER = "-"
 ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
 ANSWER_UNITS |= {"teeth", "flutes"}
 """Units that may stand between numbers."""
-ANSWER_NUMBER_PATTERN = re.compile(r"\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
 
 
 def is_open_answer(answer: str) -> bool:
@@ -173,19 +173,24 @@ def is_open_answer(answer: str) -> bool:
     return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
 
 
-def parse_numbers(answer: str, names: Sequence[str], least: int | None = None) -> list[float]:
-    """Parse the numbers of an answer, at least `least` or one per name; ValueError names them."""
-    words = ANSWER_NUMBER_PATTERN.sub(" ", answer)
+def parse_numbers(
+    answer: str, names: Sequence[str], least: int | None = None, limits: Sequence[ValueLimits | None] = ()
+) -> list[float]:
+    """Parse the numbers of an answer, at least `least` or one per name; ValueError names them.
+
+    limits: plausible range of each number, which tells a decimal sign from a separator of thousands.
+    """
+    words = NUMBER_TOKEN_PATTERN.sub(" ", answer)
     strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
     if strange:
         raise ValueError(f"{answer!r}: {strange[0]!r} is neither a number nor a unit. Enter {', '.join(names)}.")
-    numbers = [float(number.replace(",", ".")) for number in ANSWER_NUMBER_PATTERN.findall(answer)]
+    numbers = NUMBER_TOKEN_PATTERN.findall(answer)
     if not (len(names) if least is None else least) <= len(numbers) <= len(names):
         count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
-        raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces between them.")
-    return numbers
+        raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces only between them.")
+    return read_numbers(numbers, limits)
 
 
 def format_answer(*values: float) -> str:
     """Format numbers as they are typed."""
-    return " ".join(f"{value:.10g}" for value in values)
+    return " ".join(map(format_number, values))

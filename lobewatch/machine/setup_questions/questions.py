@@ -6,9 +6,15 @@ from typing import Any, get_args
 
 from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
-from lobewatch.machine.settings.setting_questions import TEMPLATE_COEFFICIENTS
-from lobewatch.machine.settings.setup_tables import SensorMounting
-from lobewatch.machine.settings.toml import TomlValue
+from lobewatch.machine.settings.cut_tables import CutTable, DriveTable
+from lobewatch.machine.settings.number_text import ValueLimits
+from lobewatch.machine.settings.setting_questions import (
+    DEPTH_RATIO_RANGE,
+    RADIAL_DEPTH_RATIO_RANGE,
+    TEMPLATE_COEFFICIENTS,
+)
+from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable, SensorMounting, SpeedTable, TapTable
+from lobewatch.machine.settings.toml import TomlTable, TomlValue, find_plausible_ranges
 from lobewatch.machine.setup_questions import draft as setup
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion
 
@@ -47,10 +53,20 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
     driver = driver or look.driver
     draft = draft.set("daq", port=port, driver=None if driver == "taps" else driver)
     if rate:
-        draft = draft.set("daq", sample_rate_hz=setup.parse_numbers(rate, ("sample rate in Hz",))[0])
+        draft = draft.set("daq", sample_rate_hz=_parse_rate(rate))
     if find_driver(driver).prints_samples:
         find_driver(driver).check(DeviceSettings(draft.table("daq").get("sample_rate_hz")))
     return draft
+
+
+def _parse_rate(answer: str) -> float:
+    return setup.parse_numbers(answer, ("sample rate in Hz",), limits=_limits(DaqTable, "sample_rate_hz"))[0]
+
+
+def _limits(table: type[TomlTable], *keys: str) -> list[ValueLimits | None]:
+    """Return the plausible range of keys of a table, None for a key without one."""
+    ranges = find_plausible_ranges(table)
+    return [ranges.get(key) for key in keys]
 
 
 def _described_by_daq(quantity: str, draft: MachineDraft) -> str:
@@ -79,7 +95,8 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
             return draft.set("tap", hammer=NO_HAMMER_ANSWER, trigger_n=None)
         draft = draft.set("tap", hammer=None)
     names = ("DAQ input", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
-    number, sensitivity, reach = setup.parse_numbers(answer, names)
+    limits = _limits(ChannelTable, "input", SENSITIVITY_KEYS[quantity], "range_v")
+    number, sensitivity, reach = setup.parse_numbers(answer, names, limits=limits)
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is not a whole number. Enter 0 for the first input.")
     values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
@@ -105,7 +122,7 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
     mountings = [word for word in words if word in MOUNTINGS]
     rest = " ".join(word for word in words if word not in MOUNTINGS)
     names = (f"the mass in g and one of {', '.join(MOUNTINGS)}",)
-    mass = setup.parse_numbers(rest, names, 0 if mountings else 1)
+    mass = setup.parse_numbers(rest, names, 0 if mountings else 1, _limits(TapTable, "sensor_mass_g"))
     return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
 
 
@@ -130,7 +147,8 @@ def _current_speeds(draft: MachineDraft) -> str:
 
 
 def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
-    low, high = setup.parse_numbers(answer, ("lowest speed in rpm", "highest speed in rpm"))
+    names, limits = ("lowest speed in rpm", "highest speed in rpm"), _limits(SpeedTable, "low_rpm", "high_rpm")
+    low, high = setup.parse_numbers(answer, names, limits=limits)
     return draft.set("speed", low_rpm=low, high_rpm=high)
 
 
@@ -143,7 +161,8 @@ def _current_drive(draft: MachineDraft) -> str:
 def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
-    power, torque = setup.parse_numbers(answer, ("power in kW", "torque in N m"))
+    names, limits = ("power in kW", "torque in N m"), _limits(DriveTable, "power_kw", "torque_nm")
+    power, torque = setup.parse_numbers(answer, names, limits=limits)
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
@@ -164,7 +183,8 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
     length = f"stick-out in mm (optional) and tool material (optional: {_TOOL_MATERIALS_TEXT})"
     numbers, made_of = _split_tool_answer(answer)
     names = ("flutes", "diameter in mm", "helix in deg", length)
-    teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3)
+    limits = [*_limits(CutTable, "teeth", "tool_diameter_mm", "helix_deg"), *_limits(TapTable, "stick_out_mm")]
+    teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3, limits)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Begin with a whole number.")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
@@ -196,8 +216,10 @@ def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     values: dict[str, TomlValue] = {"material": None}
+    limits = _limits(CutTable, *SETUP_COEFFICIENT_KEYS)
     try:
-        values |= dict(zip(SETUP_COEFFICIENT_KEYS, setup.parse_numbers(answer, ("Kt", "Kr")), strict=True))
+        numbers = setup.parse_numbers(answer, ("Kt", "Kr"), limits=limits)
+        values |= dict(zip(SETUP_COEFFICIENT_KEYS, numbers, strict=True))
     except ValueError:
         values |= {"material": answer.strip(), **dict.fromkeys(SETUP_COEFFICIENT_KEYS)}
     return _set_in_all_cuts(draft, values)
@@ -217,13 +239,21 @@ def _current_program(draft: MachineDraft) -> str:
     return f"{program['name']}: {setup.format_answer(*(program[key] for key in keys if key in program))}"
 
 
+def _program_limits(draft: MachineDraft, diameter: float) -> list[ValueLimits | None]:
+    """Return the range of the spindle, the plausible depths of a tool diameter (mm), and those of the feed."""
+    speed = SpeedTable(**draft.table("speed"))
+    depths = [(ratio.low * diameter, ratio.high * diameter) for ratio in (DEPTH_RATIO_RANGE, RADIAL_DEPTH_RATIO_RANGE)]
+    return [(speed.low_rpm, speed.high_rpm), *depths, *_limits(CutTable, "feed_per_tooth_mm")]
+
+
 def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
     names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (optional)")
-    speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3)
     cut = draft.table("reference_cut")
+    limits = _program_limits(draft, cut["tool_diameter_mm"])
+    speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3, limits)
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
     name = name.strip() if colon else "first cut"
     setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}

@@ -95,7 +95,9 @@ function row(machine) {
   part("limit").textContent = machine.limit;
   part("due").textContent = dueText(machine);
   part("due").classList.toggle("overdue", isDue(machine));
-  part("due").title = machine.last_tap ? `last tap test ${machine.last_tap.slice(0, 10)}` : "";
+  part("due").title = machine.last_tap
+    ? `last tap test ${machine.last_tap.slice(0, 10)}, ${machine.tap_age_days} d ago`
+    : "";
   drawCourse(part("course"), machine);
   part("report").disabled = !machine.last_tap;
   part("report").addEventListener("click", ({ target }) => go(target, key, `${path}/report`));

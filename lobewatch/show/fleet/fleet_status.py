@@ -9,6 +9,7 @@ from acquisition import merge_remarks
 from acquisition.errors import join_sentences
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
+from lobewatch.measurement.tap_age import tap_age_days
 from lobewatch.monitoring import threshold_dates
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
 from lobewatch.show.terminal.output import JsonObject, align_columns, count_noun, format_csv, make_printable
@@ -44,6 +45,7 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "series": worst.name if worst else "",
         "last_tap": summary.last_tap,
         "days_left": dated.days_left,
+        "tap_age_days": None if summary.time is None else math.floor(tap_age_days(summary.time, dated.time)),
         "reasons": reasons,
         "drop_reasons": [remark.finding for remark in remarks if remark.code in SEPARATE_REASON_CODES[:2]],
         "note": join_sentences(*reasons),
@@ -54,7 +56,7 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "limit": next_limit_text(ahead, dated.time),
         "forecast": threshold_dates.build_forecast_rows(summary.forecasts, summary.limits),
         "has_port": summary.has_port,
-        "programs": summary.programs,
+        "programs": summary.programs_at(dated.time),
         "points": worst.points if worst else (),
         "limits": [percent for percent, _ in summary.limits],
     }

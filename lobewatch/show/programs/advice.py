@@ -16,7 +16,14 @@ from lobewatch.logbook import Analysis, LobeComparison, Logbook
 from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
-from lobewatch.show.programs.verdicts import at_speed_text, verdict_json, verdict_notes, verdict_table
+from lobewatch.show.programs.verdicts import (
+    at_speed_text,
+    tap_age_json,
+    tap_age_text,
+    verdict_json,
+    verdict_notes,
+    verdict_table,
+)
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.verdicts import Advice, Setting, Stability, Verdict
@@ -218,6 +225,7 @@ def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> Js
     return {
         **lobes_json(now.name, lobes),
         "tap_id": now.assembly.tap_id,
+        "tap_age_days": tap_age_json(now.assembly),
         "source": now.source,
         "speed_rpm": lobes.speed_rpm,
         "depth_mm": lobes.depth * 1e3,
@@ -245,6 +253,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     texts: Texts = [
         f"{now.name}: {now.lobes.method_text}",
         f"computed from the {now.source} of {now.assembly.tap_id}",
+        tap_age_text(now.assembly),
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
         else f"no stability limit in this speed range ({now.lobes.method_text})",

@@ -19,6 +19,7 @@ from lobewatch.show.programs.advice import (
     window_text,
     worst_feed_text,
 )
+from lobewatch.show.programs.verdicts import tap_age_json, tap_age_text
 from lobewatch.show.terminal.output import (
     MIN_COLUMN_WIDTH,
     JsonObject,
@@ -64,6 +65,7 @@ def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: 
         "measured": verdict.is_measured,
         "cuts": verdict.n_cuts,
         "chance_turning": verdict.chatter_risk,
+        "tap_age_days": tap_age_json(verdict.assembly),
     }
 
 
@@ -110,6 +112,7 @@ def _recommended_lines(answer: Recommendation) -> Iterator[str]:
         return
     yield from wrap_lines([f"{answer.program.name}: {_setting_text(setting, answer)}"], "")
     items = ["Valid for up and down milling"] if answer.any_direction and answer.program.immersion < 1 else []
+    items += [] if verdict.assembly is None else [tap_age_text(verdict.assembly)]
     items += [] if verdict.is_measured else ["Predicted by the spindle model, doubtful until you tap the tool"]
     cuts = f"Valid for the rotating spindle, learned from {count_noun(verdict.n_cuts, 'test cut')}"
     yield from wrap_lines(

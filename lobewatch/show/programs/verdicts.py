@@ -12,6 +12,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, UncertaintyTable
+from lobewatch.measurement.chain_check import find_weakest_check
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.tool import Assembly
@@ -52,6 +53,40 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
 
 
+def tap_age_json(assembly: Assembly | None) -> int | None:
+    """Return the age of the newest tap test in whole days; None if unknown."""
+    return None if assembly is None or assembly.age_days is None else math.floor(assembly.age_days)
+
+
+def tap_age_text(assembly: Assembly) -> str:
+    """Return date and age of the newest tap test."""
+    age = tap_age_json(assembly)
+    return f"Newest tap test: {assembly.time.astimezone():%Y-%m-%d}" + ("" if age is None else f", {age} days old")
+
+
+def _tap_age_lines(verdicts: Sequence[Verdict]) -> list[str]:
+    """Return a line on the newest tap test of each tool."""
+    tools = {verdict.assembly.tool: verdict.assembly for verdict in verdicts if verdict.assembly is not None}
+    texts = {tool: tap_age_text(assembly) for tool, assembly in tools.items()}
+    return [f"{tool}: {text}" if len(tools) > 1 else text for tool, text in texts.items()]
+
+
+def chain_json(assembly: Assembly | None) -> JsonObject | None:
+    """Return the evidence for the sensors behind a tool and its date; None for a prediction."""
+    check = None if assembly is None else find_weakest_check(assembly.chain_checks)
+    if check is None:
+        return None
+    return {"checked_by": check.evidence, "date": check.date and check.date.isoformat()}
+
+
+def _chain_lines(verdicts: Sequence[Verdict]) -> list[str]:
+    """Return a line for each tool whose sensors are checked, with the evidence and its date."""
+    tools = {verdict.assembly.tool: verdict.assembly for verdict in verdicts if verdict.assembly is not None}
+    checks = {name: find_weakest_check(assembly.chain_checks) for name, assembly in tools.items()}
+    known = dict.fromkeys(check.text for check in checks.values() if check is not None and check.evidence is not None)
+    return [f"Sensor chain: {text}." for text in known]
+
+
 def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """Return the notes below a table of verdicts: the state of the spindle, then the uncertainty, one cause each."""
     named, evaluated, learned = dict[tuple[str, ...], list[str]](), 0, list[Verdict]()
@@ -61,7 +96,8 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             named.setdefault(tuple(parts), []).append(verdict.program.name)
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
-    lines = [*NOT_ROTATING_TEXTS] if len(learned) < evaluated else []
+    lines = [*_tap_age_lines(verdicts), *_chain_lines(verdicts)]
+    lines += NOT_ROTATING_TEXTS if len(learned) < evaluated else ()
     lines += [at_speed_text(learned)] if learned else []
     for causes, names in named.items():
         about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
@@ -177,6 +213,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "depth_mm": program.depth_mm,
         "feed": program.feed,
         "tap_id": assembly.tap_id if assembly else "",
+        "tap_age_days": tap_age_json(assembly),
         "stable": verdict.is_stable,
         "verdict": verdict.stability,
         "measured": verdict.is_measured,
@@ -186,6 +223,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "depth_margin": verdict.depth_margin,
         "chance_turning": verdict.chatter_risk,
         "decided_by": verdict.decisive_cause or None,
+        "sensor_chain": chain_json(assembly),
         "cuts": verdict.n_cuts,
         "chatter_frequency_hz": verdict.chatter_frequency,
         "kind": verdict.kind,

@@ -74,7 +74,7 @@ def _next_tap_text(data: ReportData) -> str:
     left, last = data.outlook.status.days_left, data.outlook.status.last_tap
     if left is None or last is None:
         return "now (never tapped)"
-    due = f"{last + timedelta(days=math.floor(data.machine.machine.tap_interval_days)):%Y-%m-%d}"
+    due = f"{last + timedelta(days=math.floor(data.machine.machine.interval_days)):%Y-%m-%d}"
     return f"now (overdue since {due})" if left < 0 else f"by {due}"
 
 

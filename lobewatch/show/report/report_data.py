@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from functools import cached_property
 
 import numpy as np
@@ -154,7 +154,7 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
     rows, entries = analysis.history.series(tool, direction), {entry.id: entry for entry in analysis.taps}
     if not rows:
         raise ValueError(f"{analysis.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
-    outlook = forecast_from_analysis(analysis, now or datetime.now(UTC))
+    outlook = forecast_from_analysis(analysis, now or analysis.now)
     newest = analysis.folder.read(entries[rows[-1].tap_id])
     first = analysis.folder.read(entries[rows[0].tap_id]) if len(rows) > 1 else None
     programs = [advise_program(analysis, verdict) for verdict in analysis.verdicts()]

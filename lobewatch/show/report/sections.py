@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import Channel, merge_remarks
+from acquisition import merge_remarks
 from dsm import format_with_error
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
@@ -37,6 +37,7 @@ from lobewatch.show.report.section import (
     SectionPart,
     TableCell,
 )
+from lobewatch.show.sensors import sensor_rows
 from lobewatch.show.terminal.status_labels import status_css_class, status_label
 from lobewatch.tool import DIRECTION_CODES
 from lobewatch.verdicts import Stability
@@ -363,7 +364,7 @@ def make_sign_off(data: ReportData) -> list[Section]:
         *(("condition", text) for text in condition_texts(data.last.conditions)),
         ("operator", circumstances.operator or "unknown"),
         ("device", circumstances.device or "unknown (file)"),
-        *map(_sensor_row, tap.hits[0].channels or () if tap.hits else ()),
+        *sensor_rows(tap.hits[0].channels or () if tap.hits else (), data.assembly.chain_checks),
         ("cutting coefficients", "machine.toml"),
         ("monitored failure", FAILURE_MODE),
         ("alarm", ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else f"needs {MIN_MONITORED_POINTS} clampings"),
@@ -378,13 +379,6 @@ def make_sign_off(data: ReportData) -> list[Section]:
 def _alarm_text(alarm: Alarm) -> str:
     word = alarm.acknowledgement or "not acknowledged"
     return f"{alarm.about}: {alarm.code} since {alarm.triggered_at.astimezone():%Y-%m-%d}, {word} ({alarm.id})"
-
-
-def _sensor_row(channel: Channel) -> tuple[str, str]:
-    name, unit = ("hammer", "N") if channel.quantity == "force" else ("accelerometer", "(m/s²)")
-    number = f"serial number {channel.serial_number or 'unknown'}"
-    calibrated = f"calibrated {channel.calibration_date}" if channel.calibration_date else "calibration unknown"
-    return name, f"{number}, {1e3 * channel.sensitivity:.4g} mV/{unit}, {calibrated}"
 
 
 SECTIONS: SectionMakers = (

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dsm import MATERIALS, Bearing, Joint, LumpedMass, Material, Segment, Spindle, Theory, mode_shapes
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, mode_shapes
 from dsm.modes.energy_shares import EnergyShares, energy_shares
 from dsm.modes.find_modes import find_modes
 
@@ -91,7 +91,7 @@ def stiffened(spindle: Spindle, kind: str, index: int, factor: float) -> Spindle
     segments, bearings, joints = list(spindle.segments), list(spindle.bearings), list(spindle.joints)
     if kind == "segment":
         stuff = segments[index].material or spindle.material
-        stiff = Material(factor * stuff.youngs_modulus, stuff.density, factor * stuff.shear_modulus)
+        stiff = replace(stuff, youngs_modulus=factor * stuff.youngs_modulus, shear_modulus=factor * stuff.shear_modulus)
         segments[index] = replace(segments[index], material=stiff)
     elif kind == "housing":
         bearings[index] = replace(bearings[index], housing_stiffness=factor * bearings[index].housing_stiffness)

@@ -71,6 +71,9 @@ def test_what_is_missing_of_a_cut_is_asked_for_in_one_message(shop: Shop, check:
         ),
         (("--speed", "9000", "--depth", "1", "--material", "42CrMo5"), ("42CrMo5", "'42CrMo4'")),
         (("--speed", "9000", "--depth", "0,5"), ("'--depth'", "0,5", "0.5")),
+        (("--speed", "9000", "--depth", "1,500"), ("'--depth'", "1,500", "1.5 or 1500")),
+        (("--speed", "18.000", "--depth", "1"), ("'--speed'", "18.000", "18 or 18000")),
+        (("--speed", "1.2.3", "--depth", "1"), ("'--speed'", "1.2.3")),
     ],
 )
 def test_bad_numbers_of_a_cut_are_rejected(

@@ -11,7 +11,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from typer import BadParameter
 
+from lobewatch.commands.shared_options import rpm
 from lobewatch.commands.verbosity import apply_verbosity
 from lobewatch.show.terminal.output import notes
 from lobewatch.step_times import STEP_TIMES, time_step
@@ -119,3 +121,18 @@ def test_progress_is_shown_on_a_terminal_only(
         with Terminal(tmp_path, *quiet, *(word.format(name) for word in words)) as person:
             person.end()
         assert (shown in person.text) is not bool(quiet)
+
+
+@pytest.mark.parametrize(
+    ("text", "speed"), [("9000", 9000), ("18'000", 18000), ("18 000", 18000), ("1,000", 1000), ("318.310", 318.31)]
+)
+def test_a_speed_may_have_separators_of_thousands(text: str, speed: float) -> None:
+    assert rpm(text) == speed
+
+
+@pytest.mark.parametrize(
+    ("text", "facts"), [("18,000", "18 or 18000"), ("18.000", "18 or 18000"), ("8000,5", "8000.5")]
+)
+def test_a_speed_of_two_values_is_rejected(text: str, facts: str) -> None:
+    with pytest.raises(BadParameter, match=f"'{text}'.*{facts}"):
+        rpm(text)

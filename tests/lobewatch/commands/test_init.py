@@ -43,7 +43,7 @@ def test_every_answer_is_an_option_and_is_in_the_file(run: Run) -> None:
     assert said.out.endswith("lobewatch tap mill-3\n")
     assert "/dev/ttyNOPE" in said.err
     known = tables()
-    assert known["machine"] == {"name": "Mill 3", "tap_interval_days": 30}
+    assert known["machine"] == {"name": "Mill 3"}
     assert known["speed"] == {"low_rpm": 1000, "high_rpm": 18000}
     assert known["drive"] == {"power_kw": 15, "torque_nm": 40}
     hammer, accelerometer = known["daq"].pop("channel")

@@ -68,7 +68,7 @@ def test_due_shows_those_to_be_tapped_alone(mills: Path) -> None:
     (mills / "good" / "machine.toml").write_text(
         (mills / "good" / "machine.toml")
         .read_text("utf-8")
-        .replace("tap_interval_days = 30", "tap_interval_days = 0.1"),
+        .replace("# tap_interval_days = 30", "tap_interval_days = 0.1"),
         "utf-8",
     )
     assert "good" in run(mills, "--due").stdout

@@ -120,6 +120,16 @@ def plant(shop: Shop, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
+def twin(shop: Shop, tmp_path: Path) -> Path:
+    """Make another machine with tap tests of its own, as copies of the good one would be named."""
+    other = type(shop)(tmp_path / "twin")
+    other.run(("A", 12900, 1.5))
+    other.tap_both(1.0)
+    other.tap_both(30.0, 0.999)
+    return Path(other.path)
+
+
+@pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
     """Run a command that must neither hang nor fail unexpectedly."""
 
@@ -147,14 +157,15 @@ def served(plant: Path) -> Any:
 
 
 def test_hostile_folders_cost_a_good_one_nothing(
-    plant: Path, said: Callable[..., tuple[int, str, str]], tmp_path: Path
+    plant: Path, twin: Path, said: Callable[..., tuple[int, str, str]], tmp_path: Path
 ) -> None:
     code, alone, _ = said("status", plant, "--json")
     assert code == 0
     said("export", plant, tmp_path / "alone.csv")
     on_page = served(plant)
+    said("status", twin)
     for name, make in HOSTILE.items():
-        make(Path(shutil.copytree(plant / "good", plant / name)))
+        make(Path(shutil.copytree(twin, plant / name)))
     code, among, _ = said("status", plant, "--json", "--prometheus", tmp_path / "all.prom")
     lights = {machine["key"]: machine["light"] for machine in json.loads(among)["machines"]}
     assert code == 1

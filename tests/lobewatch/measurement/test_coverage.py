@@ -104,6 +104,18 @@ def test_any_reason_keeps_a_program_doubtful(code: str) -> None:
     assert evaluate_program(PROGRAM, tool, machine()).stability is Stability.DOUBTFUL
 
 
+def test_a_result_that_a_check_must_confirm_keeps_a_program_doubtful() -> None:
+    remark = Remark("chain-not-checked", "", "a finding", "Do something")
+    tool = replace(assembled(), unchecked=(remark,))
+    verdict = evaluate_program(PROGRAM, tool, machine())
+    assert (verdict.stability, verdict.decisive_cause) == (Stability.DOUBTFUL, "unchecked")
+    assert remark in verdict.remarks
+    assert not tool.is_complete
+    assert find_stable_pockets(PROGRAM, tool, machine()) == []
+    answer = recommend(PROGRAM, tool, machine(), NO_TEST_CUTS)
+    assert (answer.setting, answer.remedies) == (None, (remark.cure,))
+
+
 @pytest.mark.parametrize(
     ("break_it", "is_used"),
     [

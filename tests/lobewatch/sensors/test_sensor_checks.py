@@ -29,6 +29,7 @@ from lobewatch.cli import main
 from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.journal.mass_checks import SensorChain
 from lobewatch.sensors.sensor_checks import list_sensors
 
 RATE = 25600.0
@@ -174,7 +175,7 @@ def test_a_hung_mass_whose_sensitivities_are_right(sensors: Sensors) -> None:
     assert "sens_V_per_EU" not in out
 
 
-def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors) -> None:
+def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors, folder: MachineFolder) -> None:
     """The wrong mass stands for a wrong sensitivity: F/(m a) cannot tell them apart, and the text says so."""
     code, out, err = sensors(hung_mass(1.1 * MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
     assert code == 0, err
@@ -184,15 +185,22 @@ def test_a_hung_mass_heavier_than_stated_shows_what_to_change(sensors: Sensors) 
     assert factor is not None
     assert float(factor[1]) == pytest.approx(1.1, abs=2e-3)
     assert "total moving mass" in out
+    (stored,) = folder.contents().mass_checks
+    assert not stored.passed
+    assert stored.ratio == pytest.approx(1.1, abs=2e-3)
 
 
-def test_json_of_a_hung_mass(sensors: Sensors) -> None:
+def test_json_of_a_hung_mass(sensors: Sensors, folder: MachineFolder) -> None:
     _, out, _ = sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", MASS, "--json")
     said = json.loads(out)
     assert said["ratio"] == pytest.approx(1, abs=4 * said["ratio_std"])
     assert said["hits"] == 10
     assert (said["agrees"], said["remarks"]) == (True, [])
     assert said["force_sensitivity_v_per_n"] == pytest.approx(2.25e-3, rel=2e-3)
+    (stored,) = folder.contents().mass_checks
+    assert (said["journal"], said["passed"]) == (stored.id, stored.passed) == ("m1", True)
+    assert (stored.mass_kg, stored.ratio, stored.ratio_std) == (MASS, said["ratio"], said["ratio_std"])
+    assert stored.chain == SensorChain("EMULATED", 2.25e-3, 1.02e-3, 5.0, 5.0)
 
 
 @pytest.mark.parametrize("skew", [0.5, -0.25])

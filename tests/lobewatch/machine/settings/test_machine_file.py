@@ -14,7 +14,7 @@ from acquisition import DataError
 from dsm import MATERIALS
 from lobewatch.machine.settings.cut_tables import UncertaintyTable
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine_file, read_machine_file
-from lobewatch.machine.settings.setting_questions import hash_programs
+from lobewatch.machine.settings.setting_questions import find_all_questions, hash_programs
 from lobewatch.verdicts.uncertainty import DEFAULT_TAP_SCATTER
 
 pytestmark = pytest.mark.quick
@@ -96,6 +96,37 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
         machine.model("end mill 13")
 
 
+def with_elastic_constants(lines: str) -> str:
+    """Return the example without its material, and with these lines in [spindle]."""
+    return EXAMPLE.replace("youngs_modulus_gpa = 210.0\n", lines)
+
+
+def test_an_orthotropic_shaft_has_a_poisson_ratio_of_its_own() -> None:
+    carbon = with_elastic_constants("youngs_modulus_gpa = 120\nshear_modulus_gpa = 5\naxial_poisson_ratio = 0.3\n")
+    machine = parse_machine_file(carbon)
+    material = machine.model("reference").material
+    assert (material.youngs_modulus, material.shear_modulus, material.poisson_ratio) == (120e9, 5e9, 0.3)
+    assert not [question for question in find_all_questions(machine) if question.location == "[spindle]"]
+    assert b"axial_poisson_ratio" not in msgspec.json.encode(parse_machine_file(EXAMPLE).spindle)
+    assert machine.settings_hash != parse_machine_file(carbon.replace("= 0.3\n", "= 0.2\n", 1)).settings_hash
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ("shear_modulus_gpa = 300\n", r"Poisson's ratio -0\.65.*theory"),
+        ("shear_modulus_gpa = 60\n", r"Poisson's ratio 0\.75.*axial_poisson_ratio"),
+        ("axial_poisson_ratio = -0.1\n", "spindle axial_poisson_ratio"),
+        ("axial_poisson_ratio = 0.6\n", "spindle axial_poisson_ratio"),
+    ],
+)
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_impossible_elastic_constants_are_rejected(lines: str, message: str, theory: str) -> None:
+    text = with_elastic_constants("youngs_modulus_gpa = 210\n" + lines)
+    with pytest.raises(DataError, match=message):
+        parse_machine_file(text.replace('theory = "euler-bernoulli"', f'theory = "{theory}"'))
+
+
 def test_measured_coefficients_next_to_a_material_count_and_leave_it_its_group() -> None:
     machine = parse_machine_file(EXAMPLE.replace("tangential_n_per_mm2", 'material = "C45"\ntangential_n_per_mm2'))
     known = machine.coefficients(machine.program[0])
@@ -123,6 +154,9 @@ def test_programs_belong_to_their_tool() -> None:
         ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: .*number > 0.0.* -3$"),
         ("length_mm = 26.5", 'length_mm = "26.5"', "spindle segment 1 length_mm: .*number.* text"),
         ("length_mm = 26.5", "length_mm = 26,5", r".*at line \d+.* 26\.5 "),
+        ("high_rpm = 24000", "high_rpm = 24,000", r".*at line \d+.* 24 or 24000 "),
+        ("high_rpm = 24000", "high_rpm = 24'000", r".*at line \d+.* 24000 "),
+        ("high_rpm = 24000", "high_rpm = 24 000", r".*at line \d+.* 24000 "),
         ("length_mm = 26.5", "length_mm = nan", "length_mm"),
         ("teeth = 4", "pitch_deg = [85, 95, 85, 96]\nteeth = 4", r"reference_cut: .*\[85, 95, 85, 96\].* 361"),
         ("teeth = 4", "pitch_deg = [120, 120, 120]\nteeth = 4", "3 angles for 4 "),
@@ -230,7 +264,7 @@ def test_a_file_that_is_no_text_is_rejected(tmp_path: Path) -> None:
 def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() -> None:
     machine = parse_machine_file(EXAMPLE)
     for old, new, same, same_words in (
-        ("tap_interval_days = 30", "tap_interval_days = 60", True, True),
+        ("# tap_interval_days = 30", "tap_interval_days = 60", True, True),
         ("depth_mm = 2.5", "depth_mm = 2.0", True, False),
         ("bearing_stiffness_n_per_um = 1280.0", "bearing_stiffness_n_per_um = 1000.0", False, True),
         ("band_hz = [1200, 2200]", "band_hz = [1200, 2300]", False, True),

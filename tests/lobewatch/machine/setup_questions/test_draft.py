@@ -31,3 +31,29 @@ def test_an_answer_changes_only_its_own_table() -> None:
     assert len({question.name for question in SETUP_QUESTIONS}) == len(SETUP_QUESTIONS) == 10
     with pytest.raises(ValueError, match=r"color.* name, speeds, drive"):
         find_setup_question("color")
+
+
+@pytest.mark.parametrize(
+    "answer", ["1,000 18,000", "1.000 18.000", "1'000, 18'000 rpm", "1\u202f000 18\u202f000", "1e3 18e3"]
+)
+def test_separated_thousands_of_speeds_are_thousands(answer: str) -> None:
+    table = find_setup_question("speeds").apply_answer(MachineDraft(TEMPLATE, {}), answer).table("speed")
+    assert (table["low_rpm"], table["high_rpm"]) == (1000, 18000)
+
+
+@pytest.mark.parametrize("answer", ["12,000 18", "1 000 18 000", "18 000", "1,000,18,000"])
+def test_speeds_of_two_values_or_another_count_are_rejected(answer: str) -> None:
+    with pytest.raises(ValueError, match=r"1|8"):
+        find_setup_question("speeds").apply_answer(MachineDraft(TEMPLATE, {}), answer)
+
+
+def test_each_answer_knows_its_plausible_range() -> None:
+    draft = MachineDraft(TEMPLATE, {})
+    draft = find_setup_question("tool").apply_answer(draft, "4 12.700 30 80,500")
+    draft = find_setup_question("material").apply_answer(draft, "1,400 500")
+    draft = find_setup_question("hammer").apply_answer(draft, "0 2.248 5")
+    draft = find_setup_question("program").apply_answer(draft, "slot: 8.000 2,125 12,7 0,125")
+    program = draft.table("program", 0)
+    assert (program["speed_rpm"], program["depth_mm"], program["feed_per_tooth_mm"]) == (8000, 2.125, 0.125)
+    assert (program["tool_diameter_mm"], program["tangential_n_per_mm2"]) == (12.7, 1400)
+    assert draft.table("daq.channel", 0)["sensitivity_mv_per_n"] == 2.248

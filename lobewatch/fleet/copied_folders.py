@@ -1,0 +1,64 @@
+"""Find copies of a machine folder: folders whose journals begin with the same tap test."""
+
+import io
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from acquisition import Remark
+from acquisition.file_io import open_regular_file
+from lobewatch.machine.folder_files import format_path
+from lobewatch.monitoring.status_rules import FOLDER_COPIED
+
+TAP_LINE_MARK = b'"kind": "tap"'
+"""Part of the journal line of a tap test."""
+MAX_LISTED_COPIES = 3
+"""Largest number of folders that a remark names."""
+
+
+def read_first_tap(folder: Path | str) -> tuple[str, str]:
+    """Read identity and SHA-256 of the first tap test in the journal of a folder; empty texts without one."""
+    try:
+        with io.BufferedReader(open_regular_file(f"{folder}/journal.jsonl")) as file:
+            line = next((line for line in file if TAP_LINE_MARK in line), b"{}")
+        entry = msgspec.json.decode(line, type=dict[str, object])
+    except (OSError, ValueError):
+        return "", ""
+    return str(entry.get("id", "")), str(entry.get("sha256", ""))
+
+
+def find_copies(machines: Mapping[str, Path]) -> dict[str, Remark]:
+    """Return a remark for each machine whose first tap test is also that of another one, by name.
+
+    A single machine is compared with the other folders next to it.
+    """
+    folders = {key: str(path) for key, path in machines.items()}
+    if len(machines) == 1:
+        (path,) = machines.values()
+        folders |= {name: f"{path.resolve().parent}/{name}" for name in _list_neighbors(path)}
+    by_first: dict[tuple[str, str], list[str]] = {}
+    for key, folder in folders.items():
+        by_first.setdefault(read_first_tap(folder), []).append(key)
+    by_first.pop(("", ""), None)
+    return {
+        key: _copy_remark([name for name in names if name != key])
+        for names in by_first.values()
+        for key in names
+        if len(names) > 1 and key in machines
+    }
+
+
+def _list_neighbors(path: Path) -> list[str]:
+    """List the other folders in the parent folder of a machine."""
+    try:
+        with os.scandir(path.resolve().parent) as entries:
+            return sorted(format_path(entry.name) for entry in entries if entry.name != path.resolve().name)
+    except OSError:
+        return []
+
+
+def _copy_remark(names: Sequence[str]) -> Remark:
+    more = [f"{len(names) - MAX_LISTED_COPIES} more"] if len(names) > MAX_LISTED_COPIES else []
+    return FOLDER_COPIED.remark("", folders=", ".join([*names[:MAX_LISTED_COPIES], *more]))

@@ -1,0 +1,125 @@
+"""Evidence for the sensors behind tap tests: known mass, model, tool geometry, another tool, printed sensitivities."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+from acquisition import CROSS_TAP, Remark
+from lobewatch.history.history import HistoryRow
+from lobewatch.machine import Machine, TapEntry
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
+from lobewatch.measurement.chain_check import ChainCheck, ChainEvidence, not_recorded_remark, unchecked_remark
+from lobewatch.measurement.sensor_models import fits_sensor_models
+from lobewatch.measurement.tap_measurement import Measurement
+from lobewatch.measurement.tool_compliance import find_tool_beam, has_plausible_size
+from lobewatch.tool import Assembly
+
+MAX_MODEL_STIFFNESS_RATIO = 1.2
+"""Ratio of K to that of the calibrated model, or the inverse, up to which both agree; chosen.
+
+An error by a factor of 3 then needs a model that is wrong by a factor of 2.5 the other way."""
+MAX_DRAWING_STIFFNESS_RATIO = 2.0
+"""Ratio of K to that of the calibrated model, or the inverse, above which they contradict each other; chosen.
+
+A real spindle is not twice as stiff as its drawing says. Only a known mass counts then."""
+MAX_OTHER_TOOL_AGE = timedelta(hours=24)
+"""Longest time between a tap test and that of another tool which is evidence for its chain; chosen."""
+
+
+class ChainChecks:
+    """Checks of the sensors behind the tap tests of a machine."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        rows: Sequence[HistoryRow],
+        entries: Mapping[str, TapEntry],
+        mass_checks: Sequence[MassCheckEntry],
+        path: Path | str,
+        measure: Callable[[str], Measurement],
+    ) -> None:
+        """Use these tap tests.
+
+        rows: history; entries: by identity; path: machine folder, for commands; measure: returns the measurement of a
+        tap test.
+        """
+        self._measure = measure
+        self._machine, self._entries, self._mass_checks, self._path = machine, entries, mass_checks, path
+        self._rows = {row.tap_id: row for row in rows if row.direction != CROSS_TAP}
+
+    def check(self, tap_id: str) -> ChainCheck:
+        """Return the check of one tap test; its mass check counts before all other evidence."""
+        entry = self._entries[tap_id]
+        if entry.chain is None:
+            return ChainCheck(tap_id, remark=not_recorded_remark(entry.tool), is_recorded=False)
+        decides = find_deciding_check(entry.chain, entry.created, self._mass_checks)
+        is_measured = decides is not None and decides.mass_kg is not None
+        if decides is not None and decides.passed and is_measured:
+            return ChainCheck(tap_id, ChainEvidence.MASS, decides.date)
+        other = None if is_measured else next(self._find_other_evidence(entry, entry.chain, decides), None)
+        if other is not None:
+            return other
+        counting = [check for check in self._mass_checks if check.mass_kg is not None and not check.excluded]
+        remark = unchecked_remark(entry.direction, self._path, decides if is_measured else None, counting)
+        return ChainCheck(tap_id, remark=remark)
+
+    def _find_other_evidence(
+        self, entry: TapEntry, chain: SensorChain, emulator: MassCheckEntry | None
+    ) -> Iterator[ChainCheck]:
+        """Yield all evidence but a mass, the strongest first; emulator: check that the emulated device brings."""
+        row = self._rows.get(entry.id)
+        own = None if row is None else self._agreement(row)
+        if own is not None:
+            yield ChainCheck(entry.id, own, entry.created)
+        for other in reversed(self._rows.values()):
+            is_near = abs(other.time - entry.created) <= MAX_OTHER_TOOL_AGE and other.tool != entry.tool
+            if is_near and self._entries[other.tap_id].chain == chain and self._agreement(other):
+                yield ChainCheck(entry.id, ChainEvidence.OTHER_TOOL, other.time)
+        ratio = math.nan if row is None else self._ratio_to_model(row)
+        if math.isfinite(ratio) and not _is_within(ratio, MAX_DRAWING_STIFFNESS_RATIO):
+            return
+        if fits_sensor_models(self._machine.daq, chain):
+            yield ChainCheck(entry.id, ChainEvidence.SENSOR_MODELS, entry.created)
+        if emulator is not None:
+            yield ChainCheck(entry.id, ChainEvidence.EMULATOR, emulator.date)
+
+    def _agreement(self, row: HistoryRow) -> ChainEvidence | None:
+        """Return the evidence of a tap test by itself: its spindle model, else the geometry of its tool."""
+        ratio = self._ratio_to_model(row)
+        if math.isfinite(ratio):
+            return ChainEvidence.MODEL if _is_within(ratio, MAX_MODEL_STIFFNESS_RATIO) else None
+        tool = None if row.questions or self._machine.tap.position_mm else find_tool_beam(self._machine, row.tool)
+        frf = None if tool is None else self._measure(row.tap_id).frf
+        if tool is None or frf is None:
+            return None
+        highest = frf.usable_band[1] if frf.usable_band else float(frf.frequency[-1])
+        is_plausible = has_plausible_size(self._measure(row.tap_id).at_tip, tool, highest)
+        return ChainEvidence.TOOL if is_plausible else None
+
+    def _ratio_to_model(self, row: HistoryRow) -> float:
+        """Return K of a tap test at the tip over that of its calibrated model; NaN if unknown or in question."""
+        if self._machine.tap.position_mm or row.questions or not row.stiffness.is_known:
+            return math.nan
+        return row.stiffness.value / row.modal_tip_stiffness
+
+    def attach(self, assembly: Assembly) -> Assembly:
+        """Return an assembly with the checks of its tap tests, and the remarks on those without evidence."""
+        used = [assembly.taps[direction] for direction in assembly.directions if direction in assembly.taps]
+        checks = tuple(map(self.check, used))
+        recorded = [check.remark for check in checks if check.remark is not None and check.is_recorded]
+        return replace(assembly, chain_checks=checks, unchecked=(*assembly.unchecked, *recorded))
+
+    def newest_remarks(self, rows: Sequence[HistoryRow]) -> Iterator[Remark]:
+        """Yield the remarks on the newest tap tests of each tool and direction that nothing has checked."""
+        newest = {(row.tool, row.direction): row for row in rows if row.direction != CROSS_TAP}
+        for row in newest.values():
+            check = self.check(row.tap_id)
+            if check.remark is not None and check.is_recorded and row.stiffness.is_known:
+                yield replace(check.remark, about=f"{row.tool}, {row.direction}")
+
+
+def _is_within(ratio: float, limit: float) -> bool:
+    """Tell whether a ratio and its inverse are up to a limit; NaN is not."""
+    return 1 / limit <= ratio <= limit

@@ -1,0 +1,88 @@
+"""Numbers as people type them: `1000`, `2.5`, `2,5`, `18'000`, `1,234.5`.
+
+A comma or a point before three digits may be a decimal sign or a separator of thousands. A plausible range and the
+other numbers of the same answer decide. If both readings remain, the number is rejected with both of them.
+"""
+
+import re
+from collections.abc import Sequence
+
+GROUP_SIGNS = "'\u2019\u00a0\u2009\u202f_"
+"""Signs that only separate thousands: apostrophes, narrow blanks, and the underscore of TOML and Python."""
+SEPARATED_NUMBER_PATTERN = rf"\d+(?:[.,{GROUP_SIGNS} ]\d+)*"
+"""Number with any signs between its digits."""
+NUMBER_TOKEN_PATTERN = re.compile(rf"\d+(?:[.,{GROUP_SIGNS}]\d+)*(?:[eE][+-]?\d+)?")
+"""Number with any signs between its digits, except for a blank, which ends it."""
+DECIMAL_SIGNS = (",.", ",", ".", "")
+"""Signs that may be decimal in one answer. The other ones separate thousands."""
+ValueLimits = tuple[float, float]
+"""Smallest and largest plausible value."""
+
+
+def read_number(text: str, decimal_signs: str) -> float | None:
+    """Read a number if these signs are decimal and all others separate thousands; None if it is no number then.
+
+    >>> read_number("18,000", ","), read_number("18,000", "."), read_number("1,23", ".")
+    (18.0, 18000.0, None)
+    """
+    separators = re.escape("".join(sign for sign in ",." if sign not in decimal_signs))
+    groups = rf"[1-9]\d{{0,2}}([{separators}{GROUP_SIGNS} ])\d{{3}}(?:\1\d{{3}})*"
+    fraction = rf"(?:[{re.escape(decimal_signs)}]\d+)?" if decimal_signs else ""
+    if not re.fullmatch(rf"[+-]?(?:{groups}|0|[1-9]\d*){fraction}(?:[eE][+-]?\d+)?", text):
+        return None
+    decimal = re.sub(f"[{re.escape(decimal_signs)}]", "#", text) if decimal_signs else text
+    return float(re.sub(r"[^\deE#+-]", "", decimal).replace("#", "."))
+
+
+def list_readings(text: str) -> list[float]:
+    """List the different values that a number may have, the decimal one first; empty if it is no number."""
+    values = (read_number(text.strip(), signs) for signs in DECIMAL_SIGNS)
+    return list(dict.fromkeys(value for value in values if value is not None))
+
+
+def read_numbers(texts: Sequence[str], limits: Sequence[ValueLimits | None] = ()) -> list[float]:
+    """Read the numbers of one answer, whose signs have one use.
+
+    Parameters
+    ----------
+    texts
+        Numbers as typed.
+    limits
+        Plausible range of each number, None for any; missing ones at the end are None.
+
+    Raises
+    ------
+    ValueError
+        For a text that is no number, and for one with two plausible values.
+    """
+    ranges = [*limits, *[None] * len(texts)]
+    answers = [[read_number(text, signs) for text in texts] for signs in DECIMAL_SIGNS]
+    complete = {tuple(value for value in values if value is not None) for values in answers if None not in values}
+    plausible = {values for values in complete if all(map(_is_within, values, ranges))}
+    if len(found := plausible or complete) == 1:
+        return list(found.pop())
+    for text in texts:
+        require_one_reading(text)
+    raise ValueError(f"the decimal signs of {' and '.join(texts)} differ. Write all numbers with a decimal point.")
+
+
+def require_one_reading(text: str) -> None:
+    """Raise ValueError for a text that is no number, or that may have two values."""
+    readings = list_readings(text)
+    if not readings:
+        raise ValueError(f"{text!r} is not a number. Write numbers as 18000 or 18.5.")
+    if len(readings) > 1:
+        raise ValueError(f"{text!r} may be {' or '.join(map(format_number, readings))}. Write one of these.")
+
+
+def _is_within(value: float, limits: ValueLimits | None) -> bool:
+    return limits is None or limits[0] <= value <= limits[1]
+
+
+def format_number(value: float) -> str:
+    """Format a number as it is typed.
+
+    >>> format_number(18000.0), format_number(2.5)
+    ('18000', '2.5')
+    """
+    return f"{value:.10g}"

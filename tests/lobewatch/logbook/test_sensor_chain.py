@@ -1,0 +1,334 @@
+"""Checks of the sensors behind tap tests: known mass, spindle model, another tool, printed sensitivities."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition import Channel, Circumstances, Hit, HitFlags, MassCalibration, Structure, TapDirection, new_tap_id
+from acquisition.source import DeviceIdentity
+from lobewatch.logbook import Logbook
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_updates import exclude_entry, store_mass_check
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
+from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
+from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
+from lobewatch.tap.tap_in_progress import average_hits
+from lobewatch.verdicts import Stability, Verdict
+from modal import Mode
+
+Shop = Any
+"""Machine fixture of tests/lobewatch/conftest.py."""
+RATE, SAMPLES, PRE_TRIGGER, WIDTH = 10240.0, 4096, 100, 6e-4
+FORCE, ACCELERATION = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
+SENSORS = FORCE, ACCELERATION
+DAQ = "board, serial number 1234, firmware 1.0"
+DAY = datetime(2026, 3, 2, 9, tzinfo=UTC)
+STIFFNESS = 3.5e7
+
+
+def entered(factor: float) -> tuple[Channel, Channel]:
+    """Return the sensors as entered, with the sensitivity of the accelerometer wrong by a factor."""
+    return FORCE, replace(ACCELERATION, sensitivity=factor * ACCELERATION.sensitivity)
+
+
+def strike(structure: Structure, peak: float, sensors: Sequence[Channel]) -> Hit:
+    """Return a hit as the true sensors give its codes, and as the entered sensors read them."""
+    time = (np.arange(SAMPLES) - PRE_TRIGGER) / RATE
+    force = peak * np.where((time >= 0) & (time <= WIDTH), np.sin(np.pi * time / WIDTH) ** 4, 0.0)
+    signals = force, peak * structure.response(time, WIDTH)
+    noise = np.random.default_rng(round(peak)).normal(scale=(0.05, 0.2), size=(SAMPLES, 2)).T
+    codes = [true.encode(signal + part) for true, signal, part in zip(SENSORS, signals, noise, strict=True)]
+    return Hit.from_codes(codes, tuple(sensors), RATE, PRE_TRIGGER)
+
+
+def tap(
+    shop: Shop,
+    direction: TapDirection,
+    days: float = 0.0,
+    sensors: Sequence[Channel] = SENSORS,
+    *,
+    device: str = DAQ,
+    tool: str = "plain",
+    frequency: float = 1713.0,
+) -> str:
+    """Store a live tap test so many days after the first, and return its id."""
+    about = Circumstances("m", DAY + timedelta(days=days), tool, direction, device=device)
+    structure = Structure(np.array([frequency]), np.array([0.03]), np.array([STIFFNESS]))
+    hits = [strike(structure, peak, sensors) for peak in (150.0, 200.0, 250.0)]
+    test = average_hits(new_tap_id(about), about, hits, [HitFlags.OK] * 3)
+    MachineFolder(shop.path).commit(test)
+    return test.id
+
+
+def tap_both(shop: Shop, days: float = 0.0, sensors: Sequence[Channel] = SENSORS, **options: Any) -> None:
+    tap(shop, "x", days, sensors, **options)
+    tap(shop, "y", days + 0.01, sensors, frequency=1690.0, **options)
+
+
+def hit_mass(shop: Shop, days: float, sensors: Sequence[Channel] = SENSORS, *, ratio: float = 1.0, **of: str) -> Any:
+    """Store the result of a mass check with a ratio F/(m a)."""
+    result = MassCalibration(ratio, 0.001, 0.1, False, 0.001, (50.0, 3000.0), 1.2, 10, tuple(sensors))
+    identity = DeviceIdentity(of.get("model", "board"), of.get("serial", "1234"))
+
+    class Connected:
+        channels = tuple(sensors)
+
+    device: Any = Connected()
+    device.identity = identity
+    return store_mass_result(shop.folder, device, result, "Kim", DAY + timedelta(days=days))
+
+
+def verdict(shop: Shop) -> Verdict:
+    (found,) = Logbook.open(shop.path).verdicts(names=["A"])
+    return found
+
+
+def evidence(shop: Shop) -> list[str | None]:
+    """Return the evidence of the tap tests behind the verdict, which is stable only with evidence for all."""
+    found = verdict(shop)
+    checks = found.assembly.chain_checks if found.assembly else ()
+    is_checked = all(check.evidence for check in checks)
+    assert found.stability is (Stability.STABLE if is_checked else Stability.DOUBTFUL)
+    assert (found.decisive_cause == "unchecked") is not is_checked
+    assert ("chain-not-checked" in [remark.code for remark in found.remarks]) is not is_checked
+    return [check.evidence for check in checks]
+
+
+@pytest.fixture
+def plain(shop: Shop) -> Shop:
+    """Return a machine with a program for a tool that has no drawing."""
+    shop.run(("A", 12900, 0.05), tool="plain")
+    return shop
+
+
+def test_a_mass_check_makes_stable_what_is_doubtful_without(plain: Shop) -> None:
+    tap_both(plain)
+    assert evidence(plain) == [None, None]
+    status = Logbook.open(plain.path).status(DAY)
+    assert ("chain-not-checked", "plain, x") in [(reason.code, reason.about) for reason in status.reasons]
+    assert status.status == "warn"
+    assert hit_mass(plain, 1.0).passed
+    assert evidence(plain) == ["mass-check"] * 2
+    found = verdict(plain).assembly
+    assert found is not None
+    assert [check.date for check in found.chain_checks] == [DAY + timedelta(days=1)] * 2
+    assert Logbook.open(plain.path).status(DAY).status == "good"
+
+
+@pytest.mark.parametrize("factor", [3.0, 1 / 3])
+def test_a_sensitivity_that_is_wrong_from_the_first_test_on_is_never_stable(plain: Shop, factor: float) -> None:
+    wrong = entered(factor)
+    tap_both(plain, sensors=wrong)
+    found = verdict(plain).assembly
+    assert found is not None
+    assert found.x is not None
+    assert found.x[0].stiffness == pytest.approx(factor * STIFFNESS, rel=0.02)
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, -1.0)
+    assert evidence(plain) == [None, None]
+    assert not hit_mass(plain, 1.0, wrong, ratio=factor).passed
+    assert evidence(plain) == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("sensors", "device"),
+    [
+        (entered(1.01), DAQ),
+        ((replace(FORCE, sensitivity=2.3e-3), ACCELERATION), DAQ),
+        ((FORCE, replace(ACCELERATION, full_scale=5.4)), DAQ),
+        (SENSORS, "board, serial number 1235, firmware 1.0"),
+    ],
+)
+def test_a_change_of_the_chain_ends_the_check(plain: Shop, sensors: Sequence[Channel], device: str) -> None:
+    hit_mass(plain, -1.0)
+    tap_both(plain)
+    assert evidence(plain) == ["mass-check"] * 2
+    tap(plain, "x", 1.0, sensors, device=device)
+    assert sorted(map(str, evidence(plain))) == ["None", "mass-check"]
+    (remark,) = verdict(plain).assembly.unchecked  # type: ignore[union-attr]
+    assert remark.about == "direction x"
+
+
+def test_a_check_that_fails_marks_the_tests_since_the_last_good_one(plain: Shop) -> None:
+    tap_both(plain)
+    hit_mass(plain, 1.0)
+    tap_both(plain, 2.0)
+    assert evidence(plain) == ["mass-check"] * 2
+    failed = hit_mass(plain, 3.0, ratio=1.49)
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, 4.0)
+    assert evidence(plain) == [None, None]
+    logbook = Logbook.open(plain.path)
+    checks = [logbook.chain_check(entry.id).evidence for entry in logbook.taps]
+    assert checks == ["mass-check", "mass-check", None, None]
+    exclude_entry(plain.folder, failed.id, "the mass was wrong")
+    assert evidence(plain) == ["mass-check"] * 2
+    tap_both(plain, 5.0)
+    assert evidence(plain) == ["mass-check"] * 2
+
+
+def test_a_result_that_is_no_measure_of_the_sensitivities_is_not_stored(plain: Shop) -> None:
+    result = MassCalibration(1.0, 0.2, 0.1, False, 0.001, (50.0, 3000.0), 1.2, 10, SENSORS)
+    device: Any = type("Connected", (), {"channels": SENSORS, "identity": DeviceIdentity("board", "1234")})()
+    assert store_mass_result(plain.folder, device, result) is None
+    assert store_mass_result(plain.folder, device, replace(result, ratio_std=0.01, phase=20.0)) is None
+    assert plain.folder.contents().mass_checks == ()
+
+
+def test_older_and_replayed_tests_keep_their_verdict_with_a_remark(plain: Shop) -> None:
+    tap_both(plain, device="replay of hits.h5")
+    found = verdict(plain)
+    assert found.stability is Stability.STABLE
+    assert [remark.code for remark in found.remarks].count("chain-not-checked") == 1
+    assert "chain" not in plain.path.joinpath("journal.jsonl").read_text("utf-8")
+
+
+def test_the_journal_keeps_check_and_chain(plain: Shop) -> None:
+    stored, tap_id = hit_mass(plain, -1.0, ratio=1.02), tap(plain, "x")
+    lines = [json.loads(line) for line in plain.path.joinpath("journal.jsonl").read_bytes().splitlines()]
+    chain = {"daq": "1234", "force_v_per_n": 2.25e-3, "acceleration_v_per_m_s2": 1.02e-3}
+    assert [line["kind"] for line in lines] == ["mass-check", "tap"]
+    assert all(line["chain"].items() >= chain.items() for line in lines)
+    assert {name: lines[0][name] for name in ("id", "mass_kg", "ratio", "passed", "operator")} == {
+        "id": "m1",
+        "mass_kg": 1.2,
+        "ratio": 1.02,
+        "passed": True,
+        "operator": "Kim",
+    }
+    contents = plain.folder.contents()
+    assert contents.mass_checks == (stored,)
+    assert [(entry.id, entry.chain) for entry in contents.taps] == [(tap_id, stored.chain)]
+
+
+def fit_model(shop: Shop, share: float) -> None:
+    """Give the program to the drawn tool, whose model has the stiffness of the tap tests times a share."""
+    shop.run(("A", 12900, 0.05))
+    tap_both(shop, sensors=entered(share), tool="reference")
+
+
+@pytest.mark.parametrize(("share", "found"), [(1.0, "model"), (1.3, None), (3.0, None), (1 / 3, None)])
+def test_a_stiffness_that_agrees_with_the_model_serves_instead_of_a_mass(
+    shop: Shop, share: float, found: str | None
+) -> None:
+    fit_model(shop, share)
+    assert evidence(shop) == [found, found]
+
+
+@pytest.mark.parametrize(("share", "found"), [(1.0, "other-tool"), (3.0, None), (1 / 3, None)])
+def test_another_tool_that_agrees_with_its_drawing_on_the_same_day_serves_instead(
+    plain: Shop, share: float, found: str | None
+) -> None:
+    sensors = entered(share)
+    tap_both(plain, sensors=sensors)
+    tap(plain, "x", 3.0, sensors, tool="reference")
+    assert evidence(plain) == [None, None]
+    tap(plain, "x", 0.3, sensors, tool="reference")
+    assert evidence(plain) == [found, found]
+
+
+@given(share=st.floats(0.8, 1.0), length=st.floats(0.04, 0.15), is_soft=st.booleans())
+def test_the_geometry_of_a_tool_excludes_a_factor_of_3_in_every_plausible_spindle(
+    share: float, length: float, is_soft: bool
+) -> None:
+    tool = ToolBeam(0.016, length, length, "carbide")
+    true = tool.compliance * share + (SUPPORT_COMPLIANCE if is_soft else 0.0)
+
+    def is_plausible(compliance: float, highest: float = 2e4) -> bool:
+        return has_plausible_size([Mode(900.0, 0.02, 1 / compliance)], tool, highest)
+
+    assert not is_plausible(3.001 * true)
+    assert not is_plausible(true / 3.75)
+    assert is_plausible(1.5 * tool.compliance) or tool.compliance < SUPPORT_COMPLIANCE / 3.5
+    assert not is_plausible(1.5 * tool.compliance, 0.99 * tool.frequency)
+
+
+def test_a_tip_that_is_as_compliant_as_its_tool_serves_instead(plain: Shop) -> None:
+    described = '[[tool]]\nname = "plain"\ndiameter_mm = 50\ntool_material = "carbide"\nstick_out_mm = {}\n\n'
+    text = plain.path.joinpath("machine.toml").read_text("utf-8")
+    tap_both(plain)
+    found = []
+    for length in (163, 130, 220):  # the tip is 1.4, 2.8 and 0.6 times as compliant as the tool alone
+        marked = text.replace("[[program]]", described.format(length) + "[[program]]", 1)
+        plain.path.joinpath("machine.toml").write_text(marked, "utf-8")
+        found.append([check.evidence for check in verdict(plain).assembly.chain_checks])  # type: ignore[union-attr]
+    assert found == [["tool-geometry"] * 2, [None] * 2, [None] * 2]
+
+
+CHANNELS = """
+[[daq.channel]]
+input = 0
+quantity = "force"
+model = "086C03"
+sensitivity_mv_per_n = 2.25
+range_v = 5
+gain = {gain}
+[[daq.channel]]
+input = 1
+quantity = "acceleration"
+model = "{model}"
+sensitivity_mv_per_g = {sensitivity}
+range_v = 5
+"""
+
+
+@pytest.mark.parametrize(
+    ("model", "sensitivity", "gain", "found"),
+    [
+        ("352A21", 10.4, 1, "sensor-models"),
+        ("352A21", 30.0, 1, None),
+        ("352A21", 3.3, 1, None),
+        ("352A21", 12.0, 1, None),
+        ("352C33", 10.4, 1, None),
+        ("352A21", 10.4, 10, None),
+        ("", 10.4, 1, None),
+    ],
+)
+def test_sensitivities_of_the_sensor_models_serve_instead(
+    plain: Shop, model: str, sensitivity: float, gain: int, found: str | None
+) -> None:
+    plain.edit("[daq]", '[daq]\ndriver = "dataq"')
+    with (plain.path / "machine.toml").open("a", encoding="utf-8") as file:
+        file.write(CHANNELS.format(model=model, sensitivity=sensitivity, gain=gain))
+    tap_both(plain, sensors=[table.build().channel for table in plain.folder.machine.daq.channel])
+    assert evidence(plain) == [found, found]
+
+
+@pytest.mark.parametrize(("share", "found"), [(1.3, "emulator"), (3.0, None), (1 / 3, None)])
+def test_the_check_of_an_emulator_counts_unless_the_model_contradicts(
+    shop: Shop, share: float, found: str | None
+) -> None:
+    with_error = entered(share)
+    shop.run(("A", 12900, 0.05))
+    tap_both(shop, sensors=with_error, tool="reference", device="emulator, serial number EMULATED")
+    assert evidence(shop) == [None, None]
+    store_emulator_check(shop.folder, with_error)
+    store_emulator_check(shop.folder, with_error)
+    assert len(shop.folder.contents().mass_checks) == 1
+    assert evidence(shop) == [found, found]
+
+
+def test_the_sensitivity_of_an_emulator_that_is_changed_afterwards_is_not_checked(plain: Shop) -> None:
+    store_emulator_check(plain.folder, SENSORS)
+    tap_both(plain, device="emulator, serial number EMULATED")
+    assert evidence(plain) == ["emulator"] * 2
+    tap_both(plain, 1.0, entered(1.05), device="emulator, serial number EMULATED")
+    assert evidence(plain) == [None, None]
+
+
+def test_a_stored_verdict_follows_the_check(plain: Shop) -> None:
+    tap_both(plain)
+    newest = Logbook.open(plain.path).taps[-1].id
+    assert Logbook.open(plain.path).stored_verdicts(newest)["A"].stability is Stability.DOUBTFUL
+    chain = SensorChain("1234", 2.25e-3, 1.02e-3, 5.0, 5.0)
+    store_mass_check(plain.folder, MassCheckEntry("", DAY, 1.2, 1.0, 0.001, True, chain))
+    assert Logbook.open(plain.path).stored_verdicts(newest)["A"].stability is Stability.STABLE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
@@ -77,7 +78,7 @@ class Frf:
         f = self.frequency
         if f.ndim != 1 or f.size < 2:
             raise ValueError(f"frequency must be a 1-D array of at least 2 lines (Hz), not of shape {f.shape}")
-        if not np.all(np.isfinite(f)) or f[0] < 0 or not np.all(np.diff(f) > 0):
+        if not (f[0] >= 0 and f[-1] < math.inf and np.all(f[1:] > f[:-1])):
             raise ValueError("frequency must be finite, at least 0 Hz and strictly increasing")
         if self.measured_as not in get_args(FrfQuantity):
             raise ValueError(f"measured_as={self.measured_as!r} is not one of {', '.join(get_args(FrfQuantity))}")
@@ -95,7 +96,7 @@ class Frf:
             return
         if self.coherence.shape != self.frequency.shape:
             raise ValueError(f"coherence {self.coherence.shape} and frequency {self.frequency.shape} differ in shape")
-        if not np.all((self.coherence >= 0) & (self.coherence <= 1 + 1e-9)):
+        if not 0 <= self.coherence.min() <= self.coherence.max() <= 1 + 1e-9:
             raise ValueError("coherence must be between 0 and 1")
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -65,7 +66,7 @@ class Hit:
         for name in ("force", "acceleration"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, values)
-            if not -MAX_SI_VALUE <= np.min(values, initial=0.0) <= np.max(values, initial=0.0) <= MAX_SI_VALUE:
+            if not -MAX_SI_VALUE <= values.min(initial=0.0) <= values.max(initial=0.0) <= MAX_SI_VALUE:
                 bad = np.flatnonzero(~(np.abs(values) <= MAX_SI_VALUE))
                 flaw = describe_invalid_value(values[bad[0]])
                 raise ValueError(f"{name} is {flaw} at {bad.size} of {values.size} samples, first at sample {bad[0]}")
@@ -73,7 +74,7 @@ class Hit:
         if not same or self.acceleration.ndim != 1 or self.acceleration.size < MIN_SAMPLES:
             shapes = f"force {self.force.shape} and acceleration {self.acceleration.shape}"
             raise ValueError(f"{shapes} must be 1-D records of equal length, at least {MIN_SAMPLES} samples")
-        if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
+        if not 0 < self.sample_rate < math.inf:
             raise ValueError(f"sample_rate={self.sample_rate} Hz is not above 0")
 
     @classmethod

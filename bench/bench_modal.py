@@ -1,7 +1,7 @@
 """Speed and errors of modal extraction compared with sdypy-EMA, in one process with one BLAS thread each.
 
     python -m pip install -e .[bench]      (in an environment of its own)
-    python bench/bench_modal.py [FOLDER]
+    python bench/bench_modal.py [FOLDER | FILES]
 
 One accelerance of 8193 lines (that at 0 Hz is left out) with five modes and noise. Ours: `fit_modes`, which finds,
 selects and fits the modes and gives their standard errors. Theirs: get_poles at order 60, select_closest_poles at the
@@ -9,6 +9,9 @@ true frequencies, get_constants.
 
 FOLDER holds measured FRFs, as SignalCalc writes them (MAT files with H1_2, H1_3, ... in g/N): some of its files are
 timed the same way, theirs told the frequencies that ours found; then five of the FRFs with common poles.
+
+FILES are FRFs of the points of one structure as text (Hz, real and imaginary part in m/N): their fit with common poles
+is timed compared with that of sdypy-EMA.
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from race import Race
+from race import Race, run
 from sdypy import EMA
 from signalcalc import measured_frfs
 from threadpoolctl import threadpool_limits
@@ -107,6 +110,17 @@ def time_measured(folder: Path) -> None:
     print(f"{f'lobewatch fit_points, {POINTS} FRFs':32}{together:10.3f}")
 
 
+def time_points(files: Sequence[str]) -> None:
+    """Time the common poles of text FRFs compared with sdypy-EMA."""
+    tables = [np.loadtxt(file) for file in files]
+    frfs = [Frf(table[1:, 0], table[1:, 1] + 1j * table[1:, 2]) for table in tables]
+    seen = [mode.frequency for mode in fit_common_modes(frfs)]
+    size = f"{len(files)} FRFs with common poles, {frfs[0].frequency.size} lines, {len(seen)} modes"
+    result = run(Race(size, lambda: fit_common_modes(frfs), "sdypy-EMA", lambda: theirs(frfs, seen)))
+    ratio = f"{1 / result.times:.2g} ({1 / result.most:.2g} to {1 / result.least:.2g})"
+    print(f"{size}: {result.ours_s:.3f} s CPU, {ratio} times that of {result.peer}")
+
+
 def five_points() -> list[Frf]:
     """Return FRFs of one structure at five points."""
     frfs = []
@@ -170,5 +184,7 @@ def main() -> None:
 if __name__ == "__main__":
     with threadpool_limits(limits=1):
         main()
-        for folder in sys.argv[1:2]:
-            time_measured(Path(folder))
+        if Path(*sys.argv[1:2]).is_dir() and len(sys.argv) > 1:
+            time_measured(Path(sys.argv[1]))
+        elif len(sys.argv) > 1:
+            time_points(sys.argv[1:])

@@ -5,7 +5,8 @@ bench_replay.py replay [FILES]      1000 recorded FRFs of 4097 lines as text, re
 bench_replay.py archive FOLDER [N]  makes a folder of 10 000 small tap tests, 500 at a time
 bench_replay.py open FOLDER         what a folder costs when it is opened, added to, checked, shown
 bench_replay.py tap                 size and CPU time of one tap test of ten hits of 2 x 16384 samples
-bench_replay.py hits                CPU of H1 and verdicts of ten new hits, over that of their bare rffts
+bench_replay.py hits                CPU of H1 and verdicts of ten new hits, over that of their bare rffts, and of parts
+                                    of a measurement over that of all of it
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from itertools import pairwise
@@ -52,14 +54,16 @@ from acquisition import (
     read_tap,
     write_tap,
 )
+from acquisition.hit_quality.double_hit import find_force_hole
+from acquisition.hits.force_window import window_force
 from lobewatch import Logbook
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.machine import TapEntry
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.settings.machine_file import parse_machine_file
-from lobewatch.measurement.tap_measurement import fit_tap
-from modal import Mode, synthesize_frf
+from lobewatch.measurement.tap_measurement import fit_tap, measure
+from modal import Mode, find_hit_changes, find_unexplained_peaks, synthesize_frf
 
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
 SHORT = np.linspace(1202.0, 2198.0, 250)
@@ -301,10 +305,41 @@ def ten_hits() -> None:
 def new_hits() -> None:
     """State CPU ratios to the peer, both measured in turns."""
     with threadpool_limits(1):
-        for race in races_of_new_hits():
+        for race in (*races_of_new_hits(), *races_of_parts()):
             result = run(race)
-            span = f"({1 / result.most:.1f} to {1 / result.least:.1f})"
-            print(f"{race.question}: {1 / result.times:.1f} {span} times the CPU of {race.peer}", flush=True)
+            span = f"({1 / result.most:.2g} to {1 / result.least:.2g})"
+            print(f"{race.question}: {1 / result.times:.2g} {span} times the CPU of {race.peer}", flush=True)
+
+
+def races_of_parts() -> Iterator[Race]:
+    """Compare parts of a measurement with all of it, and the search for a hole in the force with a transform."""
+    machine, about = parse_machine_file('[machine]\nname = "m"\n'), Circumstances("m", BEGIN, "reference")
+    tap, hits = TapTest(new_tap_id(about), about, frf(3, 10, LONG)), hammered_hits()
+    mean, flags = average_good_hits(hits)
+    found = measure(tap, machine)
+
+    def renew() -> tuple[Hit, ...]:
+        return tuple(replace(hit) for hit in hits)
+
+    yield Race(
+        "search for unexplained peaks",
+        lambda: find_unexplained_peaks(found.frf, found.used) if found.frf else (),
+        f"the measurement of an FRF, {LONG.size} lines",
+        lambda: measure(tap, machine),
+    )
+    yield Race(
+        "changes over hits",
+        lambda: find_hit_changes(renew()),
+        "the measurement of ten new hits of 16384 samples",
+        lambda: measure(replace(tap, frf=mean, hits=renew(), flags=flags), machine),
+    )
+    part = window_force(replace(hits[0], force=hits[0].force + 0.95 * np.roll(hits[0].force, 9000)))
+    yield Race(
+        "hole of two nearly equal touches, 9000 samples apart",
+        lambda: find_force_hole(part, 51200.0, np.inf),
+        "the rfft of 16384 samples",
+        lambda: np.fft.rfft(hits[0].force),
+    )
 
 
 def main() -> None:

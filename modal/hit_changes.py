@@ -17,6 +17,7 @@ from modal.bands.find_resonances import Resonance, find_resonances
 from modal.bands.frf_lines import usable_lines
 from modal.fit_modes import decay_spectra
 from modal.frequency_series import HitChangeKind, find_frequency_change
+from modal.hit_scatter import hit_peaks
 
 MIN_HITS_FOR_CHANGES = 4
 """Fewest hits in which changes are searched: two states of two hits each, or a line with two more hits than values."""
@@ -151,7 +152,7 @@ _spectra: WeakKeyDictionary[Hit, _HitSpectrum] = WeakKeyDictionary()
 
 def _compute_spectrum(hit: Hit) -> _HitSpectrum:
     if hit.has_force:
-        frf, force = estimate_frf([hit]), float(np.max(hit.force) - np.median(hit.force))
+        frf, force = estimate_frf([hit]), float(hit_peaks([hit])[0])
     else:
         decay = extract_free_decay(hit)
         (frf,), force = decay_spectra(np.pad(decay, (0, hit.acceleration.size - decay.size)), hit.sample_rate), np.nan
@@ -279,11 +280,19 @@ def _solve(columns: Complexes, target: Complexes) -> tuple[Complexes, Floats, Fl
     normal = np.swapaxes(columns.conj(), 1, 2) @ columns
     scale = np.sqrt(np.einsum("kii->ki", normal).real)
     scale[scale == 0] = 1.0
-    inverse = np.linalg.pinv(normal / (scale[:, :, np.newaxis] * scale[:, np.newaxis]), hermitian=True)
+    inverse = _invert(normal / (scale[:, :, np.newaxis] * scale[:, np.newaxis]))
     right = np.einsum("kli,kl->ki", columns.conj(), target) / scale
     values = np.einsum("kij,kj->ki", inverse, right) / scale
     residual = target - np.einsum("kli,ki->kl", columns, values)
     return values, np.sum(np.abs(residual) ** 2, axis=1), inverse[:, -1, -1].real / scale[:, -1] ** 2
+
+
+def _invert(normal: Complexes) -> Complexes:
+    """Return the inverses of matrices, and their pseudo-inverses, which take ten times as long, if one is singular."""
+    try:
+        return np.asarray(np.linalg.inv(normal))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(normal, hermitian=True))
 
 
 def _cut_window(spectra: Sequence[_HitSpectrum], mode: _HitMode, neighbours: Sequence[float]) -> _Window:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from acquisition import Frf, Hit, remove_sensor_mass
+from acquisition.arrays import find_median
 from acquisition.estimation.estimate_frf import compute_cross_spectra, propagate_force_noise_through
 from modal.arrays import Complexes, Floats
 from modal.bands.dense_bands import MAX_HIDDEN_MODE_ERROR
@@ -121,7 +122,7 @@ def hit_peaks(hits: Sequence[Hit]) -> Floats:
 
 @lru_cache(maxsize=64)
 def _hit_peak(hit: Hit) -> float:
-    return float(np.max(hit.force) - np.median(hit.force))
+    return float(np.max(hit.force)) - find_median(hit.force)
 
 
 def single_hit_factors(power: Floats) -> Floats:

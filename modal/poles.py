@@ -139,8 +139,12 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
     middle, half = (lowest + highest) / 2, (highest - lowest) / 2
     x = (model.frequency - middle) / half
     below = orthogonal_basis(np.tile(x, p), (model.weight * model.receptance).ravel(), orders)
-    above = [orthogonal_basis(x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in model.weight]
-    overlap = [b.values.conj().T @ part for b, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)]
+    shared = model.weight[:1] if np.all(model.weight == model.weight[0]) else model.weight
+    above = [orthogonal_basis(x, w.astype(complex), orders + EXTRA_POLYNOMIAL_DEGREE) for w in shared]
+    overlap = [
+        b.values.conj().T @ part
+        for b, part in zip(above * (p // len(above)), below.values.reshape(p, n, orders + 1), strict=True)
+    ]
     for order in range(1, orders + 1):
         parts = (full[: order + EXTRA_POLYNOMIAL_DEGREE + 1, : order + 1] for full in overlap)
         left = np.eye(order + 1) - sum(part.conj().T @ part for part in parts)
@@ -152,13 +156,16 @@ def _poles_by_order(model: _LscfModel, orders: int) -> Iterator[_OrderPoles]:
 def _flexibilities(model: _LscfModel, above: list[OrthogonalBasis], poles: Complexes) -> Complexes:
     """Return the complex 1/K of every pole by linear least squares, shape (k, p)."""
     fractions = 1 / (model.frequency[:, None] - poles)
-    residues = np.empty((poles.size, len(above)), dtype=np.complex128)
-    for i, basis in enumerate(above):
+    values = model.weight * model.receptance
+    residues = np.empty((poles.size, len(values)), dtype=np.complex128)
+    for i, basis in enumerate(above):  # one for each FRF, or one for all
+        alike = slice(i, i + 1) if len(above) > 1 else slice(None)
         columns = np.hstack([model.weight[i][:, None] * fractions, basis.values[:, : EXTRA_POLYNOMIAL_DEGREE + 1]])
-        columns /= np.linalg.norm(columns, axis=0)
+        size = np.linalg.norm(columns, axis=0)
+        columns /= size
         gram = columns.conj().T @ columns + LSCF_RIDGE * np.eye(columns.shape[1])
-        fit = np.linalg.solve(gram, columns.conj().T @ (model.weight[i] * model.receptance[i]))[: poles.size]
-        residues[:, i] = fit / np.linalg.norm(model.weight[i][:, None] * fractions, axis=0)
+        fit = np.linalg.solve(gram, columns.conj().T @ values[alike].T)[: poles.size]
+        residues[:, alike] = fit / size[: poles.size, None]
     return np.asarray(residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None])
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import scipy
 
-from acquisition.arrays import Floats, find_median
+from acquisition.arrays import Complexes, Floats, find_median
 from acquisition.hits.force_window import WindowedForce
 from acquisition.hits.touches import Touch
 
@@ -15,6 +15,10 @@ MIN_LOBE_POWER = 0.1
 """Power over the largest behind a hole; the lobes of no single pulse are as high (0.047 for a rectangle)."""
 HOLE_RESOLUTION = 32
 """Number of lines from hole to hole, so that one of them is 26 dB down."""
+FAR_LENGTHS = 16
+"""Delay over the length of a touch from which the spectra of each are smooth over the holes of both (chosen)."""
+FAR_HOLE_LINES = 8 * HOLE_RESOLUTION
+"""Number of lines that are searched together for a hole of far touches (chosen)."""
 
 
 def find_highest_touch(part: WindowedForce) -> Touch | None:
@@ -29,8 +33,20 @@ def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> floa
     Two equal touches with the time T between them cancel at 1/(2 T). A hole is 20 dB below the largest power, between
     lines less than 10 dB below it, which no single pulse has.
     """
-    if not _may_cancel(part):
+    gaps = np.flatnonzero(np.diff(part.samples) > 1) + 1
+    parts, starts = np.split(part.force, gaps), part.samples[[0, *gaps]]
+    size = scipy.fft.next_fast_len(HOLE_RESOLUTION * max(map(len, parts)), real=True)
+    spectra = np.array([np.fft.rfft(force, size) for force in parts])
+    if len(parts) > 1 and not _may_cancel(np.abs(spectra)):
         return None
+    delay = int(starts[-1] - starts[0])
+    is_far = len(parts) == 2 and delay > FAR_LENGTHS * max(map(len, parts))
+    hole = _find_far_hole(spectra, size, delay) if is_far else _find_near_hole(part)
+    return None if hole is None or hole * sample_rate >= end else hole * sample_rate
+
+
+def _find_near_hole(part: WindowedForce) -> float | None:
+    """Return the first hole over the sample rate, from the spectrum of all touches."""
     delays = part.samples - part.samples[0]
     size = scipy.fft.next_fast_len(HOLE_RESOLUTION * (int(delays[-1]) + 1), real=True)
     force = np.zeros(size)
@@ -39,24 +55,47 @@ def find_force_hole(part: WindowedForce, sample_rate: float, end: float) -> floa
     power = spectrum.real**2 + spectrum.imag**2
     largest = float(np.max(power))
     high = np.flatnonzero(power > MIN_LOBE_POWER * largest)
-    deep = high[0] + np.flatnonzero(power[high[0] : high[-1]] < HOLE_POWER * largest)
+    line = _first_minimum(power[high[0] : high[-1]], HOLE_POWER * largest)
+    return None if line is None else float(high[0] + line) / size
+
+
+def _find_far_hole(spectra: Complexes, size: int, delay: int) -> float | None:
+    """Return the first hole over the sample rate, of two touches with this delay (samples) and the spectra of each.
+
+    The spectra of each are smooth over many holes. Both touches add up or cancel within each, so that their sizes tell
+    the largest power and where holes begin. Only the lines from there on are computed.
+    """
+    sizes = np.abs(spectra)
+    most = np.sum(sizes, axis=0)
+    limit = HOLE_POWER * np.max(most) ** 2
+    high = np.flatnonzero(most**2 > MIN_LOBE_POWER * np.max(most) ** 2)
+    deep = high[0] + np.flatnonzero(np.diff(sizes, axis=0)[0, high[0] : high[-1]] ** 2 < limit)
+    spacing = 1 / (HOLE_RESOLUTION * delay)
+    start, stop = (max(place, 0) / size / spacing for place in (deep[0] - 1 if deep.size else high[-1], high[-1]))
+    while start < stop:
+        places = (start + np.arange(FAR_HOLE_LINES)) * spacing
+        first, second = (np.interp(places * size, np.arange(most.size), spectrum) for spectrum in spectra)
+        line = _first_minimum(np.abs(first + second * np.exp(-2j * np.pi * delay * places)) ** 2, limit)
+        if line is not None:
+            return float(places[line])
+        start += FAR_HOLE_LINES
+    return None
+
+
+def _first_minimum(power: Floats, limit: float) -> int | None:
+    """Return the lowest line of the first lines in a row that are below a limit; None without any."""
+    deep = np.flatnonzero(power < limit)
     if not deep.size:
         return None
     first = np.split(deep, np.flatnonzero(np.diff(deep) > 1) + 1)[0]
-    hole = float(first[np.argmin(power[first])]) * sample_rate / size
-    return hole if hole < end else None
+    return int(first[np.argmin(power[first])])
 
 
-def _may_cancel(part: WindowedForce) -> bool:
+def _may_cancel(sizes: Floats) -> bool:
     """Tell whether touches apart could make a hole whatever the time between them, by the spectra of each alone.
 
     The spectrum of touches far apart has so many lines that it is computed only then.
     """
-    parts = np.split(part.force, np.flatnonzero(np.diff(part.samples) > 1) + 1)
-    if len(parts) == 1:
-        return True
-    size = scipy.fft.next_fast_len(HOLE_RESOLUTION * max(map(len, parts)), real=True)
-    sizes = np.array([np.abs(np.fft.rfft(force, size)) for force in parts])
     most = np.sum(sizes, axis=0)
     least = np.maximum(2 * np.max(sizes, axis=0) - most, 0.0)
     reach = np.flatnonzero(most**2 > MIN_LOBE_POWER * np.max(least) ** 2)[-1]

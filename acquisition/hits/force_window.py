@@ -1,5 +1,6 @@
 """Window the force around all touches of the hammer."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
@@ -69,7 +70,7 @@ def _compute_windowed_force(hit: Hit) -> WindowedForce:
     window = 0.5 + 0.5 * np.cos(np.pi * np.minimum(np.maximum(away / width - 1, 0.0), 1.0))
     force = (hit.force[samples] - _follow_baseline(pulse, contacts, samples)) * window
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
-    mean_noise = pulse.baseline_rms / float(np.sqrt(quiet.size))
+    mean_noise = pulse.baseline_rms / math.sqrt(quiet.size)
     return WindowedForce(samples, force, window, pulse.baseline_rms, mean_noise, pulse, touches)
 
 
@@ -99,5 +100,5 @@ def _measure_level(pulse: Pulse, start: int, end: int) -> float:
     rest = pulse.recorded[start:end]
     if rest.size < pulse.width:
         return pulse.offset
-    level, error = find_median(rest), MEDIAN_ERROR * pulse.baseline_rms / float(np.sqrt(rest.size))
+    level, error = find_median(rest), MEDIAN_ERROR * pulse.baseline_rms / math.sqrt(rest.size)
     return level if abs(level - pulse.offset) > LEVEL_SIGNIFICANCE * error else pulse.offset

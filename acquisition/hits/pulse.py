@@ -1,5 +1,6 @@
 """Find the force pulse of a hit and window the force around it."""
 
+import math
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -57,7 +58,7 @@ def find_pulse(hit: Hit) -> Pulse | None:
     """Find the highest force pulse; None if it is below 6 times the rms of the baseline, or without a force."""
     if not hit.has_force:
         return None
-    top = int(np.argmax(hit.force))
+    top = int(hit.force.argmax())
     quiet = extract_baseline(hit.force, count_pre_hit_samples(hit))
     offset, rms = _measure_mean_and_rms(quiet)
     if float(quiet.max()) > offset + TOUCH_DEVIATION * rms:
@@ -73,9 +74,9 @@ def find_pulse(hit: Hit) -> Pulse | None:
 
 def _measure_mean_and_rms(values: Floats) -> tuple[float, float]:
     """Return the mean and the rms about it."""
-    mean = float(values.mean())
+    mean = float(values.sum()) / values.size
     apart = values - mean
-    return mean, float(np.sqrt(np.mean(apart * apart)))
+    return mean, math.sqrt(float(apart @ apart) / values.size)
 
 
 def _drop_touches(quiet: Floats, top: float) -> Floats:
@@ -96,9 +97,10 @@ def require_pulse(hit: Hit) -> Pulse:
 def _count_above(foot: float, signal: Floats) -> int:
     """Count the samples before the first one below the foot, block by block because pulses are short."""
     for at in range(0, signal.size, SEARCH_BLOCK_SIZE):
-        below = np.flatnonzero(signal[at : at + SEARCH_BLOCK_SIZE] < foot)
-        if below.size:
-            return at + int(below[0])
+        below = signal[at : at + SEARCH_BLOCK_SIZE] < foot
+        first = int(below.argmax())
+        if below[first]:
+            return at + first
     return signal.size
 
 
@@ -118,9 +120,9 @@ def _find_rise(hit: Hit) -> int:
     if not hit.has_force:
         size = np.abs(hit.acceleration - find_median(hit.acceleration))
         return int(np.argmax(size > PULSE_END_SHARE * np.max(size)))
-    above = hit.force[: int(np.argmax(hit.force)) + 1] - find_median(hit.force)
-    low = np.flatnonzero(above < PULSE_END_SHARE * above[-1])
-    return int(low[-1]) + 1 if low.size else 0
+    top, offset = int(hit.force.argmax()), find_median(hit.force)
+    foot = offset + PULSE_END_SHARE * (float(hit.force[top]) - offset)
+    return top - _count_above(foot, hit.force[top::-1]) + 1
 
 
 _pre_hit_counts: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()

@@ -45,7 +45,7 @@ def find_touches(pulse: Pulse) -> list[Touch]:
     force = _remove_main_pulse(pulse)
     force = force[: force.size // step * step].reshape(-1, step) @ np.full(step, 1 / step)
     floor = MIN_TOUCH_SHARE * pulse.peak
-    if np.ptp(force) < floor:
+    if force.max() - force.min() < floor:
         return []
     white = _estimate_noise(np.diff(force[: max(pulse.start, 0) // step])) / np.sqrt(2)
     force = np.nan_to_num(force - _measure_level(force, LEVEL_WIDTHS * pulse.width // step))
@@ -76,7 +76,7 @@ def _remove_main_pulse(pulse: Pulse) -> Floats:
     low, high = max(pulse.start - half, 0), min(pulse.end + half, pulse.recorded.size)
     force = pulse.force
     before, after = force[max(low - half, 0) : low], force[high : high + half]
-    ends = [float(np.mean(side)) if side.size else None for side in (before, after)]
+    ends = [float(side.sum()) / side.size if side.size else None for side in (before, after)]
     left, right = (end if end is not None else opposite or 0.0 for end, opposite in (ends, ends[::-1]))
     force[low:high] = left + (right - left) / max(high - low - 1, 1) * np.arange(high - low)
     return force

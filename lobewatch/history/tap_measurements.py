@@ -117,12 +117,10 @@ class UsableTaps:
     def newest(self, tool: str | None) -> TapEntry:
         """Return the newest tap test since the baseline, of a tool if named; NotTappedError without one."""
         current = [place.entry for place in self.places if place.baseline == self.baseline]
-        fitting = [tap for tap in current if tool in (None, tap.tool)]
-        if fitting:
+        if fitting := [tap for tap in current if tool in (None, tap.tool)]:
             return fitting[-1]
         tool_text = "" if tool is None else f" with tool {tool!r}"
-        damaged = [str(remark) for remark in self.remarks]
-        if damaged:
+        if damaged := [str(remark) for remark in self.remarks]:
             raise NotTappedError(join_sentences(f"{self._folder.path}: no usable tap test{tool_text}", *damaged))
         cure = "Take a tap test with session.TapSession, or replay a recorded file."
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"

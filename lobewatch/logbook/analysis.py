@@ -167,7 +167,7 @@ class Analysis:
         if not is_too_old(time, now, table.interval_days):
             return aged
         if table.tap_interval_days is None:
-            return replace(aged, remarks=(*aged.remarks, old_remark(aged.tool, time, now)))
+            return replace(aged, age_remarks=(old_remark(aged.tool, time, now),))
         return replace(aged, unchecked=(*aged.unchecked, too_old_remark(aged.tool, time, now, table.interval_days)))
 
     @property

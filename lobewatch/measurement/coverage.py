@@ -10,7 +10,7 @@ from acquisition import Frf, Remark, merge_remarks
 from dsm import format_rounded
 from lobewatch.machine import Machine
 from lobewatch.measurement.hit_remarks import HIT_CHANGE_CODES
-from modal import Mode, UnexplainedPeak
+from modal import HitChange, Mode, UnexplainedPeak
 
 PEAK_CODE = "peak-not-explained"
 """Code of the remark on a measured peak that the accepted modes do not explain."""
@@ -52,20 +52,27 @@ def peak_remark(peak: UnexplainedPeak, cure: str = PEAK_REMEDY) -> Remark:
     )
 
 
+def _is_of_change(peak: UnexplainedPeak, changes: Sequence[HitChange]) -> bool:
+    return any(abs(peak.frequency - change.frequency) <= change.damping_ratio * change.frequency for change in changes)
+
+
 def find_uncovered_peaks(
-    frf: Frf | None, used: Sequence[Mode], machine: Machine
+    frf: Frf | None, used: Sequence[Mode], machine: Machine, changes: Sequence[HitChange] = ()
 ) -> tuple[tuple[UnexplainedPeak, ...], list[Remark]]:
     """Find the measured peaks in [mode] band_hz that the modes used for lobes do not explain.
 
     A remark names each peak that they do not even explain within their errors. Peaks outside the band were left out on
     purpose: a remark names them, and no verdict depends on them. Without an FRF (no force) nothing is compared.
+    changes: changes over the hits that have a remark of their own, which is the only one within their half-width.
     """
     peaks = () if frf is None else modal.find_unexplained_peaks(frf, used, machine.mode.band_hz)
     low, high = machine.mode.band_hz or (0.0, np.inf)
     inside = tuple(peak for peak in peaks if low <= peak.frequency <= high)
     outside = [f"{peak.frequency:.0f} Hz" for peak in peaks if peak not in inside]
     cure = PEAK_REMEDY_BESIDE_TIP if machine.tap.position_mm else PEAK_REMEDY
-    remarks = [peak_remark(peak, cure) for peak in inside if not peak.is_within_errors]
+    remarks = [
+        peak_remark(peak, cure) for peak in inside if not (peak.is_within_errors or _is_of_change(peak, changes))
+    ]
     if outside:
         text = f"peak outside [mode] band_hz {low:g}..{high:g} Hz is not in the stability lobes"
         cure = "Widen [mode] band_hz if the peak belongs to the machine"

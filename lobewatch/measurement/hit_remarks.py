@@ -43,17 +43,42 @@ MIN_INCONSISTENT_HITS = 2
 def find_hit_remarks(
     hits: Sequence[Hit], band: tuple[float, float] | None = None, flags: Sequence[HitFlags] = ()
 ) -> Iterator[Remark]:
-    """Yield a remark on each kind of change over the hits of a tap test, at its most flexible mode.
+    """Return a remark on each kind of change over the hits of a tap test, at its most flexible mode.
 
     band: frequencies of interest (Hz), None for all. flags: faults of each hit, empty if all are accepted.
     """
+    return describe_changes(find_changes_in_band(hits, band, flags))
+
+
+def find_changes_in_band(
+    hits: Sequence[Hit], band: tuple[float, float] | None = None, flags: Sequence[HitFlags] = ()
+) -> list[HitChange]:
+    """Find the changes over the hits of a tap test, the most flexible mode first; arguments as `find_hit_remarks`."""
     low, high = band or (0.0, np.inf)
-    changes = [change for change in _find_changes(hits, flags) if low <= change.frequency <= high]
-    for kind in dict.fromkeys(change.kind for change in changes):
-        of_kind = [change for change in changes if change.kind is kind]
-        is_small = max(change.relative_spread for change in of_kind) < MIN_UNCOVERED_SPREAD
-        if not (is_small and kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
+    return [change for change in _find_changes(hits, flags) if low <= change.frequency <= high]
+
+
+def describe_changes(changes: Sequence[HitChange]) -> Iterator[Remark]:
+    """Yield a remark on each kind of these changes, at its most flexible mode."""
+    for of_kind in _group_by_kind(changes):
+        is_small = _is_small(of_kind)
+        if not (is_small and of_kind[0].kind is HitChangeKind.FORCE):  # the linearity check of the modes says it
             yield _make_remark(of_kind, is_small)
+
+
+def select_uncovered_changes(changes: Sequence[HitChange]) -> tuple[HitChange, ...]:
+    """Return the changes whose remark makes verdicts doubtful."""
+    return tuple(change for of_kind in _group_by_kind(changes) if not _is_small(of_kind) for change in of_kind)
+
+
+def _group_by_kind(changes: Sequence[HitChange]) -> list[list[HitChange]]:
+    kinds = dict.fromkeys(change.kind for change in changes)
+    return [[change for change in changes if change.kind is kind] for kind in kinds]
+
+
+def _is_small(changes: Sequence[HitChange]) -> bool:
+    """Return whether changes of one kind hardly move a limit."""
+    return max(change.relative_spread for change in changes) < MIN_UNCOVERED_SPREAD
 
 
 def drop_explained_remedies(modes: Sequence[Mode], changes: Sequence[Remark]) -> tuple[Mode, ...]:

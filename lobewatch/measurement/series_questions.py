@@ -55,8 +55,10 @@ MAX_COMMON_DIFFERENCE, N_STD_COMMON = 0.0005, 5.0
 the suspicion; chosen."""
 MIN_COMMON_PEAK_RATIO = 0.1
 """Peak of a mode over the followed one, from which it must be common to two tests of one direction; chosen."""
-FREQUENCY_FLOOR = 5e-6
-"""Relative standard error of a frequency at least, with which records without noise are compared; chosen."""
+FREQUENCY_FLOOR = 1.5e-5
+"""Relative standard error of a frequency at least; repeated tests agree no better (emulated: 0.6e-5 to 2e-5)."""
+COMPUTED_DIFFERENCE = 1e-7
+"""Relative frequency difference below which x and y were computed, not measured: noise is a hundred times larger."""
 
 
 class EarlierTest(NamedTuple):
@@ -246,6 +248,8 @@ def check_same_direction(now: Mode, modes: Sequence[Mode], reference: SeriesRefe
     if not reference.same_day or not all(_is_common(mode, reference.same_day) for mode in strong):
         return None
     change = _nearest_change(now.frequency, reference.same_day)
+    if abs(change) < COMPUTED_DIFFERENCE:
+        return None
     one, (centre, std) = 2 * _relative_error(now) ** 2, expect_direction_difference(reference)
     two = one + std**2
     ratio = 0.5 * (math.log(two / one) - change**2 / one + (change - centre) ** 2 / two)

@@ -10,8 +10,8 @@ from acquisition import Remark
 
 MAX_TAP_AGE_INTERVALS = 2.0
 """Age of a tap test beyond which it is too old, in tap intervals; chosen, as recommended settings hold so long."""
-TOO_OLD_CODE, OLD_CODE = "tap-too-old", "tap-old"
-"""Codes of the remarks on a tap test beyond an agreed interval, and beyond the default one."""
+TOO_OLD_CODE = "tap-too-old"
+"""Code of the remark on a tap test beyond an agreed interval."""
 
 
 def tap_age_days(time: datetime, now: datetime) -> float:

@@ -18,13 +18,18 @@ from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.coverage import find_uncovered, find_uncovered_peaks
 from lobewatch.measurement.exponential_window import hidden_window_remarks
 from lobewatch.measurement.hit_choice import find_choice_remarks
-from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
+from lobewatch.measurement.hit_remarks import (
+    describe_changes,
+    drop_explained_remedies,
+    find_changes_in_band,
+    select_uncovered_changes,
+)
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference, check_same_direction, check_series
 from lobewatch.measurement.tool_compliance import check_tool_compliance
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
-from modal import CredibleModes, Extraction, Mode, ModeEdits, UnexplainedPeak
+from modal import CredibleModes, Extraction, HitChange, Mode, ModeEdits, UnexplainedPeak
 
 EDITS_NOT_APPLIED_CODE = "hand-not-applied"
 MODE_EDIT_CODES = ("modes-by-hand", EDITS_NOT_APPLIED_CODE)
@@ -58,6 +63,8 @@ class TapFit:
     """True if the fit was impossible."""
     frf: Frf | None = None
     """FRF that was fitted, in its usable band and without the mass of the sensor; None without force."""
+    changes: tuple[HitChange, ...] = ()
+    """Changes from hit to hit whose remark makes verdicts doubtful."""
 
     @property
     def uncovered(self) -> tuple[Remark, ...]:
@@ -130,7 +137,8 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:
-            changes = tuple(find_hit_remarks(tap.hits, machine.mode.band_hz, tap.decided_flags))
+            over_hits = find_changes_in_band(tap.hits, machine.mode.band_hz, tap.decided_flags)
+            changes, uncovered = tuple(describe_changes(over_hits)), select_uncovered_changes(over_hits)
             if tap.frf is None:
                 state, edited = _apply_edits(extract_decay_modes(tap.accepted), by_hand)
                 said = (*remarks, *edited, *decay_remarks(machine.tap.sensor), *changes)
@@ -141,7 +149,7 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
             quantity = filter(None, [questions.check_quantity(fitted.modes)])
             said = (*remarks, *fitted.remarks, *about_hits, *quantity)
             modes = drop_explained_remedies(fitted.modes, changes)
-            return TapFit(*named, modes, said, frf=fitted.extraction.frf)
+            return TapFit(*named, modes, said, frf=fitted.extraction.frf, changes=uncovered)
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, questions.no_mode_remark((), machine)), failed=True)
@@ -190,7 +198,7 @@ def interpret_fit(
             highest = float(fit.frf.frequency[-1])
             remarks += filter(None, [check_tool_compliance(modes, machine, fit.tool, highest)])
         used = trusted.modes if is_at_tip or followed is None else (followed,)
-        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine)
+        unexplained, about_peaks = find_uncovered_peaks(fit.frf if at_tip else None, used, machine, fit.changes)
         at_tip += [peak.missing for peak in unexplained if is_at_tip]
     results: dict[str, Any] = {"followed": followed, "calibration": calibration, "at_tip": at_tip}
     results |= {"used": used, "unexplained": unexplained, "remarks": (*remarks, *about_peaks)}

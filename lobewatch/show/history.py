@@ -7,6 +7,8 @@ from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any
 
+import msgspec
+
 from acquisition import Conditions, Remark
 from dsm import format_rounded
 from lobewatch.history import HistoryRow
@@ -132,6 +134,7 @@ def history_json(logbook: Logbook) -> JsonObject:
         "excluded": list(map(_excluded_json, logbook.files.excluded)),
         "events": list(map(event_json, logbook.files.contents.events)),
         "acknowledged": list(map(_acknowledgement_json, logbook.files.contents.acknowledgements)),
+        "mass_checks": msgspec.to_builtins(logbook.files.contents.mass_checks),
         "cuts": [cut_json(cut) | {"text": cut_summary_text(cut)} for cut in logbook.files.contents.cuts],
     }
 

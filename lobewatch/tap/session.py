@@ -248,7 +248,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     remarks += [remark for remark in logbook.remarks if remark.code not in STATUS_BY_CODE]
     check = logbook.chain_check(measurement.tap_id)
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
-    texts += [f"Sensor chain: {check.text}."] if check.is_recorded else []
+    texts += [f"Sensor chain: {check.text}."] if check.evidence is not None else []
     texts += [f"{remark.finding.removesuffix('.')}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [

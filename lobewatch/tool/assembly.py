@@ -151,6 +151,8 @@ class Assembly:
     """Remarks on decisions on hits of these tap tests."""
     age_days: float | None = None
     """Age of its newest tap test (days), from the clock; None as of that test."""
+    age_remarks: tuple[Remark, ...] = ()
+    """Remark on an old tap test where nobody has agreed an interval; it limits no verdict."""
     chain_checks: tuple[ChainCheck, ...] = ()
     """Checks of the sensors behind its tap tests."""
     unchecked: tuple[Remark, ...] = ()

@@ -14,7 +14,7 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.measurement.coverage import describe_uncovered
-from lobewatch.measurement.tap_age import OLD_CODE, TOO_OLD_CODE
+from lobewatch.measurement.tap_age import TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
@@ -187,7 +187,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     if stability is Stability.STABLE:
         unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
         remarks += dict.fromkeys(filter(None, unrecorded))
-        remarks += (remark for remark in case.assembly.remarks if remark.code == OLD_CODE)
+        remarks += case.assembly.age_remarks
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -217,7 +217,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
 
 def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
     """Return a verdict as of now: at most doubtful if its tap tests are too old. aged: its tool with the age."""
-    old = [remark for remark in aged.remarks if remark.code == OLD_CODE and verdict.stability is Stability.STABLE]
+    old = aged.age_remarks if verdict.stability is Stability.STABLE else ()
     too_old = [remark for remark in aged.unchecked if remark.code == TOO_OLD_CODE and verdict.samples is not None]
     verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *old, *too_old))
     if not too_old or not verdict.is_stable or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):

@@ -1,5 +1,6 @@
 """Find the resonances of an FRF: mobility peaks above the noise whose phase turns as that of a mode."""
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,15 +76,17 @@ def check_line_count(frf: Frf) -> None:
         )
 
 
-def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = False) -> list[Resonance]:
+def find_resonances(frf: Frf, least_share: float = 0.0, *, noise: Floats | None = None) -> list[Resonance]:
     """Find the resonances over all lines of an FRF that starts above 0 Hz, by rising frequency.
 
     The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
     r - 1/r = -+ 2 zeta. Peaks are searched line by line and then in ever longer running means of the complex
     mobility, which reveals a wide mode that noise hides from single lines. Two modes with no dip between
     them are one peak. A mode much narrower than the line spacing is not found. Peaks below a share of the highest
-    mobility are ignored, which saves time. is_checked: the modes were fitted before, so that a rising phase is that of
-    a disturbance.
+    mobility are ignored, which saves time.
+
+    noise: noise rms of the mobility (m/s/N), shape (n,), of an FRF without drift whose modes were fitted before. A
+    rising phase is then that of a disturbance.
 
     Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one without any coherence;
     ConjugateError.
@@ -94,8 +97,10 @@ def find_resonances(frf: Frf, least_share: float = 0.0, *, is_checked: bool = Fa
     if frf.coherence is not None and not np.any(frf.coherence):
         found = "the coherence is 0 on every line, so the response does not come from the hammer"
         raise ValueError(f"{found}. Check the cables of hammer and sensor.")
-    frf = remove_drift(frf)
-    peaks = _find_peaks_at_all_scales(frf, least_share * float(np.max(np.abs(frf.mobility))))
+    is_checked = noise is not None
+    frf = frf if is_checked else remove_drift(frf)
+    noise = mobility_noise(frf) if noise is None else noise
+    peaks = _find_peaks_at_all_scales(frf, noise, least_share * float(np.max(np.abs(frf.mobility))))
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(
             "the FRF is real on every line, so the phase is missing. "
@@ -116,7 +121,7 @@ def add_residual_resonances(known: Sequence[Resonance], residual: Frf) -> list[R
     if not known:
         return []
     least = MIN_RESIDUAL_PEAK_SHARE * min(r.height for r in known)
-    peaks = _find_peaks_at_all_scales(residual, least)
+    peaks = _find_peaks_at_all_scales(residual, mobility_noise(residual), least)
     turning = [peak for peak in peaks if -MAX_PHASE_TURN < peak.turn < -MIN_PHASE_TURN]
     return sorted([*known, *(new for new in turning if _is_separate_resonance(known, new))], key=lambda r: r.frequency)
 
@@ -146,12 +151,12 @@ def _check_phase(frf: Frf, peaks: list[Resonance]) -> None:
         )
 
 
-def _find_peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[Resonance]:
+def _find_peaks_at_all_scales(frf: Frf, noise: Floats, least: float) -> list[Resonance]:
     """Find the peaks of all running means, each from the longest mean that costs no more height than noise explains.
 
-    least: height of the mobility below which peaks are ignored (m/s/N).
+    noise: noise rms of the mobility (m/s/N). least: height of the mobility below which peaks are ignored (m/s/N).
     """
-    noise, mobility = mobility_noise(frf), frf.mobility
+    mobility = frf.mobility
     peaks: list[Resonance] = []
     longest = max(1, frf.frequency.size // 16)
     for length in SMOOTHING_LENGTHS[longest >= SMOOTHING_LENGTHS]:
@@ -179,9 +184,9 @@ def _find_peaks(frf: Frf, mobility: Complexes, noise: Floats, least: float) -> l
     floor = np.maximum(MIN_PEAK_TO_NOISE * noise, max(least, faintest))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
     tops = tops[_has_deep_valleys(size, tops)]
-    saddle = _higher_saddles(size, tops)
-    clear = saddle <= size[tops] * 10 ** (-MIN_PEAK_PROMINENCE_DB / 20)
-    high = tops[clear & (size[tops] - saddle > MIN_PEAK_TO_NOISE * noise[tops])]
+    height = size[tops]
+    limit = np.minimum(height * 10 ** (-MIN_PEAK_PROMINENCE_DB / 20), height - MIN_PEAK_TO_NOISE * noise[tops])
+    high = tops[_has_low_saddles(size, tops, limit)]
     return [_measure_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
 
@@ -206,22 +211,33 @@ SEARCHED_LINES = (512, 4096, None)
 """Numbers of lines that are searched then, the last one all."""
 
 
-def _higher_saddles(size: Floats, tops: Indices) -> Floats:
-    """Return for each peak the higher of the two saddles before higher values; without one, the lowest value of all."""
-    before = _lowest_before_higher_values(size[::-1], size.size - 1 - tops)
-    return np.maximum(before, _lowest_before_higher_values(size, tops))
+def _has_low_saddles(size: Floats, tops: Indices, limit: Floats) -> Flags:
+    """Return for each peak whether both saddles before higher values are below its limit.
+
+    Without a higher value the saddle is the lowest value of all.
+    """
+    sides = [(size, tops), (size[::-1], size.size - 1 - tops)]
+    near = [_lowest_near(*side) for side in sides]
+    low: Flags = np.all([is_open | (lowest < limit) for lowest, is_open in near], axis=0)
+    for (values, places), (_, is_open) in zip(sides, near, strict=True):
+        for i in np.flatnonzero(low & is_open).tolist():
+            low[i] = _lowest_before_higher_value(values, int(places[i])) < limit[i]
+    return low
 
 
-def _lowest_before_higher_values(size: Floats, tops: Indices) -> Floats:
-    """Return the lowest value from each peak to the next higher value, or the lowest of all if none is higher."""
+def _lowest_near(size: Floats, tops: Indices) -> tuple[Floats, Flags]:
+    """Return for each peak the lowest value before a higher one among the next lines, and whether none is higher."""
     near = np.append(size, np.full(NEAR_LINES, -np.inf))[tops[:, np.newaxis] + np.arange(NEAR_LINES + 1)]
     higher = (near > near[:, :1]).argmax(axis=1)
     lowest = np.minimum.accumulate(near, axis=1)[np.arange(tops.size), np.maximum(higher - 1, 0)]
-    for i in np.flatnonzero(higher == 0).tolist():
-        side = size[tops[i] :]
-        end = next((end for n in SEARCHED_LINES if (end := int((side[:n] > side[0]).argmax()))), 0)
-        lowest[i] = side[:end].min() if end else size.min()
-    return np.asarray(lowest)
+    return lowest, higher == 0
+
+
+def _lowest_before_higher_value(size: Floats, top: int) -> float:
+    """Return the lowest value from a peak to the next higher value, or the lowest of all if none is higher."""
+    side = size[top:]
+    end = next((end for n in SEARCHED_LINES if (end := int((side[:n] > side[0]).argmax()))), 0)
+    return float(side[:end].min() if end else size.min())
 
 
 def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: float) -> Resonance:
@@ -230,21 +246,24 @@ def _measure_peak(frf: Frf, mobility: Complexes, size: Floats, top: int, noise: 
     low, high = top - math.ceil(below), top + math.ceil(above)
     lower, upper = np.interp([top - below, top + above], np.arange(low, high + 1), f[low : high + 1])
     half_width = float(min(f[top] - lower, upper - f[top]))
-    turn = np.angle((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
+    turn = cmath.phase((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
     coherence = mean_coherence(frf, slice(low, high + 1))
-    return Resonance(float(f[top]), half_width, float(size[top]), noise, float(turn), coherence)
+    return Resonance(float(f[top]), half_width, float(size[top]), noise, turn, coherence)
 
 
 def _lines_to_half_power(size: Floats) -> float:
     """Count the lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
-    level = size[0] / np.sqrt(2)
-    higher = np.flatnonzero(size > size[0])
-    side = size[: higher[0]] if higher.size else size
-    under = np.flatnonzero(side < level)
-    if not under.size:
-        return float(max(int(np.argmin(side)), 1))
-    end = int(under[0])
-    return float(end - (level - side[end]) / (side[end - 1] - side[end]))
+    level = size[0] / math.sqrt(2)
+    for searched in SEARCHED_LINES:
+        side = size[:searched]
+        ends = (side < level) | (side > size[0])
+        end = int(ends.argmax())
+        if ends[end]:
+            break
+    if ends[end] and size[end] < level:
+        return float(end - (level - size[end]) / (size[end - 1] - size[end]))
+    side = size[:end] if ends[end] else size
+    return float(max(int(np.argmin(side)), 1))
 
 
 def mobility_noise(frf: Frf) -> Floats:
@@ -257,5 +276,6 @@ def mobility_noise(frf: Frf) -> Floats:
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
     scatter = scipy.ndimage.median_filter(rough, size=NOISE_MEDIAN_LINES) / np.sqrt(np.log(2))
     scatter = np.pad(scatter, (1, 2), mode="edge")
-    noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent_noise(frf), size=NOISE_MEDIAN_LINES))
-    return np.asarray(noise * 2 * np.pi * frf.frequency / factor)
+    if frf.coherence is not None:
+        scatter = np.maximum(scatter, scipy.ndimage.median_filter(incoherent_noise(frf), size=NOISE_MEDIAN_LINES))
+    return np.asarray(scatter * 2 * np.pi * frf.frequency / factor)

@@ -7,6 +7,7 @@ import numpy as np
 import scipy
 
 from acquisition import Frf
+from acquisition.arrays import find_median
 from modal.arrays import Flags, Floats
 
 
@@ -105,8 +106,8 @@ def remove_drift(frf: Frf) -> Frf:
 def _fit_drift(frf: Frf, lines: slice) -> tuple[float, complex]:
     """Return the relative scatter of A over some lines, and A."""
     constants = frf.receptance[lines] * frf.frequency[lines] ** 2
-    middle = complex(np.median(constants.real), np.median(constants.imag))
-    return (float(np.median(np.abs(constants - middle)) / abs(middle)) if middle else np.inf), middle
+    middle = complex(find_median(constants.real), find_median(constants.imag))
+    return (find_median(np.abs(constants - middle)) / abs(middle) if middle else np.inf), middle
 
 
 def _low_octaves(frf: Frf) -> Iterator[slice]:

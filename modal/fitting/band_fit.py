@@ -18,7 +18,7 @@ class FixedPoleFit:
     """Fit of the modal constants of p FRFs at given poles.
 
     Each FRF has c unknowns, its modal constants: m real parts, and m imaginary parts if they are complex. k poles
-    may move.
+    may move. s is 1 if all FRFs have the same weights, otherwise p.
     """
 
     poles: Floats
@@ -26,9 +26,9 @@ class FixedPoleFit:
     free: Flags
     """True for each of them that is free, (2 m,)."""
     q: Floats
-    """Orthonormal bases of the modes without their part in the residual terms, (p, 2 n, c)."""
+    """Orthonormal bases of the modes without their part in the residual terms, (s, 2 n, c)."""
     inverse: Floats
-    """Inverses of the triangular factors, (p, c, c)."""
+    """Inverses of the triangular factors, (s, c, c)."""
     linear: Floats
     """Best modal constants, (p, c)."""
     left: Floats
@@ -36,7 +36,7 @@ class FixedPoleFit:
     unknowns: int
     """Modal constants and residual terms of all FRFs, real and imaginary parts."""
     squares: Floats
-    """Squared partial fractions of each mode without residual terms, (p, 2, m, 2 n).
+    """Squared partial fractions of the modes without residual terms, (s, 2 m, 2 n).
 
     They are the slopes by the pole for real and for imaginary residues.
     """
@@ -64,32 +64,34 @@ class FixedPoleFit:
         return self.left.reshape(-1)
 
     @cached_property
-    def slope(self) -> Floats:
-        """Slope of the models by the free values at constant residues A f / (2i sqrt(1 - zeta^2)), (p, k, 2 n).
+    def _slope_parts(self) -> Floats:
+        """Shares of the squares in the slopes of the models by the free values, (p, k, 2 m).
 
-        Frequencies in units of zeta f, damping ratios relative to themselves. Only the constants differ from FRF to
-        FRF:
-        the squares are computed once.
+        The residues A f / (2i sqrt(1 - zeta^2)) are constant. Frequencies are in units of zeta f, damping ratios
+        relative to themselves. Only the constants differ from FRF to FRF.
         """
         zeta = self.poles[1]
-        turning = np.sqrt(1 - zeta**2)
+        turning, m = np.sqrt(1 - zeta**2), zeta.size
         moved = 2 * zeta * np.array([turning * (1j * turning - zeta), -(turning + 1j * zeta)])
-        by_pole = (-1j * self.constant[:, np.newaxis] * moved)[..., np.newaxis]
-        along, across = self.squares[:, :1], self.squares[:, 1:]
-        slope = by_pole.real * along + by_pole.imag * across
-        every = slope.reshape(len(slope), self.free.size, -1)
-        return np.asarray(every if self.free.all() else every[:, self.free])
+        by_pole = -1j * self.constant[:, np.newaxis] * moved
+        parts, own = np.zeros((len(by_pole), 2, m, 2, m)), np.arange(m)
+        parts[:, :, own, 0, own], parts[:, :, own, 1, own] = by_pole.real, by_pole.imag
+        return np.asarray(parts.reshape(-1, 2 * m, 2 * m)[:, self.free])
 
     @cached_property
-    def _constant_slopes(self) -> Floats:
-        """Part of the slopes that the constants take up, in their bases, (p, k, c)."""
-        return np.asarray(self.slope @ self.q)
+    def _constant_squares(self) -> Floats:
+        """Part of the squares that the constants take up, in their bases, (s, 2 m, c)."""
+        return np.asarray(self.squares @ self.q)
+
+    @cached_property
+    def _free_squares(self) -> Floats:
+        """Squares without that part, (s, 2 m, 2 n)."""
+        return np.asarray(self.squares - self._constant_squares @ self.q.mT)
 
     @cached_property
     def by_frf(self) -> Floats:
         """Slope of the residual by the scaled poles with optimal constants (Kaufman), by FRF, (p, k, 2 n)."""
-        taken = self._constant_slopes @ self.q.mT
-        return np.asarray(np.subtract(taken, self.slope, out=taken))
+        return np.asarray(-self._slope_parts @ self._free_squares)
 
     @cached_property
     def jacobian(self) -> Floats:
@@ -99,12 +101,14 @@ class FixedPoleFit:
     @cached_property
     def gram(self) -> Floats:
         """Products of these slopes with each other, (k, k)."""
-        return np.asarray(self.jacobian @ self.jacobian.T)
+        products = self._free_squares @ self._free_squares.mT
+        return np.asarray(np.sum(self._slope_parts @ products @ self._slope_parts.mT, axis=0))
 
     @property
     def gradient(self) -> Floats:
         """Half the slope of the cost by the scaled poles, (k,)."""
-        return np.asarray(self.jacobian @ self.residual)
+        along = self._free_squares @ self.left[..., np.newaxis]
+        return np.asarray(-np.sum(self._slope_parts @ along, axis=0)[:, 0])
 
     @property
     def constant(self) -> Complexes:
@@ -149,7 +153,8 @@ class FixedPoleFit:
     @cached_property
     def _pole_errors(self) -> Floats:
         """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
-        by_poles = -(self._rotated_constants @ self._constant_slopes.mT[:, np.newaxis]).swapaxes(0, 1)
+        by_constants = self._slope_parts @ self._constant_squares
+        by_poles = -(self._rotated_constants @ by_constants.mT[:, np.newaxis]).swapaxes(0, 1)
         zeta = self.poles[1]
         residue_slopes = np.hstack([np.diag(zeta), np.diag(zeta**2 / (1 - zeta**2))])[:, self.free]
         by_poles[0] -= np.abs(self.constant)[..., np.newaxis] * residue_slopes

@@ -7,6 +7,7 @@ import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from modal.arrays import Complexes, Flags, Floats
 from modal.fitting.band_fit import BandFit, FixedPoleFit, residual_powers, split_complex
@@ -17,14 +18,17 @@ MIN_CURVE_SEPARATION = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class ProjectedBand:
-    """Weighted FRFs of a band without residual terms."""
+    """Weighted FRFs of a band without residual terms.
+
+    FRFs with the same weights share one set of rows: s is then 1, otherwise p.
+    """
 
     root: Complexes
     """Values i f, (n,)."""
     weight: Floats
-    """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
+    """Weights of real, then of imaginary parts, (s, 1, 2 n)."""
     bases: Floats
-    """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (p, n, terms)."""
+    """Orthonormal bases of the residual terms of each FRF, the same for real and imaginary parts, (s, n, terms)."""
     data: Floats
     """Weighted FRFs without residual terms, (p, 1, 2 n)."""
     free: Flags
@@ -38,9 +42,8 @@ class ProjectedBand:
         part = self.data @ q
         left = self.data - part @ q.mT
         linear = part @ inverse.mT
-        unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
-        squares = rows[:, 2 * m :].reshape(len(rows), 2, m, -1)
-        return FixedPoleFit(poles, self.free, q, inverse, linear[:, 0], left[:, 0], unknowns, squares)
+        unknowns = linear.size + 2 * len(linear) * self.bases.shape[2]
+        return FixedPoleFit(poles, self.free, q, inverse, linear[:, 0], left[:, 0], unknowns, rows[:, 2 * m :])
 
 
 def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms: int, held: Flags) -> ProjectedBand:
@@ -48,10 +51,11 @@ def project_band(frequency: Floats, receptance: Complexes, weight: Floats, terms
 
     frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,).
     """
-    bases = _term_bases(frequency, weight, terms)
+    shared = weight[:1] if np.all(weight == weight[0]) else weight
+    bases = _term_bases(frequency, shared, terms)
     values = _project_out(bases, split_complex(weight * receptance)[:, np.newaxis])
     root = np.asarray(1j * frequency)
-    return ProjectedBand(root, np.tile(weight, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
+    return ProjectedBand(root, np.tile(shared, 2)[:, np.newaxis], bases, values, np.tile(~held, 2))
 
 
 def residual_term_gain(fit: BandFit, frequency: Floats, weight: Floats, terms: int) -> float:
@@ -83,17 +87,17 @@ def _term_bases(frequency: Floats, weight: Floats, terms: int) -> Floats:
 
 
 def _orthonormal(rows: Floats) -> tuple[Floats, Floats]:
-    """Return orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse triangle, (p, c, c).
+    """Return orthonormal columns, (s, 2 n, c), that span rows (s, c, 2 n), and the inverse triangle, (s, c, c).
 
     By Cholesky, in half the time, if no row is nearly a sum of the others, which makes it as exact.
     """
     gram = rows @ rows.mT
-    with contextlib.suppress(np.linalg.LinAlgError):
-        lower = np.linalg.cholesky(gram)
-        apart = lower.diagonal(axis1=1, axis2=2) ** 2 > MIN_CURVE_SEPARATION**2 * gram.diagonal(axis1=1, axis2=2)
-        if apart.all():
-            inverse = np.linalg.inv(lower).mT
-            return rows.mT @ inverse, inverse
+    lapack = scipy.linalg.lapack  # numpy takes as long for its checks as for a small matrix
+    lower, failed = zip(*(lapack.dpotrf(each, lower=1) for each in gram), strict=True)
+    lowest = np.array([each.diagonal() for each in lower]) ** 2 / gram.diagonal(axis1=1, axis2=2)
+    if not any(failed) and lowest.min() > MIN_CURVE_SEPARATION**2:
+        inverse = np.array([lapack.dtrtri(each, lower=1)[0].T for each in lower])
+        return rows.mT @ inverse, inverse
     q, triangle = np.linalg.qr(rows.mT)
     return q, np.linalg.inv(triangle)
 
@@ -114,7 +118,7 @@ def _model_rows(root: Complexes, poles: Floats) -> Floats:
 
 
 def _project_out(bases: Floats, values: Floats) -> Floats:
-    """Subtract from values (p, k, 2 n) their part in orthonormal bases (p, n, terms) of real and imaginary parts."""
+    """Subtract from values (p, k, 2 n) their part in orthonormal bases (s, n, terms) of real and imaginary parts."""
     parts = values.reshape(len(bases), -1, bases.shape[1])
     taken = parts @ bases @ bases.mT
     return np.subtract(parts, taken, out=taken).reshape(values.shape)
@@ -137,6 +141,8 @@ NEARBY_FIT_STEPS = 2
 
 With five steps, sensors of the same measured hits agree no more often.
 """
+MAX_DROP_RATIO = 10.0
+"""Largest drop of the cost by all further steps over that predicted for the next one, hardly damped; chosen."""
 MIN_WORTHWHILE_GAIN = 1e-3
 """Least cost drop of a step over that by chance of one unknown: a thirtieth of an error."""
 
@@ -181,8 +187,9 @@ def fit_real_constants(fit: BandFit, frequency: Floats, receptance: Complexes, w
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         band = project_band(frequency, receptance, weight, terms, fit.held)
         starts = _poles_for_real_constants(fit)
-        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS)
-        if has_converged and state.cost - fit.sum_of_squares <= allowed:
+        most = fit.sum_of_squares + allowed
+        state, has_converged = _descend(band, starts, is_complex=False, trials=MAX_FIT_EVALUATIONS, most=most)
+        if has_converged and state.cost <= most:
             across = fit.constant / state.constant
             return replace(_band_fit(state, fit.complex_fit), phase_if_complex=np.angle(across * np.sign(across.real)))
     return fit
@@ -222,8 +229,13 @@ def _band_fit(state: FixedPoleFit, with_phases: FixedPoleFit) -> BandFit:
     return BandFit(f, zeta, state.constant, freedom, with_phases, state.residual, real, held)
 
 
-def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int) -> tuple[FixedPoleFit, bool]:
-    """Run a number of evaluations and return the state and whether it has converged."""
+def _descend(
+    band: ProjectedBand, starts: Floats, is_complex: bool, trials: int, most: float = np.inf
+) -> tuple[FixedPoleFit, bool]:
+    """Run a number of evaluations and return the state and whether it has converged.
+
+    A descent that will not reach a cost of at most `most` ends.
+    """
     state, damping = band.at(starts, is_complex), INITIAL_FIT_DAMPING
     for _ in range(trials):
         if not np.isfinite(state.cost):
@@ -232,6 +244,8 @@ def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int)
         size = float(np.abs(step).max(initial=0.0))
         if gain < MIN_WORTHWHILE_GAIN * state.cost / state.degrees_of_freedom or size < FIT_STEP_TOLERANCE:
             return state, True
+        if damping <= MIN_EFFECTIVE_FIT_DAMPING and state.cost - MAX_DROP_RATIO * promise > most:
+            break
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             kept = (state.cost - trial.cost) / promise
@@ -247,9 +261,14 @@ def _descend(band: ProjectedBand, starts: Floats, is_complex: bool, trials: int)
 def _damped_step(state: FixedPoleFit, damping: float) -> tuple[Floats, float, float]:
     """Return the damped Gauss-Newton step (k,), its squared model change (first order), and the predicted cost drop."""
     gram, gradient = state.gram, state.gradient
+    if not gradient.size:
+        return gradient, 0.0, 0.0
     norm = np.sqrt(gram.diagonal())
     scaled = gram / (norm[:, np.newaxis] * norm)
     scaled.flat[:: norm.size + 1] += damping
-    step = np.linalg.solve(scaled, -gradient / norm) / norm
+    _, _, solution, failed = scipy.linalg.lapack.dgesv(scaled, -gradient / norm)
+    if failed:
+        raise np.linalg.LinAlgError("the unknowns of the mode fit are linearly dependent")
+    step = solution / norm
     gain = float(step @ gram @ step)
     return step, gain, float(-2 * step @ gradient) - gain

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,16 +108,16 @@ def find_unexplained_peaks(
     >>> f"{peak.frequency:.0f} Hz: {peak.measured * 1e6:.2f} instead of {peak.explained * 1e6:.2f} um/N"
     '902 Hz: -0.18 instead of -0.02 um/N'
     """
-    check_line_count(usable_lines(frf, None))
-    lines = replace(remove_drift(usable_lines(frf, None)), coherence=None)  # low where hits differ, too
-    noise = mobility_noise(lines) / (2 * np.pi * lines.frequency)
+    lines = usable_lines(frf, None)
+    check_line_count(lines)
+    lines = replace(remove_drift(lines), coherence=None)  # low where hits differ, too
+    of_mobility = mobility_noise(lines)
+    noise = of_mobility / (2 * np.pi * lines.frequency)
     counted = noise < np.abs(lines.receptance)
     model = synthesize_frf(modes, lines.frequency).receptance.real
     lowest = LOWEST_FREQUENCY_SHARE * min((mode.frequency for mode in modes), default=0.0)
-    compared = _Comparison(
-        lowest, lines.frequency, lines.receptance.real, noise, counted, model, _model_error(lines, modes)
-    )
-    resonances = find_resonances(lines, MIN_MOBILITY_SHARE * _mobility_share(lines, band), is_checked=True)
+    compared = _Comparison(lowest, lines.frequency, lines.receptance.real, noise, counted, model, modes)
+    resonances = find_resonances(lines, MIN_MOBILITY_SHARE * _mobility_share(lines, band), noise=of_mobility)
     measured = [(peak.frequency, *compared.measure(peak)) for peak in resonances]
     found = list[UnexplainedPeak]()
     for frequency, depth, peak in measured:
@@ -132,8 +133,8 @@ def _is_inside(frequency: float, band: tuple[float, float] | None) -> bool:
 
 def _mobility_share(lines: Frf, band: tuple[float, float] | None) -> float:
     """Return the largest mobility in a band over that of all lines; 1 without lines in it."""
-    size = np.abs(lines.mobility)
-    inside = size[[_is_inside(f, band) for f in lines.frequency.tolist()]]
+    size, (low, high) = np.abs(lines.mobility), band or (0.0, np.inf)
+    inside = size[(lines.frequency >= low) & (lines.frequency <= high)]
     return float(np.max(inside) / np.max(size)) if inside.size and np.any(size) else 1.0
 
 
@@ -165,14 +166,14 @@ def _with_errors_of_nearest(missing: Mode, modes: Sequence[Mode]) -> Mode:
     return replace(missing, **errors)
 
 
-def _model_error(lines: Frf, modes: Sequence[Mode]) -> Floats:
-    """Return the 95 % error of the real part of the sum of modes on each line (m/N), to first order.
+def _model_error(frequency: Floats, modes: Sequence[Mode]) -> Floats:
+    """Return the 95 % error of the real part of the sum of modes at these frequencies (m/N), to first order.
 
     That of the frequency is left out: it moves a peak within the half-width that is searched, and deepens none.
     """
-    squares = np.zeros(lines.frequency.size)
+    squares = np.zeros(frequency.size)
     for mode in modes:
-        slopes = np.array(list(_slopes(mode, lines.frequency)))
+        slopes = np.array(list(_slopes(mode, frequency)))
         covariance = np.nan_to_num(mode.joint_covariance)[1:, 1:]
         squares += mode.quantile() ** 2 * np.einsum("in,ij,jn->n", slopes, covariance, slopes)
     return np.sqrt(np.maximum(squares, 0.0))
@@ -193,7 +194,7 @@ def _slopes(mode: Mode, frequency: Floats) -> Iterator[Floats]:
 
 @dataclass(frozen=True, eq=False)
 class _Comparison:
-    """Real parts of the measured receptance and of the modes (m/N) on the same lines, shape (n,) each."""
+    """Real parts of the measured receptance and of the modes (m/N) on the same lines, shape (n,) each array."""
 
     lowest: float
     """Frequency below which only resolved peaks count (Hz)."""
@@ -207,8 +208,13 @@ class _Comparison:
     """True for the lines that are compared."""
     explained: Floats
     """Real part of the modes."""
-    error: Floats
-    """95 % error of that real part."""
+    modes: Sequence[Mode]
+    """Modes."""
+
+    @cached_property
+    def spacing(self) -> float:
+        """Least distance of two lines (Hz)."""
+        return float(np.min(np.diff(self.frequency)))
 
     def real_at(self, frequency: float) -> float:
         """Return the measured real part (m/N) at a frequency (Hz)."""
@@ -216,7 +222,7 @@ class _Comparison:
 
     def measure(self, peak: Resonance) -> tuple[float, UnexplainedPeak | None]:
         """Return the most negative real part near a peak (m/N), 0 without one, and the peak if it is unexplained."""
-        f, spacing = self.frequency, np.min(np.diff(self.frequency))
+        f, spacing = self.frequency, self.spacing
         if peak.frequency < self.lowest and peak.half_width < MIN_LOW_PEAK_LINES * spacing:
             return 0.0, None
         near = self.counted & (np.abs(f - peak.frequency) <= PEAK_HALF_WIDTHS * peak.half_width)
@@ -232,7 +238,7 @@ class _Comparison:
         if surely >= least:
             return deepest, None
         missing = _mode_of(peak, float(f[line]), deepest - float(explained[line]))
-        is_within = bool(surely >= np.min((explained - self.error)[around]))
+        is_within = bool(surely >= np.min(explained[around] - _model_error(f[around], self.modes)))
         return deepest, UnexplainedPeak(peak.frequency, deepest, least, is_within, missing)
 
 

@@ -295,12 +295,21 @@ class Machine(toml.TomlTable, frozen=True):
         tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
         return tables | {program.name: program for program in self.program}
 
+    def _tool_body(self, tool: ToolTable) -> tuple[Any, ...] | None:
+        """Return all settings behind the compliance of a tool; None if it is unknown."""
+        stick_out = self.tap.conditions(tool.name).stick_out_mm or tool.stick_out_mm
+        if stick_out is None or tool.tool_material is None:
+            return None
+        programs = [(cut.tool_diameter_mm, cut.flute_length_mm) for cut in self.program if cut.tool == tool.name]
+        return tool.name, tool.tool_material, tool.diameter_mm, tool.flute_length_mm, stick_out, programs
+
     @property
     def settings_hash(self) -> str:
         """SHA-256 of all settings that decide the results of a tap test, except verdicts."""
         tools = [(tool.name, tool.segments, tool.masses) for tool in self.modelled_tools]
         tap = self.tap.tool, self.tap.position_mm, self.tap.sensor
-        settings = ("questions, K against the model", self.mode, self.spindle, tools, *tap)
+        bodies = [*filter(None, map(self._tool_body, self.tool))]
+        settings = ("questions, K against the model", self.mode, self.spindle, tools, *tap, *bodies)
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 

@@ -26,6 +26,8 @@ from acquisition import (
     estimate_frf,
     evaluate_hit,
 )
+from acquisition.hit_quality.double_hit import find_force_hole
+from acquisition.hits.force_window import window_force
 
 RATE = 25600.0
 NOTHING = 1e-32
@@ -85,6 +87,25 @@ def test_a_hole_counts_up_to_the_end_of_the_required_band() -> None:
     assert int(told[1]) == pytest.approx(250, rel=0.01)
     assert evaluate_hit(double, band=(20.0, 220.0)).flags == HitFlags.OK
     assert evaluate_hit(double, band=(20.0, 260.0)).flags == HitFlags.DOUBLE_HIT
+
+
+@pytest.mark.parametrize("delay", [2e-3, 20e-3, 150e-3])
+def test_touches_of_nearly_one_size_cancel_first_at_half_a_turn(delay: float) -> None:
+    """The least power over the largest is ((1 - r) / (1 + r))^2 of two touches of sizes 1 and r."""
+    for ratio, is_deep in ((0.85, True), (0.5, False)):
+        double = hit((200, 0, 0.6e-3), (200 * ratio, delay, 0.6e-3), noise=0.01)
+        hole = find_force_hole(window_force(double), RATE, 2000.0)
+        assert hole == (pytest.approx(1 / (2 * delay), rel=0.05) if is_deep else None)
+
+
+@pytest.mark.parametrize("delay", [20e-3, 150e-3])
+def test_holes_of_touches_far_apart_begin_where_the_pulse_is_low_enough(delay: float) -> None:
+    """Of sizes 1 and 0.7 where the spectrum P of the pulse is (1.7 / 0.3) / 10 of its largest value."""
+    pulse = np.sin(np.pi * np.arange(0, 0.6e-3, 1e-6) / 0.6e-3) ** 4
+    size = np.abs(np.fft.rfft(pulse, 1_000_000)) / np.sum(pulse)  # one line per Hz
+    begin = int(np.argmax(size < 0.17 / 0.3))
+    hole = find_force_hole(window_force(hit((200, 0, 0.6e-3), (140, delay, 0.6e-3), noise=0.01)), RATE, 1e4)
+    assert hole == pytest.approx(begin, abs=1 / delay + 0.02 * begin)
 
 
 def test_two_peaks_in_one_pulse_leave_a_hole() -> None:

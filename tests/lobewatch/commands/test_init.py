@@ -165,7 +165,7 @@ def test_from_an_empty_folder_to_a_verdict_on_a_tapped_tool_in_three_commands(
             for answer in ("", "3000 24000", "-", device.port, "0 glue", "4 20 0", "1400 500", "slot: 16000 0.2 20"):
                 person.answer(answer)
             assert person.end() == 0
-        with Terminal(tmp_path, "tap", "mill-3") as person:
+        with Terminal(tmp_path, "tap", "mill-3", "--accept", "same-direction") as person:
             person.wait_for("MOVE SENSOR")
             person.wait_for("y tap y")
             person.type("\n")

@@ -178,7 +178,7 @@ def test_one_program_has_one_verdict_in_every_place(
 ) -> None:
     shop.put(program)
     shop.tap(0, 1541.74)
-    shop.tap(0.1, 1544.0, "y")
+    shop.tap(0.1, 1541.74, "y")
     logbook = Logbook.open(path)
     assembly = logbook.assembly()
     (name,) = (table.name for table in logbook.machine.program)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,7 +19,9 @@ from acquisition.source import DeviceIdentity
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import exclude_entry, store_mass_check
-from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
+from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable
+from lobewatch.measurement.sensor_models import fits_sensor_models
 from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
 from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
 from lobewatch.tap.tap_in_progress import average_hits
@@ -27,7 +30,7 @@ from modal import Mode
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
-RATE, SAMPLES, PRE_TRIGGER, WIDTH = 10240.0, 4096, 100, 6e-4
+RATE, SAMPLES, PRE_TRIGGER, WIDTH = 10240.0, 2048, 100, 6e-4
 FORCE, ACCELERATION = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
 SENSORS = FORCE, ACCELERATION
 DAQ = "board, serial number 1234, firmware 1.0"
@@ -142,9 +145,7 @@ def test_a_sensitivity_that_is_wrong_from_the_first_test_on_is_never_stable(plai
 @pytest.mark.parametrize(
     ("sensors", "device"),
     [
-        (entered(1.01), DAQ),
-        ((replace(FORCE, sensitivity=2.3e-3), ACCELERATION), DAQ),
-        ((FORCE, replace(ACCELERATION, full_scale=5.4)), DAQ),
+        ((replace(FORCE, sensitivity=2.3e-3), replace(ACCELERATION, full_scale=5.4)), DAQ),
         (SENSORS, "board, serial number 1235, firmware 1.0"),
     ],
 )
@@ -156,6 +157,15 @@ def test_a_change_of_the_chain_ends_the_check(plain: Shop, sensors: Sequence[Cha
     assert sorted(map(str, evidence(plain))) == ["None", "mass-check"]
     (remark,) = verdict(plain).assembly.unchecked  # type: ignore[union-attr]
     assert remark.about == "direction x"
+
+
+@pytest.mark.parametrize("name", SensorChain.__struct_fields__)
+def test_a_check_counts_for_its_own_chain_only(name: str) -> None:
+    chain = SensorChain("1234", 2.25e-3, 1.02e-3, 5.0, 5.0)
+    other = msgspec.structs.replace(chain, **{name: "1235" if name == "daq" else 1.001 * getattr(chain, name)})
+    check = MassCheckEntry("m1", DAY, 1.2, 1.0, 0.001, True, chain)
+    assert find_deciding_check(chain, DAY, [check]) is check
+    assert find_deciding_check(other, DAY, [check]) is None
 
 
 def test_a_check_that_fails_marks_the_tests_since_the_last_good_one(plain: Shop) -> None:
@@ -224,7 +234,7 @@ def test_a_stiffness_that_agrees_with_the_model_serves_instead_of_a_mass(
     assert evidence(shop) == [found, found]
 
 
-@pytest.mark.parametrize(("share", "found"), [(1.0, "other-tool"), (3.0, None), (1 / 3, None)])
+@pytest.mark.parametrize(("share", "found"), [(1.0, "other-tool"), (3.0, None)])
 def test_another_tool_that_agrees_with_its_drawing_on_the_same_day_serves_instead(
     plain: Shop, share: float, found: str | None
 ) -> None:
@@ -264,46 +274,57 @@ def test_a_tip_that_is_as_compliant_as_its_tool_serves_instead(plain: Shop) -> N
     assert found == [["tool-geometry"] * 2, [None] * 2, [None] * 2]
 
 
-CHANNELS = """
+INPUT = """
 [[daq.channel]]
-input = 0
-quantity = "force"
-model = "086C03"
-sensitivity_mv_per_n = 2.25
+input = {table.input}
+quantity = "{table.quantity}"
+model = "{table.model}"
 range_v = 5
-gain = {gain}
-[[daq.channel]]
-input = 1
-quantity = "acceleration"
-model = "{model}"
-sensitivity_mv_per_g = {sensitivity}
-range_v = 5
+{key}
 """
 
 
+def input_table(quantity: Any, model: str, sensitivity: float, gain: float = 1.0) -> ChannelTable:
+    key = "sensitivity_mv_per_n" if quantity == "force" else "sensitivity_mv_per_g"
+    values: dict[str, Any] = {key: sensitivity, "model": model, "gain": gain}
+    return ChannelTable(0 if quantity == "force" else 1, quantity, 5.0, **values)
+
+
 @pytest.mark.parametrize(
-    ("model", "sensitivity", "gain", "found"),
+    ("model", "sensitivity", "gain", "fits"),
     [
-        ("352A21", 10.4, 1, "sensor-models"),
-        ("352A21", 30.0, 1, None),
-        ("352A21", 3.3, 1, None),
-        ("352A21", 12.0, 1, None),
-        ("352C33", 10.4, 1, None),
-        ("352A21", 10.4, 10, None),
-        ("", 10.4, 1, None),
+        ("352A21", 10.4, 1, True),
+        ("352A21", -10.4, 1, True),
+        ("352A21", 30.0, 1, False),
+        ("352A21", 3.3, 1, False),
+        ("352A21", 12.0, 1, False),
+        ("352C33", 10.4, 1, False),
+        ("352A21", 1.04, 10, False),
+        ("", 10.4, 1, False),
+        ("086C03", 10.4, 1, False),
     ],
 )
-def test_sensitivities_of_the_sensor_models_serve_instead(
-    plain: Shop, model: str, sensitivity: float, gain: int, found: str | None
-) -> None:
+def test_sensitivities_fit_the_models_of_both_sensors(model: str, sensitivity: float, gain: float, fits: bool) -> None:
+    tables = input_table("force", "086C03", 2.3), input_table("acceleration", model, sensitivity, gain)
+    chain = SensorChain.of(DeviceIdentity("board", "1234"), [table.build().channel for table in tables])
+    assert chain is not None
+    assert fits_sensor_models(DaqTable(driver="dataq", channel=tables), chain) is fits
+    other = SensorChain("1234", 3 * chain.force_v_per_n, chain.acceleration_v_per_m_s2, 5.0, 5.0)
+    assert not fits_sensor_models(DaqTable(driver="dataq", channel=tables), other)
+
+
+def test_sensor_models_serve_instead(plain: Shop) -> None:
+    tables = input_table("force", "086C03", 2.25), input_table("acceleration", "352A21", 10.0)
     plain.edit("[daq]", '[daq]\ndriver = "dataq"')
+    keys = "sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_g = 10"
+    text = "".join(INPUT.format(table=table, key=key) for table, key in zip(tables, keys, strict=True))
     with (plain.path / "machine.toml").open("a", encoding="utf-8") as file:
-        file.write(CHANNELS.format(model=model, sensitivity=sensitivity, gain=gain))
-    tap_both(plain, sensors=[table.build().channel for table in plain.folder.machine.daq.channel])
-    assert evidence(plain) == [found, found]
+        file.write(text)
+    tap_both(plain, sensors=[table.build().channel for table in tables])
+    assert evidence(plain) == ["sensor-models"] * 2
 
 
-@pytest.mark.parametrize(("share", "found"), [(1.3, "emulator"), (3.0, None), (1 / 3, None)])
+@pytest.mark.parametrize(("share", "found"), [(1.3, "emulator"), (1 / 3, None)])
 def test_the_check_of_an_emulator_counts_unless_the_model_contradicts(
     shop: Shop, share: float, found: str | None
 ) -> None:

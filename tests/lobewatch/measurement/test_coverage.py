@@ -14,12 +14,13 @@ from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement import Measurement, measure
 from lobewatch.measurement.coverage import UNCOVERED_CODES, describe_uncovered, find_uncovered
+from lobewatch.measurement.tap_measurement import fit_tap, interpret_fit
 from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.verdicts import Stability, advise
 from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import find_stable_pockets, recommend
 from lobewatch.verdicts.verdict import evaluate_program, find_open_question
-from modal import Mode, ModeEdits, synthesize_frf
+from modal import HitChange, HitChangeKind, Mode, ModeEdits, synthesize_frf
 
 LINES = np.arange(1.0, 4000.0, 1.0)
 STRONG, OTHER = Mode(900.0, 0.02, 2e7), Mode(1700.0, 0.03, 4e7)
@@ -154,6 +155,18 @@ def test_a_deep_peak_outside_the_band_hides_none_inside() -> None:
     assert [round(peak.frequency, -2) for peak in found.unexplained] == [2100.0]
     assert [remark.code for remark in found.uncovered] == ["peak-not-explained"]
     assert [remark.about for remark in found.remarks if remark.code == "peak-outside-band"] == ["1100 Hz"]
+
+
+@pytest.mark.parametrize(("share", "codes"), [(0.999, []), (1.001, ["peak-not-explained"])])
+def test_a_peak_within_the_half_width_of_a_change_over_hits_is_not_named_again(share: float, codes: list[str]) -> None:
+    about = Circumstances("m", datetime(2026, 1, 15, tzinfo=UTC), "T", "x")
+    frf = Frf(LINES, synthesize_frf([STRONG, OTHER], LINES).receptance)
+    fit = fit_tap(TapTest("x", about, frf), machine(), DROP)
+    (peak,) = interpret_fit(fit, machine(), None).unexplained
+    missing = HitChange(HitChangeKind.PARTIAL, peak.frequency / (1 + share * 0.02), 0.02, 1e-6, 10, True, (0, 1, 2))
+    found = interpret_fit(replace(fit, changes=(missing,)), machine(), None)
+    assert [remark.code for remark in found.uncovered] == codes
+    assert [one.frequency for one in found.unexplained] == [peak.frequency]
 
 
 def test_the_used_modes_are_those_that_are_compared() -> None:

@@ -19,7 +19,9 @@ from lobewatch.measurement.hit_remarks import (
     HIT_CHANGE_CODES,
     SMALL_CHANGE_CODE,
     drop_explained_remedies,
+    find_changes_in_band,
     find_hit_remarks,
+    select_uncovered_changes,
 )
 from lobewatch.measurement.tap_measurement import measure
 from modal import Mode
@@ -78,6 +80,14 @@ def test_only_a_change_that_moves_limits_keeps_a_verdict_doubtful() -> None:
     assert codes(tap(lambda number, _: 1 - 0.3 * ZETA * number / 9)) == ["hits-drift"]
     assert {*HIT_CHANGE_CODES.values()} <= {*UNCOVERED_CODES}
     assert SMALL_CHANGE_CODE not in UNCOVERED_CODES
+
+
+def test_changes_with_an_uncovered_code_are_selected() -> None:
+    large = find_changes_in_band(tap(lambda number, _: 1 - 0.3 * ZETA * number / 9))
+    small = find_changes_in_band(tap(lambda number, _: 1 - 0.2 * ZETA * number / 9))
+    assert select_uncovered_changes(large) == (*large,) != ()
+    assert small != []
+    assert select_uncovered_changes(small) == ()
 
 
 def test_a_small_change_with_force_is_left_to_the_linearity_check() -> None:

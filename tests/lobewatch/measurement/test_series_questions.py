@@ -174,6 +174,7 @@ def same_direction(change: float, own: list[float], *others: float, error: float
         (3e-5, [], True),
         (-3e-5, [], True),
         (1e-3, [], False),
+        (0.0, [], False),
         (3e-5, [0.013, 0.014, 0.013, 0.0135], True),
         (3e-5, [0.001], False),
         (3e-5, [0.001, -0.0013, 0.0002, -0.0004, 0.002], False),
@@ -255,5 +256,5 @@ def test_a_sensor_left_in_x_is_asked_about_in_a_folder(shop: Shop) -> None:
     shop.put("")
     shop.tap_both(0)
     shop.tap(30, 1713.0)
-    shop.tap(30.1, 1713.0, "y")
+    shop.tap(30.1, 1713.0 * (1 + 2e-5), "y")
     assert questions(shop) == [[], [], [], ["same-direction"]]

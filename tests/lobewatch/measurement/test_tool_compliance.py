@@ -129,6 +129,9 @@ def test_a_tap_test_asks_until_it_is_accepted(shop: Shop, length: int, asked: bo
     tap_id = shop.tap(0, 1713.0)
     codes = [remark.code for remark in shop.logbook.history.rows[-1].questions]
     assert codes == (["tool-compliance"] if asked else [])
+    shop.edit(f"stick_out_mm = {length}", "stick_out_mm = 31")
+    assert not shop.logbook.history.rows[-1].questions
+    shop.edit("stick_out_mm = 31", f"stick_out_mm = {length}")
     if asked:
         shop.folder.accept(tap_id, "tool-compliance")
         assert not shop.logbook.history.rows[-1].questions

@@ -98,7 +98,7 @@ def test_lobes_lists_speeds_without_depths(without_force: Shop) -> None:
     told = run(without_force, "lobes", "--cut", "A")
     assert [pocket["depth_mm"] for pocket in told["pockets"]] == [None] * 3
     assert told["pockets"][1]["speed_rpm"] == pytest.approx(12850, rel=0.01)
-    assert {remark["code"] for remark in told["remarks"]} == {"force-not-measured"}
+    assert {remark["code"] for remark in told["remarks"]} == {"force-not-measured", "same-direction"}
 
 
 def test_no_depth_is_recommended_before_a_cut_and_one_is_within_five(without_force: Shop) -> None:

@@ -6,6 +6,7 @@ import enum
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+_DIFFERS = "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"
 _RINGS = "The last tenth of the response still has {share:.1%} of the rms value of the loudest tenth"
 
 TOUCH_TEXT = "Second force peak {delay:.2g} ms {side} the main peak ({percent:.2g} % of its height)"
@@ -226,8 +227,11 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",
-        "Hit the same spot in the same direction as in the other hits.",
-        {"": "FRF of this hit differs by {distance:.0%} from the mean of {count} hits (limit {limit:.0%})"},
+        "Hit the same spot in the same direction as in the other hits, and check that the accelerometer is fixed.",
+        {
+            "": _DIFFERS,
+            "weaker": f"{_DIFFERS} and has {{share:.0%}} of its magnitude, as with a loose accelerometer",
+        },
         {"mean_distance": 0.3, "noise_ratio": 4.0},
     ),
     HitFlags.UNDONE: HitFault("undone", "The operator removed this hit."),

@@ -109,7 +109,8 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
     findings |= _evaluate_strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
-    findings |= _evaluate_response_level(hit) | _evaluate_touches(hit, band) | _evaluate_decay(hit)
+    missing = _evaluate_response_level(hit)
+    findings |= missing | _evaluate_touches(hit, band) | ({} if missing else _evaluate_decay(hit))
     if HitFlags.DOUBLE_HIT in findings:
         band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
@@ -199,8 +200,23 @@ def evaluate_spectrum(hit: Hit, mean: Frf | None, band: tuple[float, float] | No
         distance, noise = compute_distance_from_mean(frf, mean)
         limit = max(limits["mean_distance"], limits["noise_ratio"] * noise)
         if distance > limit:
-            findings |= _state(HitFlags.INCONSISTENT, distance=distance, count=mean.n_averages, limit=limit)
+            figures = {"distance": distance, "count": mean.n_averages, "limit": limit}
+            share = compare_magnitude(frf, mean)
+            case = "weaker" if share < 1 - limits["mean_distance"] else ""
+            findings |= _state(HitFlags.INCONSISTENT, case, **figures, share=share)
     return findings
+
+
+def compare_magnitude(frf: Frf, mean: Frf) -> float:
+    """Return the share of a mean that an FRF of the same lines has, |sum A conj(B)| / sum |B|^2 of their accelerances.
+
+    The peaks decide, not the noise of receptance at low frequencies.
+    """
+    low, high = frf.usable_band or (0.0, np.inf)
+    lines = (frf.frequency >= low) & (frf.frequency <= high)
+    weight = frf.frequency[lines] ** 2
+    own, other = weight * frf.receptance[lines], weight * mean.receptance[lines]
+    return float(np.abs(np.vdot(other, own)) / max(np.vdot(other, other).real, np.finfo(float).tiny))
 
 
 def compute_distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:

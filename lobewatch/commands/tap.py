@@ -71,22 +71,12 @@ def tap(
 
     folder, finished = _open_folder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
-    is_single = bool(direction or as_json or port.startswith("file:"))
-    asks = screen or (notes.is_terminal and sys.stdin.isatty())
-    is_guided = asks and not is_single
+    asks = (screen or (notes.is_terminal and sys.stdin.isatty())) and not port.startswith("file:")
+    is_guided = asks and not (direction or as_json)
 
     def plan(tool: str, direction: TapDirection) -> TapSession:
-        return plan_session(
-            folder,
-            port=port,
-            tool=tool,
-            direction=direction,
-            operator=operator,
-            resume=not new,
-            accept=accept or (),
-            asks=asks and not port.startswith("file:"),
-            conditions=conditions,
-        )
+        fields = {"port": port, "tool": tool, "direction": direction, "operator": operator}
+        return plan_session(folder, **fields, resume=not new, accept=accept or (), asks=asks, conditions=conditions)
 
     def after(session: TapSession) -> None:
         finished.append(session)

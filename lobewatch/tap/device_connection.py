@@ -101,6 +101,8 @@ def estimate_resting_rms(baseline: Hit, width: int) -> float:
     return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))
 
 
+UNFELT_HIT_RATIO = 30.0
+"""Peak of the response over its rms at rest that only a hit reaches, chosen."""
 BUTTON_BOUNCE_TIME = 0.3
 """Time after a button event in which further presses are bouncing (s)."""
 
@@ -126,6 +128,15 @@ class DeviceConnection:
         steps = np.std(get_newest_codes(self._recent, self.device.sample_rate)[list(self.inputs.rows)], axis=1)
         rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.inputs.channels, strict=True)]
         return rms[0] if len(rms) > 1 else None, rms[-1]
+
+    def is_hit_alone(self, baseline: Hit | None) -> bool:
+        """Return whether the response in the newest block is that of a hit. baseline: record at rest with a force."""
+        if baseline is None or not baseline.has_force:
+            return False
+        channel = self.inputs.channels[-1]
+        response = self._recent[-1][self.inputs.rows[-1]] * channel.scale
+        peak = float(np.max(np.abs(response - np.mean(baseline.acceleration))))
+        return peak > UNFELT_HIT_RATIO * float(np.std(baseline.acceleration))
 
     def record(self, blocks: Iterable[Block], duration: float) -> Hit:
         """Return the next blocks of this duration (s) as one record."""

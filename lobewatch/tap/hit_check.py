@@ -5,13 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition import Circumstances, Hit, HitDecision, HitFlags, HitVerdict, TapTest
+from acquisition import Circumstances, Hit, HitDecision, HitFlags, HitVerdict, TapTest, estimate_frf
 from acquisition.hit_fault import HIT_FAULTS
 from acquisition.hit_quality.decide_hits import average_decided_hits
+from acquisition.hit_quality.evaluate_hit import compare_magnitude
 from acquisition.tap_test import decide_flags
 from lobewatch.tap.self_check import find_quiet_part
 from lobewatch.tap.steady_line import find_steady_line
 
+N_FIRST_HITS = 3
+"""Number of first good hits with which the strength of a response is compared, as in a mean."""
 EXPLAINED_FLAGS = HitFlags.OK | HitFlags.NOT_DECAYED | HitFlags.INCONSISTENT
 """Flags that a steady vibration explains."""
 
@@ -29,6 +32,24 @@ def add_steady_vibration(verdict: HitVerdict, hit: Hit, baseline: Hit | None) ->
     if line is None or line.rms <= fault.limits["rest_ratio"] * float(np.std(baseline.acceleration)):
         return verdict
     return HitVerdict.from_findings({HitFlags.STEADY_VIBRATION: fault.state(finding=line.finding)})
+
+
+def add_loose_sensor(verdict: HitVerdict, hit: Hit, others: Sequence[Hit]) -> HitVerdict:
+    """Return the verdict on a good hit, or INCONSISTENT if the first hits show that its response has become weak.
+
+    others: earlier good hits. A mean follows a response that decreases from hit to hit, the first hits do not. They
+    must agree with each other.
+    """
+    first, limit = others[:N_FIRST_HITS], HIT_FAULTS[HitFlags.INCONSISTENT].limits["mean_distance"]
+    if verdict.flags or len(first) < N_FIRST_HITS or not hit.has_force:
+        return verdict
+    mean = estimate_frf(first)
+    share = compare_magnitude(estimate_frf([hit]), mean)
+    if share >= 1 - limit or any(abs(compare_magnitude(estimate_frf([one]), mean) - 1) > limit / 2 for one in first):
+        return verdict
+    figures = {"distance": 1 - share, "count": len(first), "limit": limit, "share": share}
+    finding = HIT_FAULTS[HitFlags.INCONSISTENT].state("weaker", **figures)
+    return HitVerdict.from_findings({HitFlags.INCONSISTENT: finding})
 
 
 def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:

@@ -34,6 +34,10 @@ from lobewatch.tap.trial_hits import TrialHits, trigger_from_setup
 MIN_VERDICT_TIME = 0.8
 """Time for which a verdict is shown at least (s). The trigger may be armed before."""
 EARLY_HIT_TEXT = "The hit came while the tool still vibrated and does not count. Wait for TAP."
+UNFELT_HIT_TEXT = (
+    "The accelerometer shows a hit, but the force stays below the trigger level of {level:g} N. "
+    "Hit harder, or check the hammer cable."
+)
 LAST_HIT_UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -260,8 +264,12 @@ class TapPhases:
         search = HitSearch(connection.device.channels, connection.device.sample_rate, trigger, connection.direction)
         n_early = 0
         for block in self._blocks(connection):
-            yield from search.feed(block)
+            was_armed, n_hits = search.armed, 0
+            for n_hits, hit in enumerate(search.feed(block), 1):  # noqa: B007 - their number counts below
+                yield hit
             yield None
+            if was_armed and not n_hits and not search.recording and connection.is_hit_alone(self._tap.baseline):
+                self._publisher.show(reason=UNFELT_HIT_TEXT.format(level=trigger.level))
             if search.too_early > n_early:
                 n_early = search.too_early
                 self._publisher.show(reason=EARLY_HIT_TEXT)

@@ -25,7 +25,7 @@ def refuse_wrong_rate(tap: TapInProgress, device: Device, stream: StreamRate, *,
     error = f"every frequency would be {abs(percent):.2g} % too {'high' if percent > 0 else 'low'}"
     rates = f"the DAQ sampled at {found.rate:.2f} ± {found.std:.2f} Hz in this test, not {stream.sample_rate:g} Hz"
     kept = "The test is not saved, but its hits are kept"
-    cure = f"Run lobewatch sensors {tap.folder.path} to measure the sample rate again, then repeat the command"
+    cure = "Measure the sample rate again with acquisition.measure_rate, then repeat the command"
     raise DataError(join_sentences(f"{rates}, so {error}", kept, cure))
 
 

@@ -136,16 +136,17 @@ def _check_response_noise(rms: float, channel: Channel) -> Check:
 
 def _check_hum(baseline: Hit) -> Check:
     """Check for mains lines in each channel."""
-    texts = []
+    texts = dict[str, str]()
     for channel, signal, unit in _list_signals(baseline):
         frequency, power = compute_power_spectrum(signal, baseline.sample_rate)
         hum, mains = measure_hum(frequency, power)
         if hum**2 > MIN_LINE_POWER_SHARE * np.sum(power) and hum > MIN_LINE_CODES * abs(channel.scale):
-            texts.append(f"{hum:.2g} {unit} rms at {mains:g} Hz and harmonics in the {channel.quantity} signal")
-    if texts:
-        cure = "Check that the spindle stands still, then check cable shields and grounding"
-        return Check("hum", False, join_sentences(", ".join(texts), cure))
-    return Check("hum", True, "no mains hum")
+            name = channel.quantity
+            texts[name] = f"{hum:.2g} {unit} rms at {mains:g} Hz and harmonics in the {name} signal"
+    if not texts:
+        return Check("hum", True, "no mains hum")
+    still = "Check that the spindle stands still" if "acceleration" in texts else ""
+    return Check("hum", False, join_sentences(", ".join(texts.values()), still, "Check cable shields and grounding"))
 
 
 def _check_spindle(baseline: Hit) -> Check:

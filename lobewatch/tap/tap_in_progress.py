@@ -35,7 +35,7 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
 from lobewatch.machine.journal.entries import read_hit_decisions
 from lobewatch.tap import spool
-from lobewatch.tap.hit_check import add_steady_vibration, average_hits, evaluate_safely, format_peak
+from lobewatch.tap.hit_check import add_loose_sensor, add_steady_vibration, average_hits, evaluate_safely, format_peak
 from lobewatch.tap.kept_rate import correct_rate, find_kept_rate
 from lobewatch.tap.spool import SpooledHit
 from lobewatch.tap.state import ListedHit
@@ -229,7 +229,7 @@ class TapInProgress:
         elif mean is not None and len(references) < len(self.mean.hits):
             mean = acquisition.estimate_frf(references)
         verdict = evaluate_hit(hit, mean, self.folder.machine.mode.band_hz)
-        verdict = add_steady_vibration(verdict, hit, self.baseline)
+        verdict = add_loose_sensor(add_steady_vibration(verdict, hit, self.baseline), hit, references)
         if not verdict.flags:
             self.mean.add(hit)
         return verdict

@@ -99,8 +99,8 @@ radial_n_per_mm2 = {radial:.0f}
 speed_rpm = {speed:.0f}
 depth_mm = {depth:.4f}
 """
-PROGRAMS = {"half": (0, 0.5), "just": (0, 1.03), "above": (1, 1.3)}
-"""Programs: number of the speed, and depth over the true limit there."""
+PROGRAMS = {"half": 0.5, "just": 1.03}
+"""Programs and their depths over the true limit."""
 FEED_ANGLES = np.pi * np.arange(12) / 12
 
 
@@ -224,8 +224,8 @@ class Workshop:
         self.operators = 0.5 * self.stiffness_std * rng.standard_normal(3)
         self.drop = rng.uniform(0, 0.002)
         make_machine_folder(self.path, "new_machine.toml")
-        self.cut, self.speeds = self._draw_cut(), np.exp(rng.uniform(np.log(2500), np.log(20000), 2))
-        self.write(programs=False)
+        self.cut, self.speed = self._draw_cut(), float(np.exp(rng.uniform(np.log(2500), np.log(20000))))
+        self.write()
 
     def _draw_cut(self) -> Cut:
         tangential = self.rng.uniform(500e6, 2200e6)
@@ -257,11 +257,8 @@ class Workshop:
         limits = program_limit(program, modes_of(truth.x), modes_of(truth.y), cuts).limits
         return float(min(*limits, 20e-3))
 
-    def write(self, *, programs: bool = True) -> None:
-        """Write machine.toml.
-
-        programs: with those at shares of their true limits. Without them, the history computes no verdicts.
-        """
+    def write(self, *programs: str) -> None:
+        """Write machine.toml with some of PROGRAMS. Without them, the history computes no verdicts."""
         diameter = 1e3 * self.truth.beam.diameter
         cut = {
             "teeth": self.cut.teeth,
@@ -274,10 +271,9 @@ class Workshop:
         if self.knows_tool:
             text += TOOL.format(diameter=diameter, stick_out=1e3 * self.truth.beam.stick_out)
         more = {"radial_depth": self.cut.immersion * cut["diameter"], "direction": self.cut.direction}
-        for name, (number, share) in PROGRAMS.items() if programs else ():
-            speed = float(self.speeds[number])
-            depth = 1e3 * share * self.limit(self.truth, speed)
-            text += PROGRAM.format(**cut, **more, name=name, speed=speed, depth=depth)
+        for name in programs:
+            depth = 1e3 * PROGRAMS[name] * self.limit(self.truth, self.speed)
+            text += PROGRAM.format(**cut, **more, name=name, speed=self.speed, depth=depth)
         (self.path / "machine.toml").write_text(text, "utf-8")
 
     def tap_both(self, wrong: Wrong = RIGHT, only: str = "xy") -> frozenset[str]:
@@ -360,7 +356,7 @@ def choose_hammering(structure: Structure, shop: Workshop, wrong: Wrong) -> Hamm
     peak = float(np.max(np.abs(structure.response(seconds, 0.65e-3))))
     high = 0.35 * min(force, acceleration / peak) / max(1.0, *wrong.gains)
     widths, noise = (0.85 * wrong.width, 1.15 * wrong.width), (2e-4 * high, 2e-4 * high * peak)
-    return Hammering((0.5 * high, high), widths, force_noise=noise[0], response_noise=noise[1])
+    return Hammering((0.5 * high, high), widths, overloads=0.0, force_noise=noise[0], response_noise=noise[1])
 
 
 def run_session(session: TapSession, path: Path) -> Tapped:
@@ -408,7 +404,7 @@ def ask(shop: Workshop, now: datetime) -> Said:
     """Return what `check` and `status` say at a time."""
     logbook = Logbook.open(shop.path, now)
     verdicts, status = logbook.verdicts(), logbook.status(now)
-    stable = frozenset(PROGRAMS[v.program.name][1] for v in verdicts if v.stability is Stability.STABLE)
+    stable = frozenset(PROGRAMS[v.program.name] for v in verdicts if v.stability is Stability.STABLE)
     check = frozenset(remark.code for verdict in verdicts for remark in verdict.remarks)
     reasons = frozenset(remark.code for remark in (*status.remarks, *logbook.remarks))
     return Said(check, reasons, stable, str(status.status))

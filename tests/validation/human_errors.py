@@ -211,7 +211,7 @@ def sensor_falls(shop: Workshop) -> Codes:
 
 def sensor_left(shop: Workshop) -> Codes:
     """Measure y with sensor and hammer left in x."""
-    return shop.tap_both(only="x") | shop.tap("y", Wrong(structure=shop.truth.x)).codes
+    return tap_structures(shop, shop.truth.x, shop.truth.x)
 
 
 def directions_exchanged(shop: Workshop) -> Codes:
@@ -340,7 +340,7 @@ def codes(*names: str) -> Codes:
 CHAIN = codes("chain-not-checked", "tool-compliance", "stiffness-off-model", "wrong-unit", "direction-stiffness")
 TOOL = codes("stiffness-jump", "frequency-jump", "no-mode-to-follow", "tool-compliance", "no-mode-in-band")
 TURNING = codes("refused:spindle-turning", "hit:steady-vibration")
-SETTING = codes("setting-not-plausible", "settings-contradict")
+SETTING = codes("setting-not-plausible", "settings-contradict", "not-checked")
 NO_RESPONSE = codes("hit:no-response", "check:acceleration sensor", "hit:missing-response")
 ERRORS = {
     "gain changed at once": HumanError(gain_at_once, codes("stiffness-jump")),
@@ -350,7 +350,7 @@ ERRORS = {
     "first tests, mV/g entered as mV/(m/s^2)": HumanError(accelerometer_unit_wrong, CHAIN, 0),
     "first tests, mV/lbf entered as mV/N": HumanError(hammer_unit_wrong, CHAIN, 0),
     "mass check with a wrong mass": HumanError(wrong_mass, codes("chain-not-checked")),
-    "channels swapped": HumanError(swap_channels, codes("hit:swapped", "check:force sensor")),
+    "channels swapped": HumanError(swap_channels, codes("hit:swapped-channels", "hit:swapped channels")),
     "sample rate off by 0.3 to 8 %": HumanError(rate_off, codes("refused:rate", "rate-not-verified")),
     "spindle turns from the start": HumanError(spindle_turns, TURNING),
     "spindle turns after the first hits": HumanError(spindle_starts, TURNING),
@@ -364,7 +364,7 @@ ERRORS = {
     "longer tool under the old name": HumanError(longer_tool, TOOL),
     "another tool under the old name": HumanError(wrong_tool_name, TOOL),
     "same tool in another machine": HumanError(wrong_folder, TOOL),
-    "newest test 7 to 16 months old": HumanError(old_test, codes("tap-old", "tap-too-old")),
+    "newest test 7 to 16 months old": HumanError(old_test, codes("tap-old", "tap-too-old", "overdue")),
     "folder copied": HumanError(copied_folder, codes("folder-copied")),
     "soft tip": HumanError(soft_tip, codes("other-band", "no-mode-in-band", "no-mode-to-follow", "modes-incomplete")),
     "hits away from the tip": HumanError(other_point, codes("stiffness-jump", "tool-compliance")),
@@ -397,7 +397,7 @@ def commit(error: HumanError, shop: Workshop, path: Path, seed: int) -> Seen:
     """Make an error on a copy of a machine, and ask a day after its last test."""
     other = shop.copy(path / "m", seed)
     found = error.make(other)
-    other.write()
+    other.write("just")
     return Seen(found, ask(other, other.time - timedelta(days=29)))
 
 
@@ -406,7 +406,7 @@ def measure(kinds: dict[str, HumanError], count: int, path: Path) -> dict[str, C
     counts = {name: Count() for name in kinds}
     for earlier in {error.earlier for error in kinds.values()}:
         for number, shop in enumerate(machines(count, path, earlier)):
-            before = commit(HumanError(lambda _: frozenset(), codes()), shop, path / f"{earlier}-{number}-none", number)
+            before = commit(HumanError(Workshop.tap_both, codes()), shop, path / f"{earlier}-{number}-none", number)
             for place, (name, error) in enumerate(kinds.items()):
                 if error.earlier == earlier:
                     seen = commit(error, shop, path / f"{earlier}-{number}-{place}", 1000 * number + place)
@@ -422,4 +422,3 @@ def add(count: Count, error: HumanError, seen: Seen, before: Seen) -> None:
     count.false_stable += seen.is_false
     count.silent_and_false += is_silent and seen.is_false
     count.said.update(seen.codes - before.codes)
-    count.said.update({"half stays stable"} if 0.5 in seen.said.stable else ())

@@ -63,7 +63,7 @@ def plain(state: TapState, width: int = 100) -> str:
 
 CHOICES = Choice("y", "tap y"), Choice("tool", "next tool"), Choice("done", "done")
 KEYS = "y tap y   n next tool   q done   m mute"
-SYMBOLS = dict(zip(TapStep, ("…", "▼", "…", "✓", "✗", "!", "⟳", "■", "✗"), strict=True))
+SYMBOLS = dict(zip(TapStep, ("?", "…", "▼", "…", "✓", "✗", "!", "⟳", "■", "✗"), strict=True))
 
 
 @pytest.mark.parametrize("word", TapStep)

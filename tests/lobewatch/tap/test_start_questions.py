@@ -1,0 +1,144 @@
+"""Turning spindle, broken cables and a loose sensor in a tap test, and the questions to the person with the hammer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition import DataError, HammeredStructure, Hammering, HitFlags, SensorInput
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.measurement.recording_questions import SPINDLE_TURNING
+from lobewatch.tap.emulated_faults import SOFT_TIP_WIDTH, EmulatedFault, EmulatedFaults
+from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, build_structure
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.state import TapState, TapStep
+from tests.lobewatch.tap.conftest import RATE, Simulated
+
+INPUTS = tuple(SensorInput(number, channel) for number, channel in enumerate(EMULATED_CHANNELS))
+Watch = Callable[[TapState], None]
+
+
+class Chain(Simulated):
+    """Device that says it follows the clock, on the spindle of a machine, with faults until a time (s)."""
+
+    follows_clock = True
+
+    def __init__(self, folder: MachineFolder, faults: EmulatedFaults, end: float = np.inf) -> None:
+        spindle, scan = folder.machine.spindle, 0
+        assert spindle is not None
+        structure = build_structure(spindle.build(), spindle.damping_ratio)
+        widths = SOFT_TIP_WIDTH if faults.kind is EmulatedFault.SOFT_TIP else Hammering().width_range
+        hitting = Hammering(width_range=widths, double_hits=0.0, overloads=0.0)
+        signal = HammeredStructure(structure, RATE, np.random.default_rng(1), hitting)
+        disturbed = faults.apply(signal, INPUTS, RATE)
+
+        def sampled(_: int, n_scans: int) -> Any:
+            """Go on where the last stream has ended."""
+            nonlocal scan
+            scan += n_scans
+            return (disturbed if scan < end * RATE else signal)(scan - n_scans, n_scans)
+
+        super().__init__(sampled, EMULATED_CHANNELS)  # type: ignore[arg-type]
+
+
+def run(session: Any, *watches: Watch, until: Callable[[TapState], object]) -> None:
+    """Run a session until its state is as wanted."""
+
+    def follow() -> None:
+        for watch in watches:
+            watch(session.state)
+        if until(session.state):
+            session.stop()
+
+    session.wakes.add(follow)
+    with pytest.raises(TapStopped):
+        session.run()
+
+
+@pytest.mark.parametrize("rpm", [3000.0, 3600.0, 12_000.0, 13_020.0])
+def test_no_hit_counts_while_the_spindle_turns(
+    folder: MachineFolder, session_of: Callable[..., Any], rpm: float
+) -> None:
+    session = session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=rpm)))
+    with pytest.raises(DataError, match=SPINDLE_TURNING.code) as error:
+        session.run()
+    assert "rpm" in str(error.value)
+    assert ("mains hum" in str(error.value)) == (rpm != 13_020.0)
+    assert (session.state.hits, folder.taps()) == ((), [])
+
+
+def test_weak_hum_only_warns(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
+    session = session_of(folder, lambda: Chain(folder, EmulatedFaults(EmulatedFault.MAINS_HUM)))
+    run(session, until=lambda state: state.good)
+    assert {check.name for check in session.state.checks if not check.passed} >= {"hum"}
+
+
+def test_an_accepted_line_is_kept_in_the_journal(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
+    session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=3000)), accept=[SPINDLE_TURNING.code]).run()
+    (entry,) = MachineFolder(folder.path).taps()
+    assert SPINDLE_TURNING.code in entry.asked
+    assert SPINDLE_TURNING.code in entry.accepted
+
+
+@pytest.mark.parametrize("rpm", [0.0, 12_000.0])
+def test_a_person_confirms_tool_and_spindle_once(
+    folder: MachineFolder, session_of: Callable[..., Any], rpm: float
+) -> None:
+    asked: list[str] = []
+
+    def answer(state: TapState) -> None:
+        if state.word is TapStep.ASK and state.choices and state.reason not in asked:
+            asked.append(state.reason)
+            session.choose(state.choices[0].key)
+
+    session = session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=rpm)), asks=True)
+    run(session, answer, until=lambda state: state.good)
+    assert len(asked) == 1 + bool(rpm)
+    assert "reference" in asked[0]
+    assert session.questions.accepted == [SPINDLE_TURNING.code] * bool(rpm)
+    assert (session.state.choices, session.questions.is_confirmed) == ((), True)
+
+
+def test_the_test_goes_on_once_the_spindle_is_stopped(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
+    shown: list[TapStep] = []
+    session = session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=12_000), end=3.0), asks=True)
+    session.questions.is_confirmed = True
+    run(session, lambda state: shown.append(state.word), until=lambda state: state.good)
+    assert TapStep.ASK in shown
+    assert (session.questions.asked, session.questions.accepted) == ([], [])
+
+
+def test_an_answer_that_nobody_asked_for_is_rejected(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
+    with pytest.raises(ValueError, match="start"):
+        session_of(folder, lambda: Chain(folder, EmulatedFaults())).choose("start")
+
+
+@pytest.mark.parametrize(
+    ("faults", "flag"),
+    [
+        (EmulatedFaults(turning_rpm=3000, begin=3.0), HitFlags.STEADY_VIBRATION),
+        (EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION),
+        (EmulatedFaults(EmulatedFault.RESPONSE_CABLE, begin=3.0), HitFlags.NO_RESPONSE),
+        (EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE),
+        (EmulatedFaults(EmulatedFault.SATURATED, begin=3.0), HitFlags.NO_RESPONSE),
+        (EmulatedFaults(EmulatedFault.SWAPPED, begin=3.0), HitFlags.SWAPPED_CHANNELS),
+        (EmulatedFaults(EmulatedFault.SOFT_TIP), HitFlags.NARROW_BAND),
+        (EmulatedFaults(EmulatedFault.FALLING_SENSOR, begin=3.0), HitFlags.INCONSISTENT),
+    ],
+)
+def test_a_fault_of_the_chain_rejects_hits_with_its_cause(
+    folder: MachineFolder, session_of: Callable[..., Any], faults: EmulatedFaults, flag: HitFlags
+) -> None:
+    session = session_of(folder, lambda: Chain(folder, faults))
+    run(session, until=lambda state: sum(bool(hit.flags) for hit in state.hits) == 2)
+    assert {hit.flags for hit in session.state.hits} <= {HitFlags.OK, flag}
+
+
+def test_a_hit_that_the_hammer_does_not_show_is_named(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
+    session = session_of(folder, lambda: Chain(folder, EmulatedFaults(EmulatedFault.FORCE_CABLE)))
+    run(session, until=lambda state: "hammer cable" in state.reason)
+    assert "20 N" in session.state.reason
+    assert session.state.hits == ()

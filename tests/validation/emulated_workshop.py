@@ -6,8 +6,8 @@ import math
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -38,7 +38,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.measurement.tool_compliance import ToolBeam
 from lobewatch.tap.emulated_mass import build_hung_mass
-from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.hit_loop import UNFELT_HIT_TEXT, TapStopped
 from lobewatch.tap.kept_rate import RATE_FILE_NAME
 from lobewatch.tap.mass_check import measure_mass, store_mass_result
 from lobewatch.tap.session import TapSession
@@ -58,6 +58,8 @@ PATIENCE = 40.0
 """Time after which an operator without enough good hits gives up (s of the signal)."""
 MAX_REJECTED = 10
 """Rejected hits after which the operator gives up."""
+ACCELEROMETERS = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1.02e-3, 2.5e-3, 5e-3, 1.02e-2)
+"""Sensitivities of accelerometers (V per m/s^2)."""
 TOML = """
 [machine]
 name = "m"
@@ -219,8 +221,7 @@ class Workshop:
         """Draw the machine and make its folder."""
         rng = self.rng
         self.truth = random_truth(rng)
-        force, acceleration = rng.choice([2.25e-3, 1.1e-2]), rng.choice([5e-4, 1.02e-3, 2.5e-3])
-        self.channels = Channel("force", force, 5.0), Channel("acceleration", acceleration, 5.0)
+        self.channels = choose_sensors(self.truth.x, rng)
         self.operators = 0.5 * self.stiffness_std * rng.standard_normal(3)
         self.drop = rng.uniform(0, 0.002)
         make_machine_folder(self.path, "new_machine.toml")
@@ -349,13 +350,26 @@ def serve(shop: Workshop, structure: Structure, wrong: Wrong) -> Iterator[tuple[
         requested.release()
 
 
+def choose_sensors(structure: Structure, rng: np.random.Generator) -> tuple[Channel, Channel]:
+    """Choose a hammer and an accelerometer whose range fits hits of a third of the range of the hammer."""
+    hammer = Channel("force", float(rng.choice([2.25e-3, 1.1e-2, 2.3e-2])), 5.0)
+    peak = 0.35 * hammer.full_scale / hammer.sensitivity * peak_response(structure)
+    sizes = [size for size in ACCELEROMETERS if 0.5 * 5.0 / size >= peak]
+    return hammer, Channel("acceleration", max(sizes, default=min(ACCELEROMETERS)), 5.0)
+
+
+def peak_response(structure: Structure) -> float:
+    """Return the largest acceleration after a pulse of 1 N (m/s^2)."""
+    return float(np.max(np.abs(structure.response(np.arange(2000) / RATE, 0.65e-3))))
+
+
 def choose_hammering(structure: Structure, shop: Workshop, wrong: Wrong) -> Hammering:
     """Return hits that use a third of the range of both sensors at most."""
-    seconds = np.arange(2000) / RATE
     force, acceleration = (channel.full_scale / channel.sensitivity for channel in shop.channels)
-    peak = float(np.max(np.abs(structure.response(seconds, 0.65e-3))))
-    high = 0.35 * min(force, acceleration / peak) / max(1.0, *wrong.gains)
-    widths, noise = (0.85 * wrong.width, 1.15 * wrong.width), (2e-4 * high, 2e-4 * high * peak)
+    peak = peak_response(structure)
+    high = 0.35 * min(force, 2 * acceleration / peak) / max(1.0, *wrong.gains)
+    widths, steps = (0.85 * wrong.width, 1.15 * wrong.width), [abs(channel.scale) for channel in shop.channels]
+    noise = max(2e-4 * high, steps[0]), max(2e-4 * high * peak, steps[1])
     return Hammering((0.5 * high, high), widths, overloads=0.0, force_noise=noise[0], response_noise=noise[1])
 
 
@@ -366,6 +380,7 @@ def run_session(session: TapSession, path: Path) -> Tapped:
 
     def watch(state: TapState) -> None:
         nonlocal n_rejected
+        seen.update({"screen:unfelt-hit"} if state.reason.startswith(UNFELT_HIT_TEXT.partition("{")[0]) else ())
         n_rejected += state.word is TapStep.REFUSED and state.trial
         seen.update(f"check:{check.name}" for check in state.checks if not check.passed)
         rejected = [code for hit in state.hits for code in hit.flags.codes]

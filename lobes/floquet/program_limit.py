@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lobes.cut import CHECKED_DEPTH_SHARES, Cut, Program
-from lobes.floquet.crossings import converged_crossings
-from lobes.floquet.milling_rows import MillingRows, rows_at_speeds
+from lobes.floquet.crossings import converged_crossings, estimate_limits
+from lobes.floquet.milling_rows import MillingRows, join_rows, rows_at_speeds
 from lobes.floquet.multipliers import growth_rate
 from lobes.floquet.stability_boundary import chatter_at_limits
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import MethodName
 from lobes.tip_response import TipModes
+from modal.arrays import Floats
 
 MAX_PROGRAM_DEPTH_RATIO = 20.0
 """Largest searched limit over the depth of the program."""
@@ -81,7 +83,7 @@ def program_limit(
     (limit, crossing), number = np.empty((2, len(cuts))), np.empty(len(cuts), dtype=np.int64)
     for places in group_by_engagement(cuts):
         rows = _program_rows(system, program, [cuts[place] for place in places])
-        crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth)
+        crossings, number[places] = converged_crossings(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth, first_only=True)
         crossing[places] = crossings[:, 0]
         depths = np.broadcast_to(program.depth * np.array(CHECKED_DEPTH_SHARES), (len(rows), len(CHECKED_DEPTH_SHARES)))
         unstable = np.any(growth_rate(rows, depths, number[places]) >= 0, axis=1)
@@ -100,6 +102,23 @@ def program_limit(
         cut=cuts[worst],
         limits=tuple(limit.tolist()),
     )
+
+
+def estimate_program_limits(
+    program: Program, x: TipModes, y: TipModes, cuts: Sequence[Cut], vectors: Sequence[ArrayLike]
+) -> Floats:
+    """Estimate the limits (m) of a program for each of several directions of the modes, in the worst of its cuts.
+
+    They are those of `program_limit` within `ESTIMATE_ACCURACY`, but for slowly converging cuts. vectors: directions of
+    the modes of x, then of y, shape (n, 2) each. Returns shape (vectors,).
+    """
+    systems, limit = [build_milling_system(x, y, each) for each in vectors], np.full(len(vectors), np.inf)
+    for places in group_by_engagement(cuts):
+        alike = [cuts[place] for place in places]
+        rows = reduce(join_rows, (_program_rows(system, program, alike) for system in systems))
+        found = estimate_limits(rows, MAX_PROGRAM_DEPTH_RATIO * program.depth).reshape(len(systems), -1)
+        limit = np.minimum(limit, np.min(found, axis=1))
+    return limit
 
 
 def group_by_engagement(cuts: Sequence[Cut]) -> list[list[int]]:

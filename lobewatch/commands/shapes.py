@@ -36,7 +36,7 @@ def shapes(
     """
     from lobewatch.measurement import measure_folder_shapes
     from lobewatch.show.figures.shape_animation import save_shape_animation
-    from lobewatch.show.modes import folder_shapes_json, folder_shapes_texts
+    from lobewatch.show.shapes import folder_shapes_json, folder_shapes_texts
 
     description = file_options.description()
     found = measure_folder_shapes(folder, band, description)

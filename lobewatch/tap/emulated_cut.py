@@ -34,6 +34,8 @@ DEFAULT_FEED_SHARE = 5e-3
 """Feed per tooth over diameter if machine.toml does not state it, chosen."""
 DEFAULT_EDGE_COEFFICIENTS = (25e3, 35e3)
 """Tangential and radial edge coefficients (N/m) if unknown, about those of aluminium."""
+HIDDEN_FREQUENCY_FACTOR = (0.985, 0.02)
+"""Mean and standard deviation of natural frequencies at speed over those not rotating; chosen."""
 MIN_HIDDEN_FACTOR = 0.3
 """Smallest random factor as a share of its median, chosen."""
 MAX_SPEED_DEVIATION = 0.015
@@ -169,7 +171,7 @@ def _find_true_limit(cut: MillingCut, setting: CutSetting) -> float:
 def draw_hidden_truth(seed: int) -> HiddenTruth:
     """Draw the hidden truth of a seed, the same for every cut. Modes in x and y differ independently."""
     random = np.random.default_rng([seed, 1])
-    priors = rotating.ROTATING_FREQUENCY_FACTOR, rotating.ROTATING_DAMPING_FACTOR, rotating.ROTATING_STIFFNESS_FACTOR
+    priors = HIDDEN_FREQUENCY_FACTOR, rotating.ROTATING_DAMPING_FACTOR, rotating.ROTATING_STIFFNESS_FACTOR
     x, y = (ModeFactors(*(_draw_factor(random, *prior) for prior in priors)) for _ in range(2))
     tangential = _draw_factor(random, *ROTATING_FORCE_PRIOR)
     return HiddenTruth(x, y, tangential, 1 + random.uniform(-MAX_SPEED_DEVIATION, MAX_SPEED_DEVIATION))

@@ -23,8 +23,8 @@ from lobewatch.tap.device_connection import (
 )
 from lobewatch.tap.hit_check import add_steady_vibration, evaluate_safely
 from lobewatch.tap.live_curves import build_curves
-from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.mass_check import check_mass_entry, store_emulator_check
+from lobewatch.tap.rate_check import check_stream_rate, rate_remarks, refuse_wrong_rate
 from lobewatch.tap.self_check import check_calibration, check_detectable_band, find_quiet_part, run_self_check
 from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import Check, StatePublisher, TapState, TapStep

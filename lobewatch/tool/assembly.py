@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from functools import cached_property
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
 from lobewatch.measurement.spindle_model import build_model_state
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool import principal_directions as principal
+from lobewatch.tool.hidden_residues import find_hidden_residues
 from lobewatch.tool.principal_directions import PrincipalDirections, TipModes
 from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, interpolate_frequency
 from modal import Mode, UnexplainedPeak
@@ -157,6 +159,9 @@ class Assembly:
     """Checks of the sensors behind its tap tests."""
     unchecked: tuple[Remark, ...] = ()
     """Remarks on what a check or another tap test must still confirm; until then no program is stable."""
+    hidden_residues: Floats | None = None
+    """Largest residue of each mode of x, then y, in the FRF of the other direction (m/N), shape (n,); None without
+    FRFs of both at the tip."""
 
     @property
     def is_complete(self) -> bool:
@@ -177,10 +182,10 @@ class Assembly:
         """Name in a legend."""
         return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
 
-    @property
+    @cached_property
     def principal_directions(self) -> PrincipalDirections:
         """Principal directions of the modes of x, then of y, with their uncertainty."""
-        return principal.find_principal_directions(self.x or (), self.y or (), self.cross)
+        return principal.find_principal_directions(self.x or (), self.y or (), self.cross, self.hidden_residues)
 
     def check(self) -> Assembly:
         """Return itself; DataError without modes at the tip."""
@@ -228,6 +233,7 @@ def assemble(
         predicted=False,
         remarks=(*newest.remarks, *_direction_remarks(newest, across, assembly.directions, moved), *about_cross),
         cross=signed,
+        hidden_residues=_find_hidden_residues(direct),
         series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
@@ -240,6 +246,20 @@ def assemble(
             if own.code in HIT_DECISION_CODES
         ),
     )
+
+
+def _find_hidden_residues(taps: Mapping[str, Measurement]) -> Floats | None:
+    """Return the largest residues of the modes of x, then y, in the other FRF; None unless both are recent at the tip.
+
+    The modes at the tip are those of the FRF only if it was tapped there.
+    """
+    x, y = taps.get("x"), taps.get("y")
+    if x is None or y is None or x.frf is None or y.frf is None or abs(x.time - y.time) > MAX_DIRECTION_AGE:
+        return None
+    if not all(tap.at_tip and set(tap.used) <= set(tap.at_tip) for tap in (x, y)):
+        return None
+    in_y, in_x = find_hidden_residues(x.at_tip, y.at_tip, y.frf), find_hidden_residues(y.at_tip, x.at_tip, x.frf)
+    return np.concatenate((in_y, in_x))
 
 
 def _make_assembly(

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from lobes import Cut, StabilityLobes, lower_envelope, project_modes, zero_order_lobes
 from lobewatch.arrays import Flags, Floats
+from lobewatch.tool.hidden_residues import CLAMPING_FREQUENCY_TOLERANCE
 from modal import Mode
 
 TipModes = Sequence[Mode] | None
@@ -28,8 +29,8 @@ HIDDEN_PEAK_RATIO = 0.03
 """Share of the tallest peak that a fit overlooks in another direction; chosen from fits of synthetic FRFs. It
 grows with the square of the damping ratio over the distance of the frequencies, once these are nearer than
 that."""
-CLAMPING_FREQUENCY_TOLERANCE = 0.003
-"""Relative distance of two frequencies that reclamping explains."""
+MAX_TWO_MODE_SHARE = 0.5
+"""Share of a peak that a mode of the other direction may have in it, up to which they are two modes; chosen."""
 MAX_OPEN_SIGNS = 3
 """Largest number of unknown signs whose combinations are all computed; the others are positive."""
 
@@ -83,10 +84,17 @@ class PrincipalDirections:
         nothing = np.zeros((len(signs), self.stiffness.size))
         return list(self._vectors(signs, nothing[:, : len(self.pairs)], nothing))
 
+    @property
+    def possible_vectors(self) -> list[Floats]:
+        """Mode vectors (n, 2) for each combination of unknown signs, and along x and y if a sign is unknown."""
+        along = np.eye(2)[self.is_y.astype(int)]
+        patterns = [along if vectors is None else vectors for vectors in self.sign_patterns]
+        return [*patterns, along] if self.sign_count else patterns
+
     def sample(self, count: int, seed: int) -> Floats:
         """Return random mode vectors within the uncertainty, shape (count, n, 2), reproducible by the seed."""
         random = np.random.default_rng((seed, 2))
-        signs = random.choice([-1.0, 1.0], (count, self.sign_count))
+        signs = random.choice([-1.0, 0.0, 1.0], (count, self.sign_count))
         turn = random.uniform(-1, 1, (count, len(self.pairs))) * [pair.max_rotation for pair in self.pairs]
         lean = random.uniform(-1, 1, (count, self.max_cross_share.size)) * self.max_cross_share
         return self._vectors(signs, turn, lean)
@@ -118,13 +126,16 @@ def _pair_vectors(stiff_x: float, stiff_y: float, correlation: Floats, turn: Flo
     return np.asarray(turned * np.sqrt([stiff_x, stiff_y]))
 
 
-def find_principal_directions(x: Sequence[Mode], y: Sequence[Mode], cross: TipModes = None) -> PrincipalDirections:
+def find_principal_directions(
+    x: Sequence[Mode], y: Sequence[Mode], cross: TipModes = None, hidden: Floats | None = None
+) -> PrincipalDirections:
     """Find the principal directions of the modes measured in x and in y.
 
-    cross: signed modes hit in x and measured in y. Peaks of x and y are matched in the order of their frequencies. With
-    a neighbouring pair of similar stiffness, each match is one mode in a rotated direction, perpendicular to the other.
-    A single match is the two modes of a round spindle, rotated as far as the taps would not show it. A cross FRF
-    decides.
+    cross: signed modes hit in x and measured in y. hidden: largest residue (m/N) of each mode in the FRF of the other
+    direction (`find_hidden_residues`), None if unknown. Peaks of x and y are matched in the order of their frequencies.
+    With a neighbouring pair of similar stiffness, each match that the FRFs do not tell apart is one mode in a rotated
+    direction, perpendicular to the other. Any other match is the two modes of a round spindle, rotated as far as the
+    taps would not show it. A cross FRF decides.
     """
     modes = [*x, *y]
     stiffness = np.array([mode.stiffness for mode in modes])
@@ -134,9 +145,11 @@ def find_principal_directions(x: Sequence[Mode], y: Sequence[Mode], cross: TipMo
     if cross is not None:
         pairs = [ModePair(*pair, _cross_correlation(pair, modes, matched, cross), -1, 0.0) for pair in matched]
     else:
-        pairs = _pair_without_cross_tap(modes, matched)
+        limits = np.full(len(modes), np.inf) if hidden is None else hidden
+        pairs = _pair_without_cross_tap(modes, matched, limits)
         for i in np.setdiff1d(np.arange(len(modes)), np.ravel(matched)).astype(int):
-            lean[i] = min(np.sqrt(HIDDEN_PEAK_RATIO * stiffness[i] / np.min(stiffness[across != across[i]])), 1.0)
+            residue = min(HIDDEN_PEAK_RATIO / np.min(stiffness[across != across[i]]), limits[i])
+            lean[i] = min(np.sqrt(residue * stiffness[i]), 1.0)
     return PrincipalDirections(stiffness, across, tuple(pairs), lean)
 
 
@@ -161,13 +174,18 @@ def _match_modes(x: Sequence[Mode], y: Sequence[Mode]) -> list[tuple[int, int]]:
     return matched[::-1]
 
 
-def _pair_without_cross_tap(modes: Sequence[Mode], matched: Sequence[tuple[int, int]]) -> list[ModePair]:
-    """Return the pairs that direct taps imply."""
+def _pair_without_cross_tap(
+    modes: Sequence[Mode], matched: Sequence[tuple[int, int]], hidden: Floats
+) -> list[ModePair]:
+    """Return the pairs that direct taps imply; hidden: largest residues in the other direction (m/N), shape (n,)."""
     pairs, sign = list[ModePair](), itertools.count()
     number, direction = -1, 1.0
     for k, (i, j) in enumerate(matched):
-        if not any(_are_siblings(modes, (i, j), other) for other in _other_modes(len(modes), matched, (i, j))):
-            pairs.append(ModePair(i, j, 0.0, -1, _max_rotation(modes[i], modes[j])))
+        share = min(hidden[i] * modes[j].stiffness, hidden[j] * modes[i].stiffness)
+        has_sibling = any(_are_siblings(modes, (i, j), other) for other in _other_modes(len(modes), matched, (i, j)))
+        if not has_sibling or share < MAX_TWO_MODE_SHARE:
+            turn = float(np.arcsin(np.sqrt(min(share, 1.0))))
+            pairs.append(ModePair(i, j, 0.0, -1, min(_max_rotation(modes[i], modes[j]), turn)))
             continue
         follows = k > 0 and pairs[-1].sign == number and direction > 0 and _are_siblings(modes, (i, j), matched[k - 1])
         number, direction = (number, -1.0) if follows else (next(sign), 1.0)

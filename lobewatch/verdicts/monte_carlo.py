@@ -12,7 +12,13 @@ from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts import program_samples
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
-from lobewatch.verdicts.program_samples import ProgramSamples, WorstLimit, build_median_row
+from lobewatch.verdicts.program_samples import (
+    ProgramSamples,
+    WorstLimit,
+    build_median_row,
+    draw_rotating_samples,
+    find_deepest_stable,
+)
 from lobewatch.verdicts.uncertainty import uncertainty_of
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 
@@ -20,6 +26,8 @@ TRIED_LIMIT_SHARES = np.array([0.75, 1.0, 1.4])
 """Shares of the median limit, scaled by the cutting coefficient of each sample, at which the sample is checked."""
 FURTHER_LIMIT_SHARES = np.array([2.0, 3.0])
 """Further shares, for samples that are stable at all of these."""
+LOWER_LIMIT_SHARES = np.linspace(0, 1, 9)[1:]
+"""Shares of the first of these depths, for samples that chatter there."""
 UNLIMITED_DEPTH_SHARES = np.array([0.05, 0.2, 0.5, 1.0])
 """Shares of the largest depth of interest, if there is no median limit."""
 N_REFINED_EXTREMES = 9
@@ -51,6 +59,11 @@ def find_sample_limits(samples: ProgramSamples, depth: float) -> Floats:
         tried = softness * limit * TRIED_LIMIT_SHARES
     bracket = _bracket_limits(tried, worst.growth(tried))
     low, high, at_low, at_high = bracket
+    early = np.flatnonzero(low == 0)
+    if early.size:
+        first = tried[early, :1]
+        lower = np.sort(np.hstack((first * LOWER_LIMIT_SHARES, np.minimum(first, depth))), axis=1)
+        bracket[:, early] = _bracket_limits(lower, worst[early].growth(lower))
     open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
     if open_ones.size:
         further = np.hstack((low[open_ones, np.newaxis], softness[open_ones] * limit * FURTHER_LIMIT_SHARES))
@@ -131,31 +144,108 @@ class MonteCarloResult(NamedTuple):
     samples: ProgramSamples
     """Evaluated samples."""
     chatters: Flags
-    """True for each sample that chatters, without the median, shape (samples,)."""
+    """True for each sample that chatters, not rotating, without the median, shape (samples,)."""
     axes_ratio: float
     """Highest over lowest median limit for all open principal directions; 1 if none are open."""
+    limit_at_speed: float
+    """Lowest limit of the median estimate over the frequency drop at speed (m)."""
+    chatters_at_speed: Flags
+    """True for each sample that chatters at a frequency drop at speed, the median first, shape (samples + 1,).
+
+    Looked for only where none chatters that does not rotate."""
+
+    chatters_otherwise: bool = False
+    """True if the median chatters in other possible principal directions than those of `median`."""
 
     @property
     def is_stable_throughout(self) -> bool:
-        """True if the median and every sample are stable."""
-        return self.median.stable and not np.any(self.chatters)
+        """True if the median in all possible principal directions and every sample are stable, also at speed."""
+        is_calm = self.median.stable and not self.chatters_otherwise
+        return is_calm and not np.any(self.chatters) and not np.any(self.chatters_at_speed)
 
 
 def run_monte_carlo(case: ProgramCase) -> MonteCarloResult:
     """Evaluate a program on all its samples by semi-discretization."""
     worst = program_samples.find_worst_limit(case)
-    return evaluate_samples(case.depth, worst, program_samples.draw_samples(case, worst))
+    median = program_samples.find_median_limit(case, worst)
+    result = evaluate_samples(case.depth, median, program_samples.draw_samples(case, median))
+    return result._replace(low=min(result.low, worst.limit.limit), chatters_otherwise=median is not worst)
 
 
-def evaluate_samples(depth: float, worst: WorstLimit, samples: ProgramSamples) -> MonteCarloResult:
-    """Evaluate all samples of a program at its depth (m): limits, quantiles, samples that chatter."""
+def evaluate_samples(
+    depth: float, worst: WorstLimit, samples: ProgramSamples, turning: Flags | None = None
+) -> MonteCarloResult:
+    """Evaluate all samples of a program at its depth (m): limits, quantiles, samples that chatter.
+
+    turning: samples that chatter at speed (`find_chattering_at_speed`), if they have been found already.
+    """
     median, _, axes_ratio = worst
     limits = find_sample_limits(samples, depth)[1:]
     low, high = np.quantile(limits, LIMIT_QUANTILES, method="closest_observation")
     below = SKIPPED_CUT_MARGIN * depth * median.limit / low if np.isfinite(median.limit) else 0.0
     around = samples.median_growth_near(SKIPPED_CUT_MARGIN * depth) >= 0
     chatters = _find_chattering(samples, (samples.limits <= below) | around, around, limits, depth)
-    return MonteCarloResult(median, float(np.min(limits)), float(low), float(high), samples, chatters, axes_ratio)
+    at_speed = find_limit_at_speed(samples, depth)
+    if turning is None:
+        is_calm = median.stable and not np.any(chatters)
+        turning = find_chattering_at_speed(samples, depth) if is_calm else np.zeros(len(samples.rows), dtype=np.bool_)
+    lowest = float(np.min(limits))
+    return MonteCarloResult(median, lowest, float(low), float(high), samples, chatters, axes_ratio, at_speed, turning)
+
+
+N_HARDEST_SAMPLES, N_SOFTEST_SAMPLES = 24, 8
+"""Numbers of samples checked over the whole drop at speed: nearest to chatter, and with the most force on a mode."""
+SHALLOWER_SHARE = 0.12
+"""Share of a depth at which the limit at speed is searched next, if all of it chatters."""
+REFINED_LIMIT_SHARE = 1.03
+"""Depth over the first estimate of the limit at speed up to which it is refined."""
+MIN_LIMIT = 1e-6
+"""Smallest limit at speed that is searched (m)."""
+
+
+def find_limit_at_speed(samples: ProgramSamples, depth: float) -> float:
+    """Find the lowest limit (m) of the median over the drop at speed, up to that not rotating; depth: m."""
+    limit = float(samples.limits[0])
+    if samples.drop.is_zero:
+        return limit
+    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS) if np.isfinite(limit) else samples
+    median, most = near[np.zeros(1, dtype=np.intp)].over_drops(), min(limit, MAX_PROGRAM_DEPTH_RATIO * depth)
+    found, tried = find_deepest_stable(median, most), most
+    while found == 0 and tried > MIN_LIMIT:
+        tried *= SHALLOWER_SHARE
+        found = find_deepest_stable(median, tried)
+    return limit if found == most else find_deepest_stable(median, REFINED_LIMIT_SHARE * found)
+
+
+def find_chattering_at_speed(samples: ProgramSamples, depth: float) -> Flags:
+    """Find samples, the median first, that chatter at a depth (m) at speed: at its own drop each, critical ones at all.
+
+    Each drop is drawn evenly from its range, so that no chatter of 300 means what it means not rotating. The range is
+    then checked in steps with the samples nearest to chatter, as lobes may lie between its ends.
+    """
+    if samples.drop.is_zero:
+        return np.zeros(len(samples.rows), dtype=np.bool_)
+    most = samples.drop.largest
+    near = samples.with_cuts(samples.median_growth_near(SKIPPED_CUT_MARGIN * depth / (1 - most) ** 2, most) >= 0)
+    turning = near.at_speed()
+    grown = turning.critical_growth(depth)
+    chatters = grown >= 0
+    if not np.any(chatters):
+        rows = turning.rows
+        force = np.max(rows.tangential[:, np.newaxis] / (rows.stiffness * rows.damping_ratio), axis=1)
+        few = np.union1d(np.argsort(-grown)[:N_HARDEST_SAMPLES], np.argsort(-force)[:N_SOFTEST_SAMPLES])
+        few = np.union1d(few, [0]).astype(np.intp)
+        worst = near[few].over_drops().critical_growth(depth).reshape(-1, few.size)
+        chatters[few] = np.any(worst >= 0, axis=0)
+    return chatters
+
+
+def estimate_chatter_risk(result: MonteCarloResult, depth: float, n_cuts: int) -> float:
+    """Estimate the chatter risk at speed at a depth (m): that learned from test cuts, else by plausible differences."""
+    if n_cuts:
+        return float(np.mean(result.chatters))
+    worst = draw_rotating_samples(result.samples.with_lowest_cuts(0.0))
+    return float(np.mean(worst.growth(depth)[1:] >= 0))
 
 
 def _find_chattering(samples: ProgramSamples, near: Flags, around: Flags, limits: Floats, depth: float) -> Flags:

@@ -21,8 +21,7 @@ from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.monte_carlo import LIMIT_QUANTILES, find_sample_limits, refine_sample_limits, run_monte_carlo
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
-from lobewatch.verdicts.program_samples import ProgramSamples
-from lobewatch.verdicts.safe_depth_estimates import find_deepest_stable
+from lobewatch.verdicts.program_samples import ProgramSamples, find_deepest_stable
 from lobewatch.verdicts.verdict import Stability, Verdict, classify_stability, evaluate_program
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 

@@ -11,10 +11,12 @@ import numpy as np
 
 from acquisition import Remark
 from lobes import Cut, Direction, Program
+from lobes.floquet.program_limit import estimate_program_limits
 from lobewatch.arrays import Floats
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.principal_directions import TipModes
+from lobewatch.verdicts.speed_drop import NO_DROP, SpeedDrop, find_speed_drop
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields, uncertainty_of
 
 AnyCutTable = TypeVar("AnyCutTable", bound=CutTable)
@@ -135,9 +137,20 @@ class ProgramCase:
         )
 
     @cached_property
+    def axes_limits(self) -> Floats:
+        """Estimated limits (m) in each of the possible principal directions (`possible_vectors`)."""
+        spindle = self.spindle
+        vectors = spindle.principal_directions.possible_vectors
+        return estimate_program_limits(self.program, spindle.x, spindle.y, self.cuts, vectors)
+
+    @cached_property
     def uncertainty(self) -> Uncertainty:
         """Uncertainty by cause."""
         return self.at_speed.uncertainty or uncertainty_of(self.assembly, self.table, self.machine)
+
+    def drop_at(self, speed_rpm: float) -> SpeedDrop:
+        """Find the frequency drop at a speed (rpm); none where test cuts have shown the spindle at speed."""
+        return NO_DROP if self.at_speed.n_cuts else find_speed_drop(self.assembly, self.machine, speed_rpm)
 
     def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""

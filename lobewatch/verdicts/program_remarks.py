@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition import Remark
+from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement.coverage import describe_uncovered
@@ -15,7 +16,9 @@ from lobewatch.verdicts.program_case import FEED_ANGLE_STEP, ProgramCase
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES
 from lobewatch.verdicts.uncertainty_causes import (
     COVERAGE,
+    CROSS,
     QUESTION,
+    SPEED_DROP,
     UNCERTAINTY_CAUSES,
     UNCHECKED,
     UNTAPPED,
@@ -114,7 +117,8 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
         text = f"helix_deg is missing, 0 is assumed ({risk})"
         yield Remark("helix-not-written", table.name, text, "Set helix_deg, 0 for straight edges")
     if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
-        effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %, worst case used"
+        used = "" if result.chatters_otherwise else ", worst case used"
+        effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %{used}"
         text = f"modes may have rotated principal directions ({effect})"
         yield Remark(CROSS_NOT_TAPPED_CODE, table.name, text, "Tap Circumstances.direction xy (hit in x, sensor in y)")
 
@@ -155,14 +159,24 @@ def find_decisive_cause(case: ProgramCase, result: MonteCarloResult) -> str:
         return UNCHECKED.name
     if case.table.thin and case.assembly.is_complete and not np.any(result.chatters):
         return WORKPIECE.name
-    samples, uncertainty = result.samples, result.samples.uncertainty
-    if UNTAPPED.name in uncertainty.modes or not np.any(result.chatters):
+    if UNTAPPED.name in result.samples.uncertainty.modes:
         return UNTAPPED.name
+    if result.chatters_otherwise:
+        return CROSS.name
+    if not np.any(result.chatters):
+        return SPEED_DROP.name if np.any(result.chatters_at_speed) else UNTAPPED.name
+    return _find_most_frequent_cause(case, result)
+
+
+def _find_most_frequent_cause(case: ProgramCase, result: MonteCarloResult) -> str:
+    """Find the cause without which most of the chattering samples would be stable."""
+    samples, uncertainty = result.samples, result.samples.uncertainty
     places, median = np.flatnonzero(result.chatters)[:N_CAUSE_SAMPLES], samples.rows[np.array([0])]
     shares = {}
     for cause in uncertainty.causes:
         rows = uncertainty.sample(median, N_PROGRAM_SAMPLES, without=cause)[places]
-        shares[cause] = float(np.mean(replace(samples, rows=rows).growth(case.depth) < 0))
+        grown = replace(samples, rows=rows).growth(case.depth * np.array(CHECKED_DEPTH_SHARES))
+        shares[cause] = float(np.mean(np.max(grown, axis=1) < 0))
     return max(shares, key=lambda cause: shares[cause])
 
 
@@ -175,6 +189,8 @@ def uncertainty_advice(cause: str, case: ProgramCase, result: MonteCarloResult) 
     tangential = result.median.limit / case.depth * case.program.cut.tangential
     values = {"kt": f"{tangential / 1e6:.0f}", "coefficients_remedy": measure, "questions": asked}
     values |= {"tool": repr(table.tool), "program": repr(table.name), "n_cuts": str(case.at_speed.n_cuts)}
+    drop = result.samples.drop
+    values["drop_percent"] = f"{100 * drop.low:.3g} to {100 * drop.high:.3g}"
     if assembly.uncovered:
         values["uncovered"], values["uncovered_remedy"] = describe_uncovered(assembly.uncovered)
     if assembly.unchecked:

@@ -1,5 +1,6 @@
 """Monte Carlo samples of a program, the cuts it makes on its path, and which samples chatter."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple
@@ -13,14 +14,15 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO, group_by_engage
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.verdicts.speed_drop import NO_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Factors, Uncertainty, scale_fields
 
 N_PROGRAM_SAMPLES = 300
 """Number of samples: if all are stable, at most 1 % of the uncertainty chatters at 95 % confidence."""
 ROTATING_SEED = 1
 """Random seed of the samples for the rotating spindle."""
-ROTATING_FREQUENCY_FACTOR, ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
-"""Mean and standard deviation of f_n, zeta and K in the cut over the values not rotating; plausible, not measured."""
+ROTATING_DAMPING_FACTOR, ROTATING_STIFFNESS_FACTOR = (1.1, 0.25), (1.0, 0.10)
+"""Mean and standard deviation of zeta and K in the cut over the values at its speed; plausible, not measured."""
 ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD = 1.0, 0.30
 """Mean and standard deviation of Kt in the cut over that of the table; chosen, as plausible.
 
@@ -30,6 +32,8 @@ FREQUENCY_MARGIN, N_MARGIN_SPEEDS = 0.003, 7
 """Relative frequency margin checked in addition to the speed uncertainty, and number of speeds checked."""
 N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
 """Number of samples that estimate growth differences between cuts, half of them critical, and safety factor."""
+MARGIN_DROP_STEP = 0.01
+"""Relative frequency drop for each further speed; chosen."""
 MIN_ROTATING_FACTOR = 0.1
 """Smallest factor over its mean."""
 
@@ -48,6 +52,8 @@ class ProgramSamples:
     """Number of pieces of a turn over that required by the modes only."""
     uncertainty: Uncertainty
     """Uncertainty that the samples were drawn from."""
+    drop: SpeedDrop = NO_DROP
+    """Frequency drop at the speed of the program, not yet in the samples."""
 
     def growth(self, depth: float | Floats) -> Floats:
         """Return the growth rate in the worst cut; negative where stable.
@@ -113,20 +119,61 @@ class ProgramSamples:
     def median_growth_near(self, depth: float, drop: float = 0.0, apart: float = 1.0) -> Floats:
         """Return the largest median growth of each cut at a depth (m) within the uncertainty of speed and frequency.
 
-        fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
+        drop: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
         slower and faster, that counts too. Shape (cuts,).
         """
         margin = self.uncertainty.speed + FREQUENCY_MARGIN
-        ends = (1 - margin) / apart, (1 + margin) * apart / (1 - drop)
-        median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, N_MARGIN_SPEEDS))
+        rise = max(-self.drop.low, 0.0) if drop else 0.0
+        ends = (1 - margin) / apart / (1 + rise), (1 + margin) * apart / (1 - drop)
+        number = N_MARGIN_SPEEDS + round((drop + rise) / MARGIN_DROP_STEP)
+        median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, number))
         return np.asarray(np.max(median.growth_by_cut(depth)[..., 0], axis=1))
 
-    def sweep(self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0) -> "ProgramSamples":
+    def at_speed(self) -> "ProgramSamples":
+        """Lower the frequencies of each sample by its own drop at speed; the median has the largest drop."""
+        if self.drop.is_zero:
+            return self
+        return replace(self, rows=self.drop.apply(self.rows, self.drop.spread(len(self.rows))))
+
+    def over_drops(self) -> "ProgramSamples":
+        """Repeat all samples at each step of the drop at speed."""
+        drops = self.drop.steps
+        rows = self.rows[np.tile(np.arange(len(self.rows)), drops.size)]
+        return replace(self, rows=self.drop.apply(rows, np.repeat(drops, len(self.rows))))
+
+    def sweep(
+        self, speed: Factors, frequency: Factors = 1.0, stiffness: Factors = 1.0, force: Factors = 1.0
+    ) -> "ProgramSamples":
         """Repeat all samples with each of several factors (k,), k times as many."""
-        factors = np.broadcast_arrays(speed, frequency, stiffness)
+        factors = np.broadcast_arrays(speed, frequency, stiffness, force)
         rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
-        n, f, k = (np.repeat(factor, len(self.rows))[:, np.newaxis] for factor in factors)
-        return replace(self, rows=scale_fields(rows, speed_rpm=n[:, 0], frequency=f, stiffness=k))
+        n, f, k, push = (np.repeat(factor, len(self.rows)) for factor in factors)
+        rows = scale_fields(rows, frequency=f[:, np.newaxis], stiffness=k[:, np.newaxis])
+        return replace(self, rows=scale_fields(rows, speed_rpm=n, tangential=push, radial=push))
+
+
+CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
+"""Shares of a depth at which samples are checked for the deepest stable depth."""
+DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
+"""Shares of the step between a stable and an unstable depth at which they are checked again."""
+
+
+def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
+    """Return the deepest depth (m) up to `most` at which all samples are stable; 0 if there is hardly any."""
+    depths = most * CRITICAL_DEPTH_SHARES
+    grown = np.max(samples.growth(depths), axis=0)
+    if np.all(grown < 0):
+        return most
+    first = int(np.argmax(grown >= 0))
+    low = float(depths[first - 1]) if first else 0.0
+    between = low + (depths[first] - low) * DEPTH_BRACKET_SHARES
+    finer = np.max(samples.growth(between), axis=0)
+    depth = np.concatenate(([low], between, [depths[first]]))
+    value = np.concatenate(([grown[first - 1] if first else -np.inf], finer, [grown[first]]))
+    bad = int(np.argmax(value >= 0))
+    if not np.isfinite(value[bad - 1]):
+        return low
+    return float(depth[bad - 1] - value[bad - 1] * (depth[bad] - depth[bad - 1]) / (value[bad] - value[bad - 1]))
 
 
 def build_median_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
@@ -137,24 +184,43 @@ def build_median_row(program: Program, assembly: Assembly, axes: Floats | None =
 
 
 class WorstLimit(NamedTuple):
-    """Median limit of a program, with the worst of its possible principal directions."""
+    """Median limit of a program in one of its possible sets of principal directions, the worst unless stated."""
 
     limit: ProgramLimit
-    """Lowest limit."""
+    """Limit in these directions."""
     axes: Floats | None
-    """Principal directions with that limit, shape (n, 2); None along x and y."""
+    """These principal directions, shape (n, 2); None along x and y."""
     axes_ratio: float
     """Highest over lowest limit: over the open signs, and with modes along x and y; 1 if nothing is open."""
 
 
 def find_worst_limit(case: ProgramCase) -> WorstLimit:
-    """Find the lowest limit over all cuts of a program and all open signs of the principal directions."""
+    """Find the lowest limit over all cuts of a program and all possible principal directions."""
+    return next(_find_rising_limits(case))
+
+
+def find_median_limit(case: ProgramCase, worst: WorstLimit) -> WorstLimit:
+    """Find the lowest limit over the possible principal directions in which a program is stable; else the worst."""
+    if worst.limit.stable:
+        return worst
+    return next((found for found in _find_rising_limits(case, case.depth) if found.limit.stable), worst)
+
+
+def _find_rising_limits(case: ProgramCase, above: float = 0.0) -> Iterator[WorstLimit]:
+    """Yield the limits of a program in each set of possible principal directions, the lowest estimate first.
+
+    above: estimate (m) up to which directions are left out.
+    """
     spindle, axes = case.spindle, case.spindle.principal_directions
-    patterns = [*axes.sign_patterns, *([None] if axes.sign_count else [])]
-    limits = [lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, vectors) for vectors in patterns]
-    worst = min(range(len(axes.sign_patterns)), key=lambda i: limits[i].limit)
-    depths = [min(limit.limit, MAX_PROGRAM_DEPTH_RATIO * case.depth) for limit in limits]
-    return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
+    patterns: Sequence[Floats | None] = axes.possible_vectors if axes.sign_count else axes.sign_patterns
+    estimates = case.axes_limits if axes.sign_count else np.ones(1)
+    depths = np.minimum(estimates, MAX_PROGRAM_DEPTH_RATIO * case.depth)
+    ratio = float(np.max(depths) / np.min(depths))
+    for place in np.argsort(estimates, kind="stable").tolist():
+        if axes.sign_count and estimates[place] <= above:
+            continue
+        limit = lobes.program_limit(case.program, spindle.x, spindle.y, case.cuts, patterns[place])
+        yield WorstLimit(limit, patterns[place], ratio)
 
 
 def _find_likely_axes(case: ProgramCase, program: Program) -> Floats | None:
@@ -177,7 +243,8 @@ def draw_likely_samples(case: ProgramCase, program: Program) -> ProgramSamples:
     program: the case at another speed and depth, in SI units.
     """
     median = build_median_row(program, case.spindle, _find_likely_axes(case, program))
-    return _unlimited_samples(case, lobes.join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
+    samples = _unlimited_samples(case, lobes.join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES)))
+    return replace(samples, drop=case.drop_at(program.speed_rpm))
 
 
 def draw_samples(case: ProgramCase, worst: WorstLimit) -> ProgramSamples:
@@ -186,19 +253,19 @@ def draw_samples(case: ProgramCase, worst: WorstLimit) -> ProgramSamples:
     order = np.argsort(limits)
     finer = max(worst.limit.pieces // int(lobes.count_pieces(median, MAX_PROGRAM_DEPTH_RATIO * case.depth)[0]), 1)
     rows = lobes.join_rows(median, case.uncertainty.sample(median, N_PROGRAM_SAMPLES))
-    return ProgramSamples(rows, tuple(case.cuts[place] for place in order), limits[order], finer, case.uncertainty)
+    cuts, drop = tuple(case.cuts[place] for place in order), case.drop_at(case.table.speed_rpm)
+    return ProgramSamples(rows, cuts, limits[order], finer, case.uncertainty, drop)
 
 
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
-    """Vary the samples by plausible differences between a spindle at rest and a cutting one."""
-    rows, random = samples.rows, np.random.default_rng(seed)
-    frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
+    """Vary the samples by plausible differences between a spindle at rest and a cutting one: drop, zeta, K, Kt."""
+    rows, random = samples.at_speed().rows, np.random.default_rng(seed)
+    damping, stiffness, force = random.standard_normal((3, len(rows)))
 
     def factor(median: float, spread: float, normal: Floats) -> Floats:
         return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
     push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
-    f, zeta = factor(*ROTATING_FREQUENCY_FACTOR, frequency), factor(*ROTATING_DAMPING_FACTOR, damping)
-    k = factor(*ROTATING_STIFFNESS_FACTOR, stiffness)
-    changed = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=push, radial=push)
+    zeta, k = factor(*ROTATING_DAMPING_FACTOR, damping), factor(*ROTATING_STIFFNESS_FACTOR, stiffness)
+    changed = scale_fields(rows, damping_ratio=zeta, stiffness=k, tangential=push, radial=push)
     return replace(samples, rows=changed)

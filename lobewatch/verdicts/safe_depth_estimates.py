@@ -20,7 +20,13 @@ from lobewatch.tool.principal_directions import lowest_zero_order_lobes
 from lobewatch.verdicts import setting_robustness as robustness
 from lobewatch.verdicts.monte_carlo import interpolate_first_crossing
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import FREQUENCY_MARGIN, ProgramSamples, draw_likely_samples
+from lobewatch.verdicts.program_samples import (
+    FREQUENCY_MARGIN,
+    N_PROGRAM_SAMPLES,
+    ProgramSamples,
+    draw_likely_samples,
+    find_deepest_stable,
+)
 from lobewatch.verdicts.setting_robustness import ROBUST_SPEED_FACTOR, StiffnessAt
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 
@@ -30,10 +36,6 @@ N_FLEXIBLE_SAMPLES = 8
 """Number of samples with the largest force on the most flexible mode."""
 N_CRITICAL_FEEDS = 2
 """Number of worst feed directions around the speed in which these samples are checked."""
-CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])
-"""Shares of a depth at which these samples are checked."""
-DEPTH_BRACKET_SHARES = np.array([0.3, 0.6])
-"""Shares of the step between a stable and an unstable depth at which they are checked again."""
 DEPTH_GROWTH_FACTOR, DEPTH_SHRINK_FACTOR = 1.5, 0.15
 """Depth factor of the search if all depths are stable, and if hardly any is."""
 MIN_SEARCHED_DEPTH = 1e-5
@@ -46,7 +48,7 @@ class CriticalSamples(NamedTuple):
     likely_depth: float
     """Likely safe depth (m), the scale of the checked depths."""
     samples: ProgramSamples
-    """Samples at both ends of the required range (`sweep_extremes`), then the median with its depth margin."""
+    """Samples at the ends of the required range (`sweep_extremes`), then the median with its depth margin."""
     likely_first: Indices
     """Indices of the few samples that probably chatter first."""
     chattered: frozenset[int] = frozenset()
@@ -55,20 +57,21 @@ class CriticalSamples(NamedTuple):
     @property
     def selected(self) -> ProgramSamples:
         """Samples that are evaluated."""
-        more = np.add.outer([0, len(self.samples.rows) // 2], sorted(self.chattered)).ravel().astype(np.intp)
+        blocks = np.arange(len(self.samples.rows) // (N_PROGRAM_SAMPLES + 1)) * (N_PROGRAM_SAMPLES + 1)
+        more = np.add.outer(blocks, sorted(self.chattered)).ravel().astype(np.intp)
         return self.samples[np.union1d(self.likely_first, more)]
 
     def deepest_stable(self, most: float) -> float:
-        """Return the deepest depth (m) up to `most` at which all selected samples are stable with depth margin."""
-        few, depth = self.selected, robustness.ROBUST_DEPTH_FACTOR * min(self.likely_depth, most)
+        """Return the deepest depth (m) up to `most` at which all selected samples are stable."""
+        few, depth = self.selected, min(self.likely_depth, most)
         calm = find_deepest_stable(few, depth)
-        while calm == depth < robustness.ROBUST_DEPTH_FACTOR * most:
-            depth = min(DEPTH_GROWTH_FACTOR * depth, robustness.ROBUST_DEPTH_FACTOR * most)
+        while calm == depth < most:
+            depth = min(DEPTH_GROWTH_FACTOR * depth, most)
             calm = find_deepest_stable(few, depth)
         while calm == 0 and depth > MIN_SEARCHED_DEPTH:
             depth *= DEPTH_SHRINK_FACTOR
             calm = find_deepest_stable(few, depth)
-        return calm / robustness.ROBUST_DEPTH_FACTOR
+        return calm
 
     def growth_at_speeds(self, speeds: Floats, depths: Floats) -> Floats:
         """Return the largest growth of the selected samples at relative speeds and depths (m) (k,).
@@ -76,47 +79,31 @@ class CriticalSamples(NamedTuple):
         In the worst direction of feed: it says where to look, no more.
         """
         few = self.selected.with_lowest_cuts(0.0)
-        wanted = np.repeat(robustness.ROBUST_DEPTH_FACTOR * depths, len(few.rows))[:, np.newaxis]
+        wanted = np.repeat(depths, len(few.rows))[:, np.newaxis]
         return np.asarray(np.max(few.sweep(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
 
 
 def select_critical_samples(
     case: ProgramCase, program: Program, drop: float, stiffness_at: StiffnessAt
 ) -> CriticalSamples:
-    """Select the samples that are likely the first to chatter, now or after a frequency drop.
+    """Select the samples that are likely the first to chatter, at speed, now or after a frequency drop by age.
 
     program: the case at one speed and the depth that is likely safe.
     """
     likely = draw_likely_samples(case, program)
-    order = np.argsort(-likely.median_growth_near(program.depth, drop, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
-    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
+    resting = likely.rows
+    total = 1 - (1 - likely.drop.largest) * (1 - drop)
+    order = np.argsort(-likely.median_growth_near(program.depth, total, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order]).at_speed()
     aged = robustness.sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
-    median = likely.rows[np.zeros(1, dtype=np.intp)]
-    push = (1 + robustness.MIN_DEPTH_MARGIN) / robustness.ROBUST_DEPTH_FACTOR
+    median = resting[np.zeros(1, dtype=np.intp)]
+    push = 1 + robustness.MIN_DEPTH_MARGIN
     median = replace(median, tangential=push * median.tangential, radial=push * median.radial)
     growing, flexible = np.argsort(-grown)[:N_GROWING_SAMPLES], np.argsort(-force)[:N_FLEXIBLE_SAMPLES]
     first = np.unique(np.concatenate((growing, flexible, [grown.size])))
     return CriticalSamples(program.depth, replace(aged, rows=join_rows(aged.rows, median)), first)
-
-
-def find_deepest_stable(samples: ProgramSamples, most: float) -> float:
-    """Return the deepest depth (m) up to `most` at which all samples are stable; 0 if there is hardly any."""
-    depths = most * CRITICAL_DEPTH_SHARES
-    grown = np.max(samples.growth(depths), axis=0)
-    if np.all(grown < 0):
-        return most
-    first = int(np.argmax(grown >= 0))
-    low = float(depths[first - 1]) if first else 0.0
-    between = low + (depths[first] - low) * DEPTH_BRACKET_SHARES
-    finer = np.max(samples.growth(between), axis=0)
-    depth = np.concatenate(([low], between, [depths[first]]))
-    value = np.concatenate(([grown[first - 1] if first else -np.inf], finer, [grown[first]]))
-    bad = int(np.argmax(value >= 0))
-    if not np.isfinite(value[bad - 1]):
-        return low
-    return float(depth[bad - 1] - value[bad - 1] * (depth[bad] - depth[bad - 1]) / (value[bad] - value[bad - 1]))
 
 
 LIKELY_SPEED_STEP = 0.002
@@ -186,11 +173,13 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
     margin = uncertainty.speed + FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
+    most = case.drop_at(reach.high_rpm).largest
+    safe_at_speed, drop = safe / (1 - most) ** 2, drop + most
     steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
 
     def around(limits: Floats) -> Floats:
         lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
-        return np.asarray(np.minimum(lowest / safe, deepest))
+        return np.asarray(np.minimum(lowest / safe_at_speed, deepest))
 
     limit = np.min(by_cut, axis=0)
     if not all(map(is_force_constant, cuts)):

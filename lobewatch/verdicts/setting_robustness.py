@@ -17,6 +17,7 @@ from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.arrays import Floats
 from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, CutRange
 from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.monte_carlo import find_chattering_at_speed
 from lobewatch.verdicts.program_samples import ProgramSamples
 from lobewatch.verdicts.uncertainty import Factors
 from lobewatch.verdicts.verdict import CriticalDrop, Stability, StoredVerdict, Verdict
@@ -65,9 +66,11 @@ def _stiffness_ratios(calibration: Calibration) -> Floats:
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
 
 
-def apply_drops(samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0) -> ProgramSamples:
-    """Apply each of some frequency drops (k,) to all samples, one after the other; speed: relative, one or (k,)."""
-    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]))
+def apply_drops(
+    samples: ProgramSamples, drops: Floats, softening: StiffnessAt, speed: Factors = 1.0, force: Factors = 1.0
+) -> ProgramSamples:
+    """Apply each of some frequency drops (k,) to all samples; speed and force: relative, one or (k,)."""
+    return samples.sweep(speed, 1 - drops, np.array([softening(drop) for drop in drops.tolist()]), force)
 
 
 def find_tolerable_drop(samples: ProgramSamples, depth: float, stiffness_at: StiffnessAt) -> float:
@@ -126,8 +129,8 @@ def is_verdict_missing(ruling: StoredVerdict | None, drops: bool) -> bool:
 
 
 def _first_doubtful_drop(samples: ProgramSamples, depth: float, last: float, stiffness_at: StiffnessAt) -> float:
-    """Return the largest drop up to which no sample chatters."""
-    most = min(last, float(CALIBRATED_DROPS[-1]))
+    """Return the largest drop by age up to which no sample chatters, each at its own drop at speed."""
+    samples, most = samples.at_speed(), min(last, float(CALIBRATED_DROPS[-1]))
 
     def chatters(drop: float) -> bool:
         return bool(np.any(apply_drops(samples, np.array([drop]), stiffness_at).growth(depth) >= 0))
@@ -169,7 +172,9 @@ class Setting:
     depth_margin: float
     """Depth margin: median limit over depth, less 1."""
     drop_margin: float
-    """Relative frequency drop up to which it stays stable; 0.1 means 0.1 or more."""
+    """Relative frequency drop by age, beyond that at speed, up to which it stays stable; 0.1 means 0.1 or more."""
+    chatter_risk: float = math.nan
+    """Chatter risk with the spindle rotating (0 to 1)."""
 
 
 WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
@@ -177,7 +182,7 @@ WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
 ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
 """Speed factor in both directions within which a setting must be safe; chosen."""
 ROBUST_DEPTH_FACTOR = 1.05
-"""Depth factor up to which a setting must be safe; chosen."""
+"""Depth factor up to which a setting must be safe, as a factor on the force; chosen."""
 MIN_DEPTH_MARGIN = 0.20
 """Smallest depth margin of a recommended setting in the median estimate; chosen."""
 MIN_ROBUST_DROP = 0.01
@@ -187,20 +192,25 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over the extremes: the slower speed, and the frequency drop."""
-    return apply_drops(samples, np.array([0, drop]), stiffness_at, np.array([1 / ROBUST_SPEED_FACTOR, 1]))
+    """Sweep all samples over the extremes, one at a time: slower, the frequency drop by age, and more depth."""
+    drops, speeds = np.array([0, drop, 0]), np.array([1 / ROBUST_SPEED_FACTOR, 1, 1])
+    return apply_drops(samples, drops, stiffness_at, speeds, np.array([1, 1, ROBUST_DEPTH_FACTOR]))
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over both speeds, the frequency drop and half of it."""
-    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR])
-    return apply_drops(samples, np.array([0, drop, drop / 2, 0]), stiffness_at, speeds)
+    """Sweep all samples over both speeds, the frequency drop by age, half of it, and more depth, one at a time."""
+    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR, 1])
+    deeper = np.array([1, 1, 1, 1, ROBUST_DEPTH_FACTOR])
+    return apply_drops(samples, np.array([0, drop, drop / 2, 0, 0]), stiffness_at, speeds, deeper)
 
 
 def find_speed_window(
     near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
-    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable on all samples."""
+    """Find the slowest and fastest speed (rpm) at which a depth (m) is stable, not rotating and at speed.
+
+    hardest: some samples at speed, which are checked first.
+    """
     ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * np.arange(MAX_WINDOW_STEPS + 1.0)) for sign in (-1, 1))
     slow, fast = (_last_stable_ratio(near, hardest, ratio, depth) for ratio in ratios)
     slowest = math.ceil(max(speed * slow, reach.low_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
@@ -222,9 +232,14 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
         last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
         if last < steps[-1]:
             break
-    while last > 0 and np.any(near.sweep(ratio[last : last + 1]).critical_growth(depth) >= 0):
+    while last > 0 and _has_chatter(near.sweep(ratio[last : last + 1]), depth):
         last //= 2
     return float(ratio[last])
+
+
+def _has_chatter(samples: ProgramSamples, depth: float) -> bool:
+    """Return whether a sample chatters at a depth (m), not rotating or at speed."""
+    return bool(np.any(samples.critical_growth(depth) >= 0) or np.any(find_chattering_at_speed(samples, depth)))
 
 
 def _last_stable_row(grown: Floats) -> int:

@@ -14,15 +14,27 @@ from functools import cached_property
 import numpy as np
 
 from lobes import Program
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange
 from lobewatch.tool.tap_series import expected_frequency_drop
 from lobewatch.verdicts import safe_depth_estimates as estimates
 from lobewatch.verdicts import setting_robustness as robustness
-from lobewatch.verdicts.monte_carlo import SKIPPED_CUT_MARGIN, MonteCarloResult, evaluate_samples
+from lobewatch.verdicts.monte_carlo import (
+    SKIPPED_CUT_MARGIN,
+    MonteCarloResult,
+    estimate_chatter_risk,
+    evaluate_samples,
+    find_chattering_at_speed,
+)
 from lobewatch.verdicts.program_case import ProgramCase
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_samples, find_worst_limit
-from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths, find_deepest_stable
+from lobewatch.verdicts.program_samples import (
+    N_PROGRAM_SAMPLES,
+    ProgramSamples,
+    draw_samples,
+    find_deepest_stable,
+    find_worst_limit,
+)
+from lobewatch.verdicts.safe_depth_estimates import CriticalSamples, LikelyDepths
 from lobewatch.verdicts.setting_robustness import Setting, StiffnessAt, model_softening
 
 MAX_DEPTH_MARGIN = 20.0
@@ -53,7 +65,7 @@ N_WINDOW_SAMPLES = 24
 N_TAP_INTERVALS = 2
 """Number of tap intervals for which a setting must stay stable."""
 DEFAULT_NEEDED_DROP = 0.02
-"""Frequency drop at which a setting must stay stable if no trend is known; chosen."""
+"""Frequency drop by age at which a setting must stay stable if no trend is known; chosen. Added to that at speed."""
 
 DepthsBySpeed = dict[float, float]
 """Possibly safe depths (mm) by speed (rpm)."""
@@ -81,11 +93,11 @@ class SettingSearch:
 
     @cached_property
     def needed_drop(self) -> float:
-        """Relative frequency drop at which a setting must stay stable: two tap intervals at the rate so far."""
+        """Relative frequency drop by age at which a setting must stay stable: two tap intervals at the rate so far."""
         days = N_TAP_INTERVALS * self.case.machine.machine.interval_days
         drops = [expected_frequency_drop(series, days) for series in self.case.assembly.series.values()]
-        needed = [DEFAULT_NEEDED_DROP if drop is None else max(drop, robustness.MIN_ROBUST_DROP) for drop in drops]
-        return max(needed, default=DEFAULT_NEEDED_DROP)
+        expected = [DEFAULT_NEEDED_DROP if drop is None else max(drop, robustness.MIN_ROBUST_DROP) for drop in drops]
+        return max(expected, default=DEFAULT_NEEDED_DROP)
 
     @cached_property
     def stiffness_at(self) -> StiffnessAt:
@@ -240,30 +252,42 @@ class SettingSearch:
         limit, samples = worst.limit.limit, draw_samples(case, worst)
         if limit < depth * (1 + robustness.MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + robustness.MIN_DEPTH_MARGIN)
-        grown = samples.median_growth_near(SKIPPED_CUT_MARGIN * deep, self.needed_drop, robustness.ROBUST_SPEED_FACTOR)
+        drop = 1 - (1 - samples.drop.largest) * (1 - self.needed_drop)
+        grown = samples.median_growth_near(
+            SKIPPED_CUT_MARGIN * deep / (1 - samples.drop.largest) ** 2, drop, robustness.ROBUST_SPEED_FACTOR
+        )
         near = samples.with_cuts(grown >= 0)
-        around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
-        grown = around.critical_growth(deep)
+        around = robustness.sweep_neighborhood(near.at_speed(), self.needed_drop, self.stiffness_at)
+        grown = around.critical_growth(depth)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        result = evaluate_samples(depth, worst, samples)
+        turning = find_chattering_at_speed(samples, depth)
+        if np.any(turning):
+            return self._depth_below(samples.over_drops(), turning, depth_mm)
+        result = evaluate_samples(depth, worst, samples, turning)
         if not result.is_stable_throughout:
-            places = 1 + np.flatnonzero(result.chatters)
-            self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
-            calm = min(find_deepest_stable(samples[places[:N_WINDOW_SAMPLES]], depth), result.lowest)
-            return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
-        hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
+            return min(self._depth_below(samples, np.append(False, result.chatters), depth_mm), 1e3 * result.lowest)
+        hardest = near.at_speed()[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
         window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
         left = robustness.find_drop_margin(hardest, depth, self.stiffness_at)
         self.results[speed, depth_mm] = result
-        return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left)
+        risk = estimate_chatter_risk(result, depth, self.case.at_speed.n_cuts)
+        return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left, risk)
+
+    def _depth_below(self, samples: ProgramSamples, chatters: Flags, depth_mm: float) -> float:
+        """Return a smaller depth (mm) at which the samples that chatter may be stable, with all their drops."""
+        places = np.flatnonzero(chatters)[:N_WINDOW_SAMPLES]
+        self.chattered.update(places[:MAX_REMEMBERED_SAMPLES].tolist())
+        repeated = np.add.outer(np.arange(0, len(samples.rows), chatters.size), places).ravel()
+        calm = find_deepest_stable(samples[repeated], depth_mm / 1e3)
+        return min(1e3 * calm, NEXT_DEPTH_SHARE * depth_mm, depth_mm - DEPTH_STEP_MM)
 
     def _reduced_depth(self, samples: ProgramSamples, grown: Floats, depth_mm: float) -> float:
         """Return a smaller depth (mm) at which these samples may be stable."""
         places = np.argsort(-grown)[:N_WINDOW_SAMPLES]
         self.chattered.update((places[grown[places] >= 0] % (N_PROGRAM_SAMPLES + 1))[:MAX_REMEMBERED_SAMPLES].tolist())
-        calm = find_deepest_stable(samples[places], robustness.ROBUST_DEPTH_FACTOR * depth_mm / 1e3)
-        return min(1e3 * calm / robustness.ROBUST_DEPTH_FACTOR, depth_mm - DEPTH_STEP_MM)
+        calm = find_deepest_stable(samples[places], depth_mm / 1e3)
+        return min(1e3 * calm, depth_mm - DEPTH_STEP_MM)
 
 
 def _round_speed(speed: float) -> float:

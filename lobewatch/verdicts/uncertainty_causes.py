@@ -43,6 +43,11 @@ COEFFICIENTS = Cause(
     "{coefficients_remedy}",
 )
 WEAR = Cause("wear", "result depends on tool wear (chatter above Kt {kt} N/mm2)", 'Use new edges and set wear = "new"')
+SPEED_DROP = Cause(
+    "drop",
+    "stable not rotating, but chatter within the frequency drop at speed of {drop_percent} %",
+    "Make test cuts for {program} with program_learning.find_next_cut, or set drop_percent in [speed]",
+)
 QUESTION = Cause("question", "a tap test has an open question ({questions})", "Answer the question, or tap again")
 COVERAGE = Cause("coverage", "the modes do not cover the measurement ({uncovered})", "{uncovered_remedy}")
 UNCHECKED = Cause("unchecked", "{unchecked}", "{unchecked_remedy}")

@@ -17,9 +17,9 @@ from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.measurement.tap_age import TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
-from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
+from lobewatch.verdicts.monte_carlo import MonteCarloResult, estimate_chatter_risk, run_monte_carlo
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
-from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples, draw_rotating_samples
+from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
 from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED
 
@@ -31,11 +31,11 @@ class Stability(StrEnum):
     """Stability of a program: the four words of a verdict."""
 
     STABLE = "stable"
-    """At most 1 % of the Monte Carlo samples chatter, at 95 % confidence."""
+    """At most 1 % of the samples chatter, at 95 % confidence, not rotating and over the frequency drop at speed."""
     DOUBTFUL = "doubtful"
     """Stable in the median estimate, but more samples may chatter; a remark names the decisive cause and its remedy."""
     NOT_STABLE = "not stable"
-    """Chatter in the median estimate."""
+    """Chatter in the median estimate, whatever the principal directions may be."""
     UNKNOWN = "unknown"
     """Not evaluated; a remark says why."""
 
@@ -81,11 +81,14 @@ class Verdict:
     """Spindle at speed, as learned from test cuts."""
     limit: float = math.nan
     """Median estimate of the deepest stable depth at its speed, in the worst feed direction (m); inf if there is no
-    limit up to 20 times its own depth, NaN if unknown."""
+    limit up to 20 times its own depth, NaN if unknown. Of unknown principal directions the worst in which it is stable
+    counts, if there is one."""
     limit_low: float = math.nan
     """1 % quantile of the limit (m)."""
     limit_high: float = math.nan
     """99 % quantile of the limit (m)."""
+    limit_at_speed: float = math.nan
+    """Lowest limit of the median over the frequency drop at speed (m); the limit where test cuts have been learned."""
     chatter_risk: float = math.nan
     """Chatter risk with the spindle rotating (0 to 1): estimated from plausible differences, or learned."""
     decisive_cause: str = ""
@@ -192,8 +195,6 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
     drive_limit = drive_depth_limit(case.machine, case.table, np.array([case.table.speed_rpm]))
-    worst = result.samples.with_lowest_cuts(0.0)
-    chattering = result.chatters if case.at_speed.n_cuts else draw_rotating_samples(worst).growth(case.depth)[1:] >= 0
     return Verdict(
         program=case.table,
         stability=stability,
@@ -202,7 +203,8 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
         limit=median.limit,
         limit_low=min(result.low, median.limit),
         limit_high=max(result.high, median.limit),
-        chatter_risk=float(np.mean(chattering)),
+        limit_at_speed=result.limit_at_speed,
+        chatter_risk=estimate_chatter_risk(result, case.depth, case.at_speed.n_cuts),
         decisive_cause=cause,
         chatter_frequency=median.chatter_frequency,
         kind=median.kind,

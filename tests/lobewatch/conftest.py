@@ -119,6 +119,6 @@ def new_shop() -> type[Shop]:
 def shop(tmp_path: Path) -> Shop:
     """Return a machine that runs the safe slots and is not tapped yet."""
     found = Shop(tmp_path / "m")
-    found.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200")
+    found.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200\ndrop_percent = [0, 0]")
     found.run_safe_slots()
     return found

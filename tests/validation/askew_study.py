@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import numpy as np
 from delayed_milling import DelayedCase, growth_per_turn
+from disturbed_study import FORCES, N_HITS, make_hit
 from numpy.typing import NDArray
 from verdict_study import MACHINE
 
-from acquisition import Frf
-from lobes import project_modes
+from acquisition import Circumstances, Frf, TapDirection, TapTest, check_hit, estimate_frf
+from lobes import program_limit, project_modes
 from lobewatch.machine import FEED_ANGLES, ProgramTable
-from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.program_case import ProgramCase
+from lobewatch.measurement.tap_measurement import measure
+from lobewatch.tool.assembly import Assembly, assemble
+from lobewatch.verdicts.program_case import ProgramCase, build_program
 from lobewatch.verdicts.program_samples import find_worst_limit
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
 from modal import Mode, fit_modes, select_credible_modes, synthesize_frf
@@ -101,6 +103,45 @@ def random_spindle(rng: np.random.Generator) -> AskewSpindle:
         feed=rng.choice(["x", "y", "both"]).item(),
     )
     return AskewSpindle(modes, math.radians(rng.uniform(5, 85)), cut)
+
+
+def tapped(spindle: AskewSpindle, rng: np.random.Generator) -> Assembly:
+    """Return the tool as ten hits in x and in y show it, with their FRFs."""
+    shown, forces = project_modes(spindle.modes, spindle.vectors), tuple(rng.uniform(*FORCES, N_HITS).tolist())
+    measured = []
+    sides: tuple[tuple[TapDirection, list[Mode]], ...] = (("x", shown.x), ("y", shown.y))
+    for direction, modes in sides:
+        made = tuple((mode.frequency, mode.damping_ratio, mode.stiffness) for mode in modes)
+        hits = tuple(make_hit(made, peak, rng) for peak in forces)
+        about = Circumstances("drawn", datetime(2026, 1, 1, tzinfo=UTC), "reference", direction)
+        flags = tuple(check_hit(hit) for hit in hits)
+        good = [hit for hit, fault in zip(hits, flags, strict=True) if not fault]
+        measured.append(measure(TapTest(direction, about, estimate_frf(good), hits, flags), MACHINE))
+    return assemble(measured[1], measured[0], {})
+
+
+def true_limit_mm(spindle: AskewSpindle) -> float:
+    """Lowest limit (mm) of the true modes over the feed directions."""
+    cut = MACHINE.build_cut(spindle.cut)
+    angles = np.arange(12) * math.pi / 12 if spindle.cut.feed == "both" else np.array([FEED_ANGLES[spindle.cut.feed]])
+    fed = [replace(cut, feed_angle=angle) for angle in angles.tolist()]
+    first, second = spindle.modes
+    return 1e3 * program_limit(build_program(spindle.cut, MACHINE), [first], [second], fed, spindle.vectors).limit
+
+
+def verdicts_from_hits(count: int, seed: int, shares: tuple[float, ...]) -> dict[float, list[Stability]]:
+    """Return the verdicts at shares of the true limit on random spindles, from hits in x and y."""
+    words: dict[float, list[Stability]] = {share: [] for share in shares}
+    made = 0
+    for rng in np.random.default_rng(seed).spawn(4 * count):
+        spindle = random_spindle(rng)
+        limit = true_limit_mm(spindle)
+        if made == count or limit >= DEEPEST_MM:
+            continue
+        made, tool = made + 1, tapped(spindle, rng)
+        for share in shares:
+            words[share].append(evaluate_program(_at(spindle.cut, share * limit), tool, MACHINE).stability)
+    return words
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase
 from lobewatch.verdicts.program_samples import draw_samples, find_worst_limit
 from lobewatch.verdicts.recommendation import advise, find_stable_pockets, recommend
-from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, ROBUST_DEPTH_FACTOR, Setting, sweep_extremes
+from lobewatch.verdicts.setting_robustness import MIN_DEPTH_MARGIN, Setting, sweep_extremes
 from lobewatch.verdicts.setting_search import SettingSearch
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 
@@ -144,10 +144,8 @@ def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
         return False
     drawn = draw_samples(at, worst).with_lowest_cuts(np.inf, 2)
     force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
-    hardest = drawn[np.argsort(-np.max(force, axis=1))[:HARDEST]]
-    return not np.any(
-        sweep_extremes(hardest, search.needed_drop, search.stiffness_at).growth(ROBUST_DEPTH_FACTOR * at.depth) >= 0
-    )
+    hardest = drawn.at_speed()[np.argsort(-np.max(force, axis=1))[:HARDEST]]
+    return not np.any(sweep_extremes(hardest, search.needed_drop, search.stiffness_at).growth(at.depth) >= 0)
 
 
 def _at(table: ProgramTable, speed: float, depth_mm: float) -> ProgramTable:

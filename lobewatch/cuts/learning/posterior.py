@@ -14,6 +14,7 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
+from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty
 
 N_PRIOR_SAMPLES = 2000
@@ -30,8 +31,6 @@ NEGLIGIBLE_WEIGHT = 1e-6
 """Share of the largest weight below which a sample is ignored."""
 MIN_CHATTER_FREQUENCIES, OPEN_FREQUENCY_INTERVAL = 2, (0.90, 1.05)
 """Number of chatter frequencies that determine frequencies at speed, and interval with fewer (factors); chosen."""
-USUAL_FREQUENCY_INTERVAL = (0.945, 1.025)
-"""95 % interval of natural frequencies at speed over those not rotating: `ROTATING_FREQUENCY_FACTOR`."""
 INTERVAL_LEVEL = 0.95
 """Share of the weight within an interval."""
 
@@ -96,7 +95,8 @@ class Posterior(NamedTuple):
     def is_frequency_unusual(self) -> bool:
         """True if a natural frequency is probably further from that not rotating than in 95 % of spindles."""
         leading = [values for name, values in self.samples.ratios().items() if name in ("frequency_x", "frequency_y")]
-        beside = [(USUAL_FREQUENCY_INTERVAL[0] < values) & (values < USUAL_FREQUENCY_INTERVAL[1]) for values in leading]
+        low, high = self.samples.usual_frequency_interval
+        beside = [(low < values) & (values < high) for values in leading]
         usual = float(np.sum(self.weights * np.all(beside, axis=0)))
         return self.n_frequencies >= MIN_CHATTER_FREQUENCIES and usual < 1 / 2
 
@@ -139,12 +139,18 @@ class NewEvidence(NamedTuple):
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
 
-def build_prior(rest: MillingRows, uncertainty: Uncertainty, count: int = N_PRIOR_SAMPLES, seed: int = 0) -> Posterior:
+def build_prior(
+    rest: MillingRows,
+    uncertainty: Uncertainty,
+    count: int = N_PRIOR_SAMPLES,
+    seed: int = 0,
+    drop: SpeedDrop = DEFAULT_DROP,
+) -> Posterior:
     """Build the posterior before the first cut.
 
-    rest: the spindle without rotation in the median estimate (a row).
+    rest: the spindle without rotation in the median estimate (a row); drop: of its frequencies at speed.
     """
-    return Posterior(sample_prior(rest, uncertainty, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(rest, uncertainty, count, seed, drop), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(
@@ -282,7 +288,8 @@ def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[Inconsiste
     """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, rejected)
     if posterior.is_frequency_unusual:
-        usual = f"{USUAL_FREQUENCY_INTERVAL[0]:g} to {USUAL_FREQUENCY_INTERVAL[1]:g} times that of the tap test"
+        low, high = posterior.samples.usual_frequency_interval
+        usual = f"{low:.3g} to {high:.3g} times that of the tap test"
         text = f"the frequency at speed from the test cuts is outside {usual}"
         yield Remark(
             "frequency-far-off", about, text, "Tap again with a warm spindle and the tool and stick-out of the cuts"

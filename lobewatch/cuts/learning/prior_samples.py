@@ -1,9 +1,10 @@
 """Prior samples of the rotating spindle.
 
-Standard deviations: f_n -1.5 +- 2 %, for each mode apart; zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1
-+- 30 %, for each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen:
-plausible, not measured. They are joined with the uncertainty of the program. Each number is a function of one that
-is standard normal, so that samples can be moved without leaving the prior out of sight.
+f_n drops by the range of `[speed] drop_percent` (0 to 5 % if nothing is set), for each mode apart, as cuts tell modes
+apart. Standard deviations: zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1 +- 30 %, for each material.
+Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen: plausible, not measured. They are
+joined with the uncertainty of the program. Each number is a function of one that is standard normal, so that samples
+can be moved without leaving the prior out of sight.
 """
 
 from dataclasses import dataclass, replace
@@ -15,14 +16,19 @@ import scipy
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts import program_samples
+from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields
 
 ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 """Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
 
-Frequency, damping and stiffness are those of the chatter risk of a verdict (the deviation of f_n absolute)."""
+Damping and stiffness are those of the chatter risk of a verdict."""
+DROP_SPREAD_SHARE, MIN_DROP_SPREAD = 0.8, 0.01
+"""Standard deviation of the drop over half of its range, and at least, so that cuts may contradict it; chosen."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
 """Share of frequencies that differ more, and factor on their deviation; chosen, as no measurements exist."""
+MIN_PRIOR_SHARE = 0.5
+"""Smallest share of a mode in the standard deviation of the drop: models of spindles are uncertain; chosen."""
 MAX_SAMPLED_DAMPING = 0.95
 """Largest sampled damping ratio; modes stay underdamped."""
 OPEN_FORCE_RATIO_SHARE = 0.3
@@ -45,6 +51,8 @@ class SpindleSamples:
     """Spindles not rotating with the error of tap tests, r rows; their speeds are factors on the commanded one."""
     uncertainty: Uncertainty
     """Uncertainty that the coefficients were drawn from."""
+    drop: SpeedDrop = DEFAULT_DROP
+    """Frequency drop at speed before the cuts."""
 
     def __len__(self) -> int:
         return len(self.normal)
@@ -102,9 +110,21 @@ class SpindleSamples:
 
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""
-        mean, spread = program_samples.ROTATING_FREQUENCY_FACTOR
+        mean, spread = self._frequency_prior()
         normal = self.normal[:, : self.at_rest.direction.size]
         return np.asarray(mean + spread * np.interp(normal, *_mixture_quantiles()))
+
+    def _frequency_prior(self) -> tuple[Floats, Floats]:
+        """Return mean and standard deviation of the factors of f of each mode, or (1,) each if they are alike."""
+        half = (self.drop.high - self.drop.low) / 2
+        spread = max(DROP_SPREAD_SHARE * half, MIN_DROP_SPREAD) * np.maximum(self.drop.shares, MIN_PRIOR_SHARE)
+        return 1 - (self.drop.low + half) * self.drop.shares, spread
+
+    @property
+    def usual_frequency_interval(self) -> tuple[float, float]:
+        """95 % interval of natural frequencies at speed over those not rotating, before the cuts."""
+        mean, spread = self._frequency_prior()
+        return float(np.min(mean - 2 * spread)), float(np.max(mean + 2 * spread))
 
     def _side_factors(self) -> Floats:
         """Factors of zeta and K in x and y, shape (r, 2, 2)."""
@@ -121,11 +141,13 @@ class SpindleSamples:
         return self.force_factors(material), np.maximum(ratio, 0.0)
 
 
-def sample_prior(median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0) -> SpindleSamples:
+def sample_prior(
+    median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0, drop: SpeedDrop = DEFAULT_DROP
+) -> SpindleSamples:
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     size = count, median.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL
-    return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty)
+    return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty, drop)
 
 
 def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:

@@ -23,6 +23,7 @@ from lobewatch.tool.assembly import Assembly, compute_tip_lobes
 from lobewatch.verdicts.monte_carlo import LimitBand, compute_limit_band
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, SpindleAtSpeed, build_program
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, build_median_row
+from lobewatch.verdicts.speed_drop import find_speed_drop
 from lobewatch.verdicts.uncertainty import FactorRange, LearnedSamples, Uncertainty, uncertainty_of
 from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from lobewatch.verdicts.verdict import Verdict, evaluate_program
@@ -73,9 +74,8 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 
 def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
-    start = posteriors.build_prior(
-        build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine)
-    )
+    resting, doubt = build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine)
+    start = posteriors.build_prior(resting, doubt, drop=find_speed_drop(tool, machine, machine.speed.high_rpm))
     posterior, odd_powers = start, []
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)

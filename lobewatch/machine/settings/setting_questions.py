@@ -128,7 +128,8 @@ def hash_programs(machine: Machine) -> dict[str, str]:
     for program in machine.program:
         questions = [question.statement for question in find_program_questions(machine, program, on_model=True)]
         tool = machine.pitch_deg(program), machine.helix_deg(program)
-        decisive = program, tool, machine.coefficients(program), machine.doubt, questions
+        drop = machine.speed.drop_range(program.speed_rpm)
+        decisive = program, tool, machine.coefficients(program), machine.doubt, questions, drop
         content = msgspec.json.encode((HASH_SALT, *decisive))
         hashes[program.name] = hashlib.sha256(content).hexdigest()
     return hashes

@@ -149,8 +149,16 @@ class LimitsTable(TomlTable, frozen=True):
     """Frequency drop that alarms (%)."""
 
 
+DROP_LIMITS_PERCENT = (-5.0, 20.0)
+"""Smallest and largest frequency drop at speed (%); bearing models give 2 to 8 %, heat may raise a frequency."""
+DropPercent = Annotated[float, Plausible(0.05, 20)]
+"""Frequency drop at speed (%); negative: a rise."""
+FULL_DROP_SPEED_SHARE = 0.25
+"""Share of the highest speed from which the whole frequency drop counts; chosen."""
+
+
 class SpeedTable(TomlTable, frozen=True):
-    """Table [speed]: speed range of the lobe diagrams."""
+    """Table [speed]: speeds of the spindle, and what its natural frequencies do at speed."""
 
     low_rpm: Annotated[Positive, Plausible(10, 60_000)] = 1000.0
     """Lowest speed (rpm)."""
@@ -158,8 +166,26 @@ class SpeedTable(TomlTable, frozen=True):
     """Highest speed (rpm)."""
     steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
     """Number of speeds of a diagram."""
+    drop_percent: tuple[DropPercent, DropPercent] = (0.0, 5.0)
+    """Smallest and largest drop of the natural frequencies at speed (%), below those not rotating; negative: a rise.
+
+    The default is assumed. Jones-type bearing models give 2 to 8 % at high speed, and heat in locked bearings less."""
+
+    def drop_range(self, speed_rpm: float) -> tuple[float, float]:
+        """Return the smallest and largest relative frequency drop at a speed (rpm).
+
+        It counts from a quarter of the highest speed on, and below in proportion to the speed.
+        """
+        share = min(speed_rpm / (FULL_DROP_SPEED_SHARE * self.high_rpm), 1.0) / 100
+        return share * self.drop_percent[0], share * self.drop_percent[1]
 
     def __post_init__(self) -> None:
+        lowest, highest = DROP_LIMITS_PERCENT
+        if not lowest <= self.drop_percent[0] <= self.drop_percent[1] <= highest:
+            raise ValueError(
+                f"drop_percent={list(self.drop_percent)} is not in rising order within {lowest:g} to {highest:g} %. "
+                "Give [smallest, largest] frequency drop at speed."
+            )
         if not self.low_rpm < self.high_rpm:
             cure = "Give the lowest speed, then the highest."
             if self.low_rpm == self.high_rpm:

@@ -20,7 +20,7 @@ from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.materials import power_json, power_text
-from lobewatch.show.programs.verdicts import factor_text
+from lobewatch.show.programs.verdicts import chance_text, factor_text
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
 from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
@@ -330,7 +330,8 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         depth = f"{1e3 * cut.depth:.4g}"
         number = f"test cut {n_made + 1} of {n_made + next_cut.cuts_left}"
         yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm ({number})"
-        yield f"Chatter risk {round(100 * cut.chatter_probability)} %, {_suggestion_reason(cut, learning)}"
+        risk = chance_text(cut.chatter_probability)
+        yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, learning)}"
         yield _observe_text(folder, program.name, cut.speed_rpm, depth)
         if program.feed_per_tooth_mm is not None:
             yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."

@@ -18,6 +18,8 @@ from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.show.programs.verdicts import (
     at_speed_text,
+    chance_text,
+    limits_at_speed_lines,
     tap_age_json,
     tap_age_text,
     verdict_json,
@@ -63,7 +65,7 @@ def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvi
 def setting_json(setting: Setting) -> JsonObject:
     """Return a recommended speed and depth with its robustness."""
     named = pick(setting, "speed_rpm", "depth_mm", "window_rpm", "depth_margin")
-    return named | {"frequency_left": setting.drop_margin}
+    return named | {"frequency_left": setting.drop_margin, "chance_turning": setting.chatter_risk}
 
 
 def _advice_json(program: ProgramAdvice) -> JsonObject:
@@ -180,15 +182,15 @@ def _alternative_items(advice: ProgramAdvice, machine: Machine) -> list[str]:
     if best is None:
         return ["Choose another tool", f"No stable speed {reach}"]
     if best.depth_mm == verdict.program.depth_mm:
-        return [f"Run this depth at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}", margins_text(best)]
+        return [f"Run this depth at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}", *margin_items(best)]
     items = list[str]()
     if shallower is None or (best.speed_rpm, best.depth_mm) != (shallower.speed_rpm, shallower.depth_mm):
         items.append(f"Run {best.depth_mm:g} mm at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}")
-        items.append(f"Highest removal rate, {margins_text(best).lower()}")
+        items += [f"Highest removal rate, {margins_text(best).lower()}", risk_text(best)]
     if shallower is not None:
         cut = "Or cut" if items else "Cut"
         items.append(f"{cut} at most {shallower.depth_mm:g} mm at this speed, {window_text(shallower)}")
-        items.append(margins_text(shallower))
+        items += margin_items(shallower)
     return [*items, f"No stable speed for this depth {reach}"]
 
 
@@ -200,6 +202,16 @@ def format_rpm(speed: float) -> str:
 def window_text(setting: Setting) -> str:
     """Return the stable speeds around a setting."""
     return "stable from {} to {} rpm".format(*map(format_rpm, setting.window_rpm))
+
+
+def margin_items(setting: Setting) -> list[str]:
+    """Return the margins of a setting and its chance of chatter at speed."""
+    return [margins_text(setting), risk_text(setting)]
+
+
+def risk_text(setting: Setting) -> str:
+    """Return the chance of chatter at speed in words."""
+    return f"Chance of chatter at speed: {chance_text(setting.chatter_risk)}"
 
 
 def margins_text(setting: Setting) -> str:
@@ -260,11 +272,11 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
         *shift_lines(comparison.shifts),
     ]
     if comparison.pockets:
-        heading = "Settings that stay stable until the next tap tests, highest removal rate first:"
+        heading = "Settings that stay stable at speed and until the next tap tests, highest removal rate first:"
         texts += [heading, pocket_table(comparison.pockets)]
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET_CODE]
     if verdicts:
-        texts.append(verdict_table(verdicts))
+        texts += [verdict_table(verdicts), *limits_at_speed_lines(verdicts)]
         methods = dict.fromkeys(verdict.method for verdict in verdicts if verdict.method)
         texts += [f"Verdicts computed by {method}, as in lobewatch check" for method in methods]
     if taught := [verdict for verdict in verdicts if verdict.n_cuts]:
@@ -275,12 +287,14 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Return a table with a line for each recommended pocket."""
-    table = new_table("speed (rpm)", "stable (rpm)", "ap (mm)", "depth margin", "f1 margin")
+    table = new_table("speed (rpm)", "stable (rpm)", "ap (mm)", "depth\nmargin", "f1\nmargin", "chatter\nat speed")
     for pocket in pockets:
         window = "{:.0f}..{:.0f}".format(*pocket.window_rpm)
         margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
         drop = f"{100 * pocket.drop_margin:.0f} %{' or more' if pocket.drop_margin >= CHECKED_DROPS[-1] else ''}"
-        table.add_row(f"{pocket.speed_rpm:.0f}", window, f"{pocket.depth_mm:.2f}", margin, drop)
+        table.add_row(
+            f"{pocket.speed_rpm:.0f}", window, f"{pocket.depth_mm:.2f}", margin, drop, chance_text(pocket.chatter_risk)
+        )
     return table
 
 

@@ -14,7 +14,7 @@ from lobewatch.machine.journal.journal import format_command
 from lobewatch.show.programs.advice import (
     LINE_REMARK_CODES,
     format_rpm,
-    margins_text,
+    margin_items,
     setting_json,
     window_text,
     worst_feed_text,
@@ -126,7 +126,7 @@ def _setting_text(setting: Setting, answer: Recommendation) -> str:
 
 
 def _margin_items(setting: Setting, answer: Recommendation, feed: str = "") -> list[str]:
-    return [capitalize(window_text(setting)) + feed, margins_text(setting), _removal_rate_text(setting, answer)]
+    return [capitalize(window_text(setting)) + feed, *margin_items(setting), _removal_rate_text(setting, answer)]
 
 
 def _removal_rate_text(setting: Setting, answer: Recommendation) -> str:

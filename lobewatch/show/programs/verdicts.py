@@ -11,7 +11,7 @@ from rich.table import Table
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
-from lobewatch.machine import Machine, UncertaintyTable
+from lobewatch.machine import Machine, SpeedTable, UncertaintyTable
 from lobewatch.measurement.chain_check import find_weakest_check
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.show.terminal.sentences import wrap_lines
@@ -23,7 +23,7 @@ from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.uncertainty_causes import CLAMPING, UNCERTAINTY_CAUSES
 
 NOT_ROTATING_TEXTS = (
-    "Verdicts and limits are for the spindle as tapped, not rotating.",
+    "Limits in the table are for the spindle as tapped, not rotating.",
     "The chatter risk is estimated for the rotating spindle, not measured.",
 )
 """Notes on reading a table of verdicts."""
@@ -97,12 +97,31 @@ def verdict_notes(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
             evaluated += 1
             learned += [verdict] if verdict.n_cuts else []
     lines = [*_tap_age_lines(verdicts), *_chain_lines(verdicts)]
-    lines += NOT_ROTATING_TEXTS if len(learned) < evaluated else ()
+    lines += [*NOT_ROTATING_TEXTS, speed_drop_text(machine)] if len(learned) < evaluated else []
+    lines += limits_at_speed_lines(verdicts)
     lines += [at_speed_text(learned)] if learned else []
     for causes, names in named.items():
         about = f"Uncertainty of {', '.join(names)}" if len(named) > 1 else "Uncertainty"
         lines += [f"{about} (docs/lobes.md):", *(f"  {cause}" for cause in causes)]
     return lines
+
+
+def speed_drop_text(machine: Machine) -> str:
+    """Return the note on the frequency drop that a stable verdict covers."""
+    low, high = machine.speed.drop_percent
+    source = "assumed" if machine.speed.drop_percent == SpeedTable().drop_percent else FROM_MACHINE_FILE
+    return f"Stable covers a frequency drop at speed of {low:g} to {high:g} % ({source})."
+
+
+def limits_at_speed_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Yield one line with the lowest limit of each program over the frequency drop; none for learned ones."""
+    texts = [
+        f"{verdict.program.name} {limit_at_speed_text(verdict)}"
+        for verdict in verdicts
+        if not (verdict.n_cuts or math.isnan(verdict.limit_at_speed))
+    ]
+    if texts:
+        yield f"Limit at speed, lowest over the frequency drop (mm): {', '.join(texts)}"
 
 
 def at_speed_text(verdicts: Sequence[Verdict]) -> str:
@@ -220,6 +239,8 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "limit_mm": verdict.limit * 1e3,
         "limit_low_mm": verdict.limit_low * 1e3,
         "limit_high_mm": verdict.limit_high * 1e3,
+        "limit_at_speed_mm": verdict.limit_at_speed * 1e3,
+        "drop_at_speed": None if samples is None else [samples.drop.low, samples.drop.high],
         "depth_margin": verdict.depth_margin,
         "chance_turning": verdict.chatter_risk,
         "decided_by": verdict.decisive_cause or None,
@@ -253,6 +274,11 @@ def limits_text(verdict: Verdict) -> str:
     return limit_text(verdict) + (f" ({band})" if band else "")
 
 
+def limit_at_speed_text(verdict: Verdict) -> str:
+    """Return the lowest limit (mm) over the frequency drop at speed."""
+    return "-" if math.isnan(verdict.limit_at_speed) else _depth_text(verdict.limit_at_speed, verdict)
+
+
 def limit_text(verdict: Verdict) -> str:
     """Return the median limit (mm)."""
     return "-" if math.isnan(verdict.limit) else _depth_text(verdict.limit, verdict)
@@ -271,6 +297,21 @@ def chatter_risk_text(verdict: Verdict) -> str:
         return "-"
     percent = round(100 * verdict.chatter_risk)
     return {0: "< 1 %", 100: "> 99 %"}.get(percent, f"{percent} %")
+
+
+EVEN_CHANCE, NEAR_CERTAINTY = 0.5, 0.95
+"""Chances above which words count tenths, and call an event almost certain."""
+WORDED_CHANCES = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 70, 100)
+"""Numbers N of the words "about 1 in N"; the last bounds a chance of which no sample is evidence."""
+
+
+def chance_text(chance: float) -> str:
+    """Return a chance in words, such as "about 1 in 50"."""
+    if chance * WORDED_CHANCES[-1] < 1:
+        return f"less than 1 in {WORDED_CHANCES[-1]}"
+    if chance > EVEN_CHANCE:
+        return "almost certain" if chance > NEAR_CERTAINTY else f"about {round(10 * chance)} in 10"
+    return f"about 1 in {min(WORDED_CHANCES, key=lambda number: abs(math.log(number * chance)))}"
 
 
 def margin_text(verdict: Verdict) -> str:

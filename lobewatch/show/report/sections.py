@@ -101,7 +101,14 @@ def make_programs(data: ReportData) -> list[Section]:
         return []
     dates = {} if data.no_dates else {name: texts for name, *texts in trends.forecast_date_rows(data.outlook)}
     heads = ["program", "verdict", *(DATE_HEADS if dates else ()), "run instead", "speed (rpm)", "ap (mm)"]
-    heads += ["limit, 98 % interval (mm)", "ap margin", "chatter risk", "f1 margin", "first verdict"]
+    heads += [
+        "limit, 98 % interval (mm)",
+        "limit at speed (mm)",
+        "ap margin",
+        "chatter risk",
+        "f1 margin",
+        "first verdict",
+    ]
     table = DataTable(heads, [_program_row(program, dates) for program in data.programs], "words")
     checked = [program.verdict for program in data.programs if program.verdict.stability is not Stability.UNKNOWN]
     remarks = [remark for program in data.programs for remark in program.verdict.remarks]
@@ -126,6 +133,7 @@ def _program_row(program: ProgramAdvice, dates: dict[str, list[str]]) -> list[st
         format_rpm(verdict.program.speed_rpm),
         f"{verdict.program.depth_mm:g}",
         verdicts.limits_text(verdict).replace("..", " to "),
+        verdicts.limit_at_speed_text(verdict),
         verdicts.margin_text(verdict),
         verdicts.chatter_risk_text(verdict),
         frequency_margin_text(program.advice),

@@ -10,6 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from lobes import Cut, Program, program_limit, spectral_radius, stability_boundary, zero_order_lobes
+from lobes.floquet.crossings import (
+    ESTIMATE_ACCURACY,
+    GROWTH_SIGN_ACCURACY,
+    converged_crossings,
+    estimate_limits,
+    find_crossings,
+)
+from lobes.floquet.milling_rows import rows_at_speeds
+from lobes.milling_system import build_milling_system
 from lobes.tip_response import TipModes
 from modal import Mode
 
@@ -74,6 +83,28 @@ def test_a_short_excursion_below_the_limit_is_seen(modes: list[Mode], speed: flo
 
 def test_limits_around_flip_lobes_hold_against_a_dense_scan() -> None:
     assert sum(missed(case) for case in cases(8, 3)) == 0
+
+
+def test_the_first_crossing_is_the_first_of_all() -> None:
+    for case in cases(4, 8):
+        system = build_milling_system(case.x, case.y)
+        rows = rows_at_speeds(system, case.cut, case.speed_rpm)
+        everything, _ = converged_crossings(rows, case.deepest)
+        first, _ = converged_crossings(rows, case.deepest, first_only=True)
+        assert first[:, 0] == pytest.approx(everything[:, 0], rel=1e-5)
+        assert estimate_limits(rows, case.deepest) == pytest.approx(everything[:, 0], rel=5e-3)
+
+
+def test_an_estimate_asks_for_growth_that_has_its_sign() -> None:
+    asked = []
+
+    def growth(row: NDArray[np.intp], depth: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+        asked.append(tolerance)
+        return (depth - 0.3) * (0.5 - depth)
+
+    found = find_crossings(growth, 1, 1.0, first_only=True, accuracy=ESTIMATE_ACCURACY)
+    assert found[0] == pytest.approx([0.3], rel=ESTIMATE_ACCURACY)
+    assert max(asked) <= GROWTH_SIGN_ACCURACY < ESTIMATE_ACCURACY
 
 
 @pytest.mark.long

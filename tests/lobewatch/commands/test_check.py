@@ -90,7 +90,14 @@ def test_the_object_of_a_program(shop: Shop, check: Check) -> None:
     assert not found.keys() & {"nearest_speed_rpm", "speed_margin", "limit_band"}
     assert (found["stable"], found["verdict"], found["cuts"], found["decided_by"]) == (False, "not stable", 0, None)
     for advice in (found["advice"], found["advice_here"]):
-        assert advice.keys() == {"speed_rpm", "depth_mm", "window_rpm", "depth_margin", "frequency_left"}
+        assert advice.keys() == {
+            "speed_rpm",
+            "depth_mm",
+            "window_rpm",
+            "depth_margin",
+            "frequency_left",
+            "chance_turning",
+        }
         low, high = advice["window_rpm"]
         assert low <= advice["speed_rpm"] <= high
         assert advice["depth_margin"] >= 0.2

@@ -111,7 +111,7 @@ def test_without_y_there_is_none_and_tapping_it_would_change_that(shop: Shop, ru
 
 
 def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
-    taps = [shop.tap(0.1 * i, 1713.0, direction, stiffness=5e5) for i, direction in enumerate("xy")]
+    taps = [shop.tap(0.1 * i, 1713.0, direction, stiffness=3e5) for i, direction in enumerate("xy")]
     code, out, _ = run("recommend")
     assert (code, "stiffness-off-model" in out) == (1, True)
     shop.logbook.accept(taps, ["stiffness-off-model"])

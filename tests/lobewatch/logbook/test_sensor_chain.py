@@ -23,8 +23,8 @@ from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, f
 from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable
 from lobewatch.measurement.sensor_models import fits_sensor_models
 from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
+from lobewatch.tap.hit_check import average_hits
 from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
-from lobewatch.tap.tap_in_progress import average_hits
 from lobewatch.verdicts import Stability, Verdict
 from modal import Mode
 

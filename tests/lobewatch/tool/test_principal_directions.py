@@ -103,3 +103,34 @@ def test_x_and_y_of_one_mode_3_percent_apart_still_belong_together() -> None:
     axes = find_principal_directions(shown.x, moved)
     assert [(pair.x, pair.y) for pair in axes.pairs] == [(0, 2), (1, 3)]
     assert axes.sign_count == 1
+
+
+def test_frfs_that_tell_x_from_y_leave_no_sign_and_little_rotation() -> None:
+    """Residues of the modes of x in y, and of y in x, in parts of those that are there."""
+    shown = project_modes(PAIR, turned_by(30))
+    y = [mode.scaled(1.03, 1.0, "") for mode in shown.y]
+    residue = np.array([1 / mode.stiffness for mode in (*y, *shown.x)])
+    apart = find_principal_directions(shown.x, y, hidden=0.01 * residue)
+    assert apart.sign_count == 0
+    assert [pair.max_rotation for pair in apart.pairs] == pytest.approx(2 * [np.arcsin(0.1)])
+    assert find_principal_directions(shown.x, y, hidden=0.9 * residue).sign_count == 1
+    assert find_principal_directions(shown.x, y, hidden=np.full(4, np.inf)).sign_count == 1
+
+
+def test_a_mode_of_one_direction_leans_no_more_than_the_other_frf_allows() -> None:
+    hidden = np.array([np.inf, 1e-4 / 60e6, np.inf])
+    axes = find_principal_directions(
+        [PAIR[0], Mode(3000.0, 0.02, 60e6)], [PAIR[0].scaled(1.001, 1.0, "")], None, hidden
+    )
+    assert axes.max_cross_share == pytest.approx([0, 0.01, 0])
+
+
+def test_modes_of_open_signs_may_also_be_along_x_and_y() -> None:
+    shown = project_modes(PAIR, turned_by(30))
+    axes = find_principal_directions(shown.x, shown.y)
+    along = axes.possible_vectors[-1]
+    assert len(axes.possible_vectors) == 3
+    assert along.tolist() == [[1, 0], [1, 0], [0, 1], [0, 1]]
+    vectors = axes.sample(300, 0)
+    assert {np.sign(np.round(v[0, 1], 9)) for v in vectors} == {-1.0, 0.0, 1.0}
+    assert len(find_principal_directions(shown.x, shown.y, shown.cross).possible_vectors) == 1

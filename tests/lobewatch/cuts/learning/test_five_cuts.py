@@ -30,6 +30,7 @@ from lobewatch.cuts.learning.suggestion import (
     suggest_cut,
 )
 from lobewatch.machine.journal.entries import CutVerdict
+from lobewatch.verdicts.speed_drop import SpeedDrop
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from lobewatch.verdicts.zero_order_batch import is_force_constant
 from modal import Mode
@@ -199,7 +200,7 @@ def noticed(spindles: Sequence[Hidden], number: int = 3) -> tuple[float, float]:
 def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_truth() -> None:
     """Simulated in time; what grows most at this depth sounds 22 % higher."""
     one, speed, depth = Hidden(215), 13510.0, 12e-3
-    truth = one.learnt.samples[:1]
+    truth = replace(one.learnt.samples[:1], drop=SpeedDrop(0.0, 0.03))
     truth.normal[:] = 0.0
     one.turn({name: float(values[0]) for name, values in truth.ratios().items()})
     ((word, pitch),) = heard([one.milling(speed, depth)])

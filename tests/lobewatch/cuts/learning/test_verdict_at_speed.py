@@ -64,6 +64,7 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
 
 
 def test_the_history_keeps_the_verdict_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
+    shop.edit("drop_percent = [0, 0]\n", "")
     shop.tap_both()
     before = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in before}

@@ -108,7 +108,8 @@ FEED_ANGLES = np.pi * np.arange(12) / 12
 
 def modes_of(structure: Structure) -> list[Mode]:
     """Return the true modes."""
-    return [Mode(*map(float, row)) for row in zip(structure.frequency, structure.damping_ratio, structure.stiffness)]
+    rows = np.transpose([structure.frequency, structure.damping_ratio, structure.stiffness])
+    return [Mode(*row) for row in rows.tolist()]
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from emulated_workshop import (
-    RIGHT,
     Array,
     Disturbance,
     Said,

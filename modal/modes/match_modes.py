@@ -79,6 +79,7 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     stiffness,
     each in units of a typical change (stiffness if both know it), and of 1 - MAC if both modes have shapes over
     the same points. A mode that is alike but for its frequency is the same up to 15 %, the largest drop of a spindle.
+    One that is alike but for its stiffness is the same within 0.5 % of the frequency: the gain has changed.
 
     Parameters
     ----------
@@ -120,8 +121,12 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
 def _is_same_mode(last: Mode, mode: Mode) -> bool:
     if _match_distance(last, mode) <= MAX_MATCH_DISTANCE:
         return True
-    moved = abs(mode.frequency / last.frequency - 1) <= MAX_FOLLOWED_FREQUENCY_CHANGE
-    return moved and _match_distance(replace(last, frequency=mode.frequency), mode) <= DOUBTFUL_MATCH_DISTANCE
+    change = abs(mode.frequency / last.frequency - 1)
+    moved = replace(last, frequency=mode.frequency)
+    if change <= MAX_FOLLOWED_FREQUENCY_CHANGE and _match_distance(moved, mode) <= DOUBTFUL_MATCH_DISTANCE:
+        return True
+    scaled = replace(moved, stiffness=mode.stiffness)
+    return change <= MATCHED_FREQUENCY_SHARE and _match_distance(scaled, mode) <= DOUBTFUL_MATCH_DISTANCE
 
 
 def _values_text(mode: Mode) -> str:

@@ -52,6 +52,8 @@ Disturbance = Callable[[Array, Array], Array]
 START = datetime(2025, 1, 15, 9, tzinfo=UTC)
 MONTH = timedelta(days=30)
 RATE = 25600.0
+MONTHS = 60
+"""Months of a machine."""
 HITS = 4
 """Good hits of a test."""
 PATIENCE = 40.0
@@ -106,6 +108,11 @@ PROGRAMS = {"half": 0.5, "just": 1.03}
 FEED_ANGLES = np.pi * np.arange(12) / 12
 
 
+def spread(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw a number evenly in its logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
 def modes_of(structure: Structure) -> list[Mode]:
     """Return the true modes."""
     rows = np.transpose([structure.frequency, structure.damping_ratio, structure.stiffness])
@@ -135,7 +142,10 @@ def scale(structure: Structure, frequency: float | Array = 1.0, stiffness: float
 
 
 def random_truth(rng: np.random.Generator) -> Truth:
-    """Draw a tool of carbide in a spindle. The static compliance at the tip is that of tool, holder and spindle."""
+    """Draw a tool of carbide in a spindle. The static compliance at the tip is that of tool, holder and spindle.
+
+    The frequencies of x and y differ by 0.2 % at least.
+    """
     while True:
         diameter, slenderness = rng.uniform(8e-3, 25e-3), rng.uniform(3.0, 5.5)
         beam = ToolBeam(diameter, slenderness * diameter, slenderness * diameter, "carbide")
@@ -147,7 +157,9 @@ def random_truth(rng: np.random.Generator) -> Truth:
     compliance = np.array([support + (1 - share) * beam.compliance, share * beam.compliance])
     frequency, damping = np.array([low, high]), rng.uniform(0.012, 0.045, 2)
     x = Structure(frequency, damping, 1 / compliance)
-    differ = rng.choice([0.003, 0.01, 0.04]) * rng.standard_normal(2)
+    differ = np.zeros(2)
+    while np.min(np.abs(differ)) < 0.002:
+        differ = rng.choice([0.003, 0.01, 0.04]) * rng.standard_normal(2)
     y = scale(replace(x, damping_ratio=damping * np.exp(0.1 * rng.standard_normal(2))), np.exp(differ))
     return Truth(x, scale(y, 1.0, np.exp(0.08 * rng.standard_normal(2))), beam)
 
@@ -210,8 +222,8 @@ class Workshop:
     knows_tool: bool = True
     truth: Truth = field(init=False)
     channels: tuple[Channel, Channel] = field(init=False)
-    operators: Array = field(init=False)
-    drop: float = field(init=False)
+    clamped: list[tuple[float, float]] = field(init=False)
+    """Frequency in each month over the first one, and bias of ln K of its operator."""
     month: int = 0
     ratio: float = 1.0
     """Kt and Kr as entered, over the true ones."""
@@ -223,8 +235,11 @@ class Workshop:
         rng = self.rng
         self.truth = random_truth(rng)
         self.channels = choose_sensors(self.truth.x, rng)
-        self.operators = 0.5 * self.stiffness_std * rng.standard_normal(3)
-        self.drop = rng.uniform(0, 0.002)
+        operators = 0.5 * self.stiffness_std * rng.standard_normal(3)
+        worn, reclamping = 1 - rng.uniform(0, 0.002) * np.arange(MONTHS), spread(rng, 5e-4, 3e-3)
+        self.clamped = [
+            *zip(worn * np.exp(reclamping * rng.standard_normal(MONTHS)), rng.choice(operators, MONTHS), strict=True)
+        ]
         make_machine_folder(self.path, "new_machine.toml")
         self.cut, self.speed = self._draw_cut(), float(np.exp(rng.uniform(np.log(2500), np.log(20000))))
         self.write()
@@ -286,9 +301,8 @@ class Workshop:
 
     def tap(self, direction: TapDirection, wrong: Wrong = RIGHT) -> Tapped:
         """Make one tap test through the bytes of a board."""
-        worn = 1 - self.drop * self.month
-        reclamped = worn * np.exp(0.001 * self.rng.standard_normal())
-        scatter = self.operators[self.rng.integers(3)] + math.sqrt(0.75) * self.stiffness_std * self.rng.normal()
+        reclamped, operator = self.clamped[self.month]
+        scatter = operator + math.sqrt(0.75) * self.stiffness_std * self.rng.standard_normal()
         truth = wrong.structure or self.truth.of(direction)
         structure = scale(truth, reclamped, reclamped**2 * np.exp(scatter))
         created = wrong.created or self.time + (direction == "y") * timedelta(minutes=20)
@@ -364,6 +378,11 @@ def peak_response(structure: Structure) -> float:
     return float(np.max(np.abs(structure.response(np.arange(2000) / RATE, 0.65e-3))))
 
 
+def resting_rms(shop: Workshop) -> float:
+    """Return the noise of the acceleration at rest (m/s^2 rms)."""
+    return choose_hammering(shop.truth.x, shop, RIGHT).response_noise
+
+
 def choose_hammering(structure: Structure, shop: Workshop, wrong: Wrong) -> Hammering:
     """Return hits that use a third of the range of both sensors at most."""
     force, acceleration = (channel.full_scale / channel.sensitivity for channel in shop.channels)
@@ -393,7 +412,7 @@ def run_session(session: TapSession, path: Path) -> Tapped:
         test = session.run()
     except TapStopped:
         flags = {code for hit in session.state.hits for code in hit.flags.codes}
-        words = {session.state.verdict} if session.state.trial and session.state.verdict else set()
+        words = {session.state.verdict.replace(" ", "-")} if session.state.trial else set()
         return Tapped(frozenset({"refused", *seen, *(f"hit:{code}" for code in flags | words)}), "")
     except (DataError, DeviceError, ValueError):
         why = {f"refused:{code}" for code in session.questions.asked}

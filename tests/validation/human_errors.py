@@ -23,11 +23,15 @@ from emulated_workshop import (
     Wrong,
     ask,
     random_truth,
+    resting_rms,
     scale,
+    spread,
 )
 
 from acquisition import Structure
 from lobewatch.fleet.fleet import Fleet, find_machines
+from lobewatch.logbook import Logbook
+from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS
 
 N_EARLIER = 6
 """Months with honest tests before an error."""
@@ -64,6 +68,8 @@ class HumanError:
     """Codes that name the right cause."""
     earlier: int = N_EARLIER
     """Months with honest tests before it, 0 for an error in the first tests."""
+    asks_programs: bool = False
+    """Whether only the verdict on a program can show it."""
 
 
 @dataclass
@@ -81,11 +87,6 @@ class Count:
     """New codes, compared with the machine before the error."""
 
 
-def spread(rng: Rng, low: float, high: float) -> float:
-    """Draw a ratio evenly in its logarithm."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def either(rng: Rng, ratio: float) -> float:
     """Return a ratio or its inverse."""
     return ratio if rng.random() < 0.5 else 1 / ratio
@@ -94,6 +95,11 @@ def either(rng: Rng, ratio: float) -> float:
 def gain_at_once(shop: Workshop) -> Codes:
     """Change the gain of the accelerometer by 1.2 to 3 or its inverse."""
     return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, spread(shop.rng, 1.2, 3.0)))))
+
+
+def amplifier_switched(shop: Workshop) -> Codes:
+    """Switch the amplifier by a factor of 10."""
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, 10.0))))
 
 
 def gain_in_two_steps(shop: Workshop) -> Codes:
@@ -163,19 +169,20 @@ def tone(shop: Workshop, frequency: float, rms: float, begin: float = 0.0, row: 
 
 def spindle_turns(shop: Workshop) -> Codes:
     """Tap a spindle that turns from the start."""
-    rpm, rms = spread(shop.rng, 600, 24000), spread(shop.rng, 0.5, 20)
+    rpm, rms = spread(shop.rng, 600, 24000), resting_rms(shop) * spread(shop.rng, 2, 40)
     return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms)))
 
 
 def spindle_starts(shop: Workshop) -> Codes:
     """Tap a spindle that begins to turn after the first hits."""
-    rpm, rms = spread(shop.rng, 600, 24000), spread(shop.rng, 2, 20)
+    rpm, rms = spread(shop.rng, 600, 24000), resting_rms(shop) * spread(shop.rng, 5, 40)
     return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=3.0)))
 
 
 def mains_hum(shop: Workshop) -> Codes:
     """Tap with strong mains hum in the accelerometer."""
-    return shop.tap_both(Wrong(disturb=tone(shop, shop.rng.choice([50, 60]), spread(shop.rng, 10, 50))))
+    rms = resting_rms(shop) * spread(shop.rng, 10, 100)
+    return shop.tap_both(Wrong(disturb=tone(shop, shop.rng.choice([50, 60]), rms)))
 
 
 def broken_cable(shop: Workshop, row: int, low: float, high: float) -> Codes:
@@ -343,20 +350,23 @@ SETTING = codes("setting-not-plausible", "settings-contradict", "not-checked")
 NO_RESPONSE = codes("hit:no-response", "check:acceleration sensor", "hit:missing-response")
 ERRORS = {
     "gain changed at once": HumanError(gain_at_once, codes("stiffness-jump")),
+    "amplifier switched by ten": HumanError(amplifier_switched, codes("stiffness-jump")),
     "gain changed in two steps": HumanError(gain_in_two_steps, codes("stiffness-jump")),
     "first tests, accelerometer 2.5 to 4 times wrong": HumanError(accelerometer_entered_wrong, CHAIN, 0),
     "first tests, hammer 2.5 to 4 times wrong": HumanError(hammer_entered_wrong, CHAIN, 0),
     "first tests, mV/g entered as mV/(m/s^2)": HumanError(accelerometer_unit_wrong, CHAIN, 0),
     "first tests, mV/lbf entered as mV/N": HumanError(hammer_unit_wrong, CHAIN, 0),
     "mass check with a wrong mass": HumanError(wrong_mass, codes("chain-not-checked")),
-    "channels swapped": HumanError(swap_channels, codes("hit:swapped-channels", "hit:swapped channels")),
+    "channels swapped": HumanError(swap_channels, codes("hit:swapped-channels")),
     "sample rate off by 0.3 to 8 %": HumanError(rate_off, codes("refused:rate", "rate-not-verified")),
     "spindle turns from the start": HumanError(spindle_turns, TURNING),
     "spindle turns after the first hits": HumanError(spindle_starts, TURNING),
     "strong mains hum": HumanError(mains_hum, TURNING | {"check:hum"}),
     "cable of the accelerometer broken": HumanError(accelerometer_cable, NO_RESPONSE | TURNING),
     "cable of the hammer broken": HumanError(hammer_cable, codes("check:force sensor", "screen:unfelt-hit")),
-    "accelerometer comes loose": HumanError(sensor_falls, NO_RESPONSE | {"hit:inconsistent", "stiffness-jump"}),
+    "accelerometer comes loose": HumanError(
+        sensor_falls, NO_RESPONSE | {"hit:inconsistent", "stiffness-jump", "tool-compliance"}
+    ),
     "sensor left in x for y": HumanError(sensor_left, codes("same-direction")),
     "names x and y exchanged": HumanError(directions_exchanged, TOOL),
     "shorter tool under the old name": HumanError(shorter_tool, TOOL),
@@ -371,19 +381,20 @@ ERRORS = {
     "clock behind": HumanError(clock_behind, codes("clock-behind", "clock-before-release")),
     "clock ahead in one test": HumanError(clock_ahead, codes("clock-behind", "clock-ahead")),
     "exponential window not stated": HumanError(exponential_window, codes("damping-jump")),
-    "Kt and Kr in another unit": HumanError(force_unit_wrong, SETTING),
+    "Kt and Kr in another unit": HumanError(force_unit_wrong, SETTING, asks_programs=True),
     "speeds with separators of thousands": HumanError(speeds_with_thousands, codes("right", "refused"), 0),
 }
 """Kinds of human errors."""
 
 
-def machines(count: int, path: Path, earlier: int, stiffness_std: float = 0.03) -> Iterator[Workshop]:
-    """Yield random machines with honest tests.
+def machines(
+    count: int, path: Path, earlier: int, stiffness_std: float = 0.03, *, first: int = 0
+) -> Iterator[Workshop]:
+    """Yield random machines with honest tests, from a number on.
 
-    Half of those with tests have a mass check and half know their tool, so that a quarter has both. Those without
-    have neither.
+    Half of them know their tool. Half of those with tests have a mass check, so that a quarter has both.
     """
-    for number, rng in enumerate(np.random.default_rng(52).spawn(count)):
+    for number, rng in list(enumerate(np.random.default_rng(52).spawn(first + count)))[first:]:
         shop = Workshop(path / f"{earlier}-{number}" / "m", rng, stiffness_std, knows_tool=number % 4 < 2)
         if earlier and number % 2:
             shop.check_mass()
@@ -421,3 +432,18 @@ def add(count: Count, error: HumanError, seen: Seen, before: Seen) -> None:
     count.false_stable += seen.is_false
     count.silent_and_false += is_silent and seen.is_false
     count.said.update(seen.codes - before.codes)
+
+
+def count_questions(count: int, stiffness_std: float, path: Path) -> list[int]:
+    """Return the number of questions in each honest series of 24 months in x and y, each answered."""
+    numbers = []
+    for shop in machines(count, path, 0, stiffness_std):
+        numbers.append(0)
+        for _ in range(24):
+            for direction in ("x", "y"):
+                tapped = shop.tap(direction)
+                asked = sorted(tapped.codes & set(RECORDING_QUESTIONS))
+                numbers[-1] += len(asked) + (not tapped.tap_id)
+                Logbook.open(shop.path).accept([tapped.tap_id], asked)
+            shop.month += 1
+    return numbers

@@ -58,6 +58,8 @@ DOUBTFUL_MATCH_DISTANCE = 2.5
 """Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
 """Largest relative change of frequency of an otherwise unchanged mode."""
+MATCHED_FREQUENCY_SHARE = 0.005
+"""Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
 """Distance of the second nearest mode over that of the nearest below which it is a rival."""
 
@@ -102,9 +104,11 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     >>> follow_mode(last, now[1:]).mode is None
     True
     """
-    near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
-    if not near or not _is_same_mode(last, near[0]):
-        nearest = f", nearest mode at {near[0].frequency:.1f} Hz" if near else ""
+    ordered = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
+    is_near = bool(ordered) and _is_same_mode(last, ordered[0])
+    near = ordered if is_near else [mode for mode in ordered if _has_other_gain(last, mode)]
+    if not near:
+        nearest = f", nearest mode at {ordered[0].frequency:.1f} Hz" if ordered else ""
         text = f"followed mode not found again{nearest}"
         return ModeMatch(None, (mode_remark(last, "no-mode-to-follow", text),))
     first = _match_distance(last, near[0])
@@ -121,12 +125,13 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
 def _is_same_mode(last: Mode, mode: Mode) -> bool:
     if _match_distance(last, mode) <= MAX_MATCH_DISTANCE:
         return True
-    change = abs(mode.frequency / last.frequency - 1)
-    moved = replace(last, frequency=mode.frequency)
-    if change <= MAX_FOLLOWED_FREQUENCY_CHANGE and _match_distance(moved, mode) <= DOUBTFUL_MATCH_DISTANCE:
-        return True
-    scaled = replace(moved, stiffness=mode.stiffness)
-    return change <= MATCHED_FREQUENCY_SHARE and _match_distance(scaled, mode) <= DOUBTFUL_MATCH_DISTANCE
+    moved = abs(mode.frequency / last.frequency - 1) <= MAX_FOLLOWED_FREQUENCY_CHANGE
+    return moved and _match_distance(replace(last, frequency=mode.frequency), mode) <= DOUBTFUL_MATCH_DISTANCE
+
+
+def _has_other_gain(last: Mode, mode: Mode) -> bool:
+    is_near = abs(mode.frequency / last.frequency - 1) <= MATCHED_FREQUENCY_SHARE
+    return is_near and _match_distance(replace(last, stiffness=mode.stiffness), mode) <= DOUBTFUL_MATCH_DISTANCE
 
 
 def _values_text(mode: Mode) -> str:
@@ -141,10 +146,6 @@ def _match_distance(a: Mode, b: Mode) -> float:
     if a.shape is not None and b.shape is not None and a.shape.shape == b.shape.shape:
         changes.append((1 - mac(a.shape, b.shape)) / TYPICAL_MAC_LOSS)
     return float(np.linalg.norm(changes))
-
-
-MATCHED_FREQUENCY_SHARE = 0.005
-"""Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
 
 
 MIN_FRFS_FOR_ABSENCE = 2

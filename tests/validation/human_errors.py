@@ -348,6 +348,7 @@ TOOL = codes("stiffness-jump", "frequency-jump", "no-mode-to-follow", "tool-comp
 TURNING = codes("refused:spindle-turning", "hit:steady-vibration")
 SETTING = codes("setting-not-plausible", "settings-contradict", "not-checked")
 NO_RESPONSE = codes("hit:no-response", "check:acceleration sensor", "hit:missing-response")
+LOOSE = codes("hit:inconsistent", "stiffness-jump", "tool-compliance")
 ERRORS = {
     "gain changed at once": HumanError(gain_at_once, codes("stiffness-jump")),
     "amplifier switched by ten": HumanError(amplifier_switched, codes("stiffness-jump")),

@@ -58,8 +58,9 @@ DOUBTFUL_MATCH_DISTANCE = 2.5
 """Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
 """Largest relative change of frequency of an otherwise unchanged mode."""
-MATCHED_FREQUENCY_SHARE = 0.005
-"""Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
+MAX_GAIN_FREQUENCY_CHANGE = 0.02
+"""Largest relative change of frequency of a mode whose stiffness alone has changed, four times a large scatter of
+reclamping; chosen."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
 """Distance of the second nearest mode over that of the nearest below which it is a rival."""
 
@@ -81,7 +82,7 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     stiffness,
     each in units of a typical change (stiffness if both know it), and of 1 - MAC if both modes have shapes over
     the same points. A mode that is alike but for its frequency is the same up to 15 %, the largest drop of a spindle.
-    One that is alike but for its stiffness is the same within 0.5 % of the frequency: the gain has changed.
+    One that is alike but for its stiffness is the same within 2 % of the frequency: the gain has changed.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def _is_same_mode(last: Mode, mode: Mode) -> bool:
 
 
 def _has_other_gain(last: Mode, mode: Mode) -> bool:
-    is_near = abs(mode.frequency / last.frequency - 1) <= MATCHED_FREQUENCY_SHARE
+    is_near = abs(mode.frequency / last.frequency - 1) <= MAX_GAIN_FREQUENCY_CHANGE
     return is_near and _match_distance(replace(last, stiffness=mode.stiffness), mode) <= DOUBTFUL_MATCH_DISTANCE
 
 
@@ -146,6 +147,10 @@ def _match_distance(a: Mode, b: Mode) -> float:
     if a.shape is not None and b.shape is not None and a.shape.shape == b.shape.shape:
         changes.append((1 - mac(a.shape, b.shape)) / TYPICAL_MAC_LOSS)
     return float(np.linalg.norm(changes))
+
+
+MATCHED_FREQUENCY_SHARE = 0.005
+"""Relative distance within which two frequencies are the same mode, as required of repeated measurements."""
 
 
 MIN_FRFS_FOR_ABSENCE = 2

@@ -58,6 +58,8 @@ HITS = 4
 """Good hits of a test."""
 PATIENCE = 40.0
 """Time after which an operator without enough good hits gives up (s of the signal)."""
+REST = 1.3
+"""Time before the first hit (s)."""
 MAX_REJECTED = 10
 """Rejected hits after which the operator gives up."""
 ACCELEROMETERS = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1.02e-3, 2.5e-3, 5e-3, 1.02e-2)
@@ -334,6 +336,7 @@ def serve(shop: Workshop, structure: Structure, wrong: Wrong) -> Iterator[tuple[
     """Serve a tapped structure on a board that states the channels of the shop. Yields opener and watch."""
     true_rate, requested = RATE * (wrong.rate_ratio or 1.0), threading.Semaphore()
     hammered = HammeredStructure(structure, true_rate, shop.rng, choose_hammering(structure, shop, wrong))
+    hammered._next_hit = REST * true_rate  # noqa: SLF001 - nobody hits during the self-check
     sessions: list[TapSession] = []
     gains = np.array(wrong.gains)[:, np.newaxis]
 

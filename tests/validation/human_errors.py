@@ -111,27 +111,22 @@ def gain_in_two_steps(shop: Workshop) -> Codes:
 
 def accelerometer_entered_wrong(shop: Workshop) -> Codes:
     """Enter its sensitivity wrong by a factor of 2.5 to 4."""
-    return twice(shop, (1.0, either(shop.rng, spread(shop.rng, 2.5, 4.0))))
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, spread(shop.rng, 2.5, 4.0)))))
 
 
 def hammer_entered_wrong(shop: Workshop) -> Codes:
     """Enter its sensitivity wrong by a factor of 2.5 to 4."""
-    return twice(shop, (either(shop.rng, spread(shop.rng, 2.5, 4.0)), 1.0))
+    return shop.tap_both(Wrong(gains=(either(shop.rng, spread(shop.rng, 2.5, 4.0)), 1.0)))
 
 
 def accelerometer_unit_wrong(shop: Workshop) -> Codes:
     """Enter mV/g as mV/(m/s^2), or the other way round."""
-    return twice(shop, (1.0, either(shop.rng, 9.80665)))
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, 9.80665))))
 
 
 def hammer_unit_wrong(shop: Workshop) -> Codes:
     """Enter mV/lbf as mV/N, or the other way round."""
-    return twice(shop, (either(shop.rng, 4.448), 1.0))
-
-
-def twice(shop: Workshop, gains: tuple[float, float]) -> Codes:
-    """Tap with wrong gains in two months."""
-    return shop.tap_both(Wrong(gains=gains)) | shop.tap_both(Wrong(gains=gains))
+    return shop.tap_both(Wrong(gains=(either(shop.rng, 4.448), 1.0)))
 
 
 def wrong_mass(shop: Workshop) -> Codes:
@@ -176,7 +171,7 @@ def spindle_turns(shop: Workshop) -> Codes:
 def spindle_starts(shop: Workshop) -> Codes:
     """Tap a spindle that begins to turn after the first hits."""
     rpm, rms = spread(shop.rng, 600, 24000), resting_rms(shop) * spread(shop.rng, 5, 40)
-    return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=3.0)))
+    return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=2.5)))
 
 
 def mains_hum(shop: Workshop) -> Codes:
@@ -207,7 +202,7 @@ def hammer_cable(shop: Workshop) -> Codes:
 
 def sensor_falls(shop: Workshop) -> Codes:
     """Let the accelerometer come loose during the test: a part of the signal is left."""
-    begin, left = shop.rng.uniform(1, 3), shop.rng.choice([0.0, 0.1, 0.5])
+    begin, left = shop.rng.uniform(2, 4), shop.rng.choice([0.0, 0.1, 0.5])
 
     def disturb(signals: Array, seconds: Array) -> Array:
         return signals * np.where(np.outer([0, 1], seconds > begin), left, 1.0)

@@ -16,6 +16,9 @@ FULL_MARKS = [pytest.mark.long, pytest.mark.timeout(14_400)]
 NOT_NAMED = {"names x and y exchanged", "same tool in another machine", "exponential window not stated"}
 """Kinds that only some machines show (docs/studies/human-errors.md)."""
 
+OTHER_FACTORS = {"first tests, mV/lbf entered as mV/N", "gain changed at once"}
+"""Kinds that differ from others in a factor only: left out of the fast tests."""
+
 
 def say(what: str, *values: object) -> None:
     """Seen with pytest -rP or -s."""
@@ -24,8 +27,8 @@ def say(what: str, *values: object) -> None:
 
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Workshop:
-    """Return a machine with three honest tests and a mass check."""
-    (shop,) = machines(1, tmp_path_factory.mktemp("shop"), 3, first=1)
+    """Return a machine with two honest tests and a mass check."""
+    (shop,) = machines(1, tmp_path_factory.mktemp("shop"), 2, first=1)
     return shop
 
 
@@ -42,7 +45,7 @@ def test_an_honest_test_asks_nothing(shop: Workshop, tmp_path: Path) -> None:
     assert not named & frozenset().union(*(error.right for error in ERRORS.values()))
 
 
-@pytest.mark.parametrize("kind", sorted(ERRORS.keys() - NOT_NAMED))
+@pytest.mark.parametrize("kind", sorted(ERRORS.keys() - NOT_NAMED - OTHER_FACTORS))
 def test_an_error_is_named(kind: str, shop: Workshop, new_shop: Workshop, tmp_path: Path) -> None:
     error: HumanError = ERRORS[kind]
     other = (shop if error.earlier else new_shop).copy(tmp_path / "m", 2)

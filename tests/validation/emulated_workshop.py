@@ -6,7 +6,7 @@ import math
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
@@ -31,7 +31,7 @@ from acquisition import (
     TapsEmulator,
     TapsSource,
 )
-from lobes import Cut, Program, program_limit
+from lobes import Cut, Direction, Program, program_limit
 from lobewatch.logbook import Logbook
 from lobewatch.machine.daq_rates import replace_stored_rate
 from lobewatch.machine.folder import MachineFolder
@@ -107,6 +107,7 @@ depth_mm = {depth:.4f}
 """
 PROGRAMS = {"half": 0.5, "just": 1.03}
 """Programs and their depths over the true limit."""
+DIRECTIONS: tuple[Direction, Direction] = ("up", "down")
 FEED_ANGLES = np.pi * np.arange(12) / 12
 
 
@@ -132,10 +133,6 @@ class Truth:
     def of(self, direction: str) -> Structure:
         """Return the structure of a direction."""
         return self.x if direction == "x" else self.y
-
-    def scaled(self, frequency: float, stiffness: float) -> Truth:
-        """Return it with all frequencies and stiffnesses times a factor."""
-        return replace(self, **{name: scale(self.of(name), frequency, stiffness) for name in "xy"})
 
 
 def scale(structure: Structure, frequency: float | Array = 1.0, stiffness: float | Array = 1.0) -> Structure:
@@ -248,7 +245,7 @@ class Workshop:
 
     def _draw_cut(self) -> Cut:
         tangential = self.rng.uniform(500e6, 2200e6)
-        immersion, direction = self.rng.choice([1.0, 0.5, 0.15]), str(self.rng.choice(["up", "down"]))
+        immersion, direction = self.rng.choice([1.0, 0.5, 0.15]), DIRECTIONS[self.rng.integers(2)]
         radial = tangential * self.rng.uniform(0.2, 0.5)
         return Cut(int(self.rng.integers(2, 6)), immersion, direction, tangential, radial)
 
@@ -295,7 +292,7 @@ class Workshop:
             text += PROGRAM.format(**cut, **more, name=name, speed=self.speed, depth=depth)
         (self.path / "machine.toml").write_text(text, "utf-8")
 
-    def tap_both(self, wrong: Wrong = RIGHT, only: str = "xy") -> frozenset[str]:
+    def tap_both(self, wrong: Wrong = RIGHT, only: Sequence[TapDirection] = ("x", "y")) -> frozenset[str]:
         """Tap x and y of a month, and return the codes."""
         found = [self.tap(direction, wrong).codes for direction in only]
         self.month += 1

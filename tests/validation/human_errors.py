@@ -187,7 +187,7 @@ def broken_cable(shop: Workshop, row: int, low: float, high: float) -> Codes:
         noise = shop.rng.standard_normal(seconds.size) * low / 10
         return hum(np.where(np.arange(2)[:, np.newaxis] == row, noise, signals), seconds)
 
-    return shop.tap_both(Wrong(disturb=disturb), only="x")
+    return shop.tap_both(Wrong(disturb=disturb), only=["x"])
 
 
 def accelerometer_cable(shop: Workshop) -> Codes:
@@ -207,7 +207,7 @@ def sensor_falls(shop: Workshop) -> Codes:
     def disturb(signals: Array, seconds: Array) -> Array:
         return signals * np.where(np.outer([0, 1], seconds > begin), left, 1.0)
 
-    return shop.tap_both(Wrong(disturb=disturb), only="x")
+    return shop.tap_both(Wrong(disturb=disturb), only=["x"])
 
 
 def sensor_left(shop: Workshop) -> Codes:
@@ -293,14 +293,14 @@ def sensor_upside_down(shop: Workshop) -> Codes:
 def clock_behind(shop: Workshop) -> Codes:
     """Let the clock of the computer be 100 to 900 days late."""
     late = timedelta(days=float(shop.rng.uniform(100, 900)))
-    return shop.tap_both(Wrong(created=shop.time - late, guided=True), only="x")
+    return shop.tap_both(Wrong(created=shop.time - late, guided=True), only=["x"])
 
 
 def clock_ahead(shop: Workshop) -> Codes:
     """Let the clock be years ahead in one test, and right in the next."""
     ahead = datetime.now(UTC) + timedelta(days=float(shop.rng.uniform(100, 900)))
-    shop.tap_both(Wrong(created=ahead), only="x")
-    return shop.tap_both(Wrong(guided=True), only="x")
+    shop.tap_both(Wrong(created=ahead), only=["x"])
+    return shop.tap_both(Wrong(guided=True), only=["x"])
 
 
 def exponential_window(shop: Workshop) -> Codes:

@@ -64,6 +64,13 @@ STIFFNESS_JUMP = RecordingQuestion(
 """Limit: smallest relative difference from the expected stiffness that is asked about (`series_questions`); chosen.
 
 A larger scatter of the series raises it."""
+STIFFNESS_DRIFT = RecordingQuestion(
+    "stiffness-jump",
+    0.12,
+    "stiffness K {now} N/um of the newest {recent} (median) is {ratio:.3g} times the {expected} N/um expected from the "
+    "first {count} (limit {limit:.0f} %): gain, range, sensitivity or tool changed little by little?",
+)
+"""Limit: as of STIFFNESS_JUMP, between the two ends of a level; chosen."""
 FREQUENCY_RISE = RecordingQuestion(
     "frequency-jump",
     0.05,

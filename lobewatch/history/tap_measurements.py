@@ -341,7 +341,7 @@ class TapMeasurements:
         calibrated = [place for place in reversed(places) if rows[place.number].bearing_stiffness.is_known]
         for place in calibrated:
             row = rows[place.number]
-            if row.stiffness.is_known and not row.questions and row.direction not in newest:
+            if row.predicts_tools and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
         if calibrated and not any(rows[place.number].stiffness.is_known for place in calibrated):
             text = "stiffness K is unknown (no force measured). Tap again with an instrumented hammer."

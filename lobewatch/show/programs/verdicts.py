@@ -13,6 +13,7 @@ from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, SpeedTable, UncertaintyTable
 from lobewatch.measurement.chain_check import find_weakest_check
+from lobewatch.measurement.tap_age import format_age
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.tool import Assembly
@@ -54,14 +55,15 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
 
 
 def tap_age_json(assembly: Assembly | None) -> int | None:
-    """Return the age of the newest tap test in whole days; None if unknown."""
-    return None if assembly is None or assembly.age_days is None else math.floor(assembly.age_days)
+    """Return the age of the older of the newest tap tests in x and y, in whole days; None if unknown."""
+    return None if assembly is None or assembly.age_days is None else int(assembly.age_days)
 
 
 def tap_age_text(assembly: Assembly) -> str:
-    """Return date and age of the newest tap test."""
-    age = tap_age_json(assembly)
-    return f"Newest tap test: {assembly.time.astimezone():%Y-%m-%d}" + ("" if age is None else f", {age} days old")
+    """Return the date of the newest tap test, that of an older direction, and the age."""
+    dates = [f"{time.astimezone():%Y-%m-%d}" for time in (assembly.time, assembly.tapped_since) if time is not None]
+    age = [] if assembly.age_days is None else [format_age(assembly.age_days)]
+    return f"Newest tap test: {', other direction: '.join(dict.fromkeys(dates))}" + "".join(f", {text}" for text in age)
 
 
 def _tap_age_lines(verdicts: Sequence[Verdict]) -> list[str]:

@@ -86,7 +86,8 @@ def test_two_equal_hits_without_response_leave_the_change_of_the_others() -> Non
         hits[number] = replace(hits[number], acceleration=np.zeros_like(hits[number].acceleration))
     partial, drift = find_hit_changes(hits)[:2]
     assert (partial.kind, {*partial.hits}) == (HitChangeKind.PARTIAL, {*range(10)} - silent)
-    assert (drift.kind, drift.spread) == (HitChangeKind.DRIFT, pytest.approx(expected.spread, rel=0.01))
+    assert drift.kind is HitChangeKind.DRIFT
+    assert drift.spread == pytest.approx(expected.spread, rel=0.01)
 
 
 def test_hits_of_two_lengths_are_rejected() -> None:

@@ -54,7 +54,8 @@ class StartQuestions:
             if SPINDLE_TURNING.code in self.accepted:
                 return baseline
             if not self._asks:
-                answer = f"If it stands still, add accept_questions.codes {SPINDLE_TURNING.code}"
+                answer = "If it stands still, check the accelerometer cable, or add accept_questions.codes"
+                answer += f" {SPINDLE_TURNING.code}"
                 raise DataError(join_sentences(line.finding, "Stop the spindle and repeat the command", answer))
             self._show(line.text, STILL_CHOICE)
             baseline = record()

@@ -238,11 +238,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "stable": verdict.is_stable,
         "verdict": verdict.stability,
         "measured": verdict.is_measured,
-        "limit_mm": verdict.limit * 1e3,
-        "limit_low_mm": verdict.limit_low * 1e3,
-        "limit_high_mm": verdict.limit_high * 1e3,
-        "limit_at_speed_mm": verdict.limit_at_speed * 1e3,
-        "drop_at_speed": None if samples is None else [samples.drop.low, samples.drop.high],
+        **limits_json(verdict),
         "depth_margin": verdict.depth_margin,
         "chance_turning": verdict.chatter_risk,
         "decided_by": verdict.decisive_cause or None,
@@ -255,6 +251,18 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "doubt": None if samples is None else uncertainty_json(samples.uncertainty),
         "method": verdict.method,
         "method_detail": verdict.detail,
+    }
+
+
+def limits_json(verdict: Verdict) -> JsonObject:
+    """Return the limits of one verdict, not rotating and at speed, as a JSON object."""
+    drop = None if verdict.samples is None else verdict.samples.drop
+    return {
+        "limit_mm": verdict.limit * 1e3,
+        "limit_low_mm": verdict.limit_low * 1e3,
+        "limit_high_mm": verdict.limit_high * 1e3,
+        "limit_at_speed_mm": verdict.limit_at_speed * 1e3,
+        "drop_at_speed": None if drop is None else [drop.low, drop.high],
     }
 
 
@@ -301,18 +309,20 @@ def chatter_risk_text(verdict: Verdict) -> str:
     return {0: "< 1 %", 100: "> 99 %"}.get(percent, f"{percent} %")
 
 
-EVEN_CHANCE, NEAR_CERTAINTY = 0.5, 0.95
-"""Chances above which words count tenths, and call an event almost certain."""
+EVEN_CHANCE, NEAR_CERTAINTY = 0.55, 0.95
+"""Chances from which words count tenths, and call an event almost certain."""
 WORDED_CHANCES = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 70, 100)
 """Numbers N of the words "about 1 in N"; the last bounds a chance of which no sample is evidence."""
 
 
 def chance_text(chance: float) -> str:
-    """Return a chance in words, such as "about 1 in 50"."""
+    """Return a chance in words, such as "about 1 in 50"; "unknown" for NaN."""
+    if math.isnan(chance):
+        return "unknown"
     if chance * WORDED_CHANCES[-1] < 1:
         return f"less than 1 in {WORDED_CHANCES[-1]}"
-    if chance > EVEN_CHANCE:
-        return "almost certain" if chance > NEAR_CERTAINTY else f"about {round(10 * chance)} in 10"
+    if chance >= EVEN_CHANCE:
+        return "almost certain" if chance >= NEAR_CERTAINTY else f"about {min(round(10 * chance), 9)} in 10"
     return f"about 1 in {min(WORDED_CHANCES, key=lambda number: abs(math.log(number * chance)))}"
 
 

@@ -8,17 +8,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition import DataError, HammeredStructure, Hammering, HitFlags, SensorInput
+from acquisition import DataError, HammeredStructure, Hammering, Hit, HitFlags, SensorInput
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.measurement.recording_questions import SPINDLE_TURNING
+from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.measurement.recording_questions import ACCEPTED_CODE, SPINDLE_TURNING, mark_accepted
 from lobewatch.tap.emulated_faults import SOFT_TIP_WIDTH, EmulatedFault, EmulatedFaults
 from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, build_structure
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.start_questions import StartQuestions
+from lobewatch.tap.state import StatePublisher, TapState, TapStep
 from tests.lobewatch.tap.conftest import RATE, Simulated
 
 INPUTS = tuple(SensorInput(number, channel) for number, channel in enumerate(EMULATED_CHANNELS))
 Watch = Callable[[TapState], None]
+
+
+def record_at_rest(lines: dict[float, float], noise: float = 0.02) -> Hit:
+    """Return a record of 1 s with lines of these frequencies (Hz) and rms (m/s^2)."""
+    random, time = np.random.default_rng(1), np.arange(round(RATE)) / RATE
+    tones = [np.sqrt(2) * rms * np.sin(2 * np.pi * frequency * time) for frequency, rms in lines.items()]
+    response = random.normal(0, noise, time.size) + np.sum([0 * time, *tones], axis=0)
+    signals = random.normal(0, 0.05, time.size), response
+    codes = np.array([sensor.channel.encode(signal) for sensor, signal in zip(INPUTS, signals, strict=True)])
+    return Hit.from_codes(codes, EMULATED_CHANNELS, RATE)
 
 
 class Chain(Simulated):
@@ -79,8 +92,17 @@ def test_weak_hum_only_warns(folder: MachineFolder, session_of: Callable[..., An
 def test_an_accepted_line_is_kept_in_the_journal(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
     session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=3000)), accept=[SPINDLE_TURNING.code]).run()
     (entry,) = MachineFolder(folder.path).taps()
-    assert SPINDLE_TURNING.code in entry.asked
-    assert SPINDLE_TURNING.code in entry.accepted
+    assert (entry.asked, entry.asked_live, entry.accepted) == ((), (SPINDLE_TURNING.code,), (SPINDLE_TURNING.code,))
+    logbook = Logbook.open(folder.path)
+    assert logbook.questions == {}
+    assert ACCEPTED_CODE in [remark.code for remark in logbook.measurement(entry.id).remarks]
+
+
+def test_a_question_of_a_newer_version_is_no_error() -> None:
+    known = TapEntry("t", "", 0, "2026-06-01T08:00:00+00:00", "R", "x", "", asked_live=("new", SPINDLE_TURNING.code))
+    entry = TapEntry.from_line(known.line)
+    assert entry == known
+    assert [remark.code for remark in mark_accepted((), entry)] == [SPINDLE_TURNING.code]
 
 
 @pytest.mark.parametrize("rpm", [0.0, 12_000.0])
@@ -114,6 +136,27 @@ def test_the_test_goes_on_once_the_spindle_is_stopped(folder: MachineFolder, ses
 def test_an_answer_that_nobody_asked_for_is_rejected(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
     with pytest.raises(ValueError, match="start"):
         session_of(folder, lambda: Chain(folder, EmulatedFaults())).choose("start")
+
+
+def test_two_presses_answer_one_question() -> None:
+    publisher = StatePublisher(TapState(0, TapStep.CHECKING, "m", "x", wanted=3), lambda: 0.0)
+    questions = StartQuestions(publisher, "R", [], asks=True)
+
+    def press_twice() -> None:
+        for _ in range(2):
+            questions.answer(publisher.state.choices[0].key)
+
+    records = 0
+
+    def record() -> Hit:
+        nonlocal records
+        records += 1
+        return turning if records < 3 else resting
+
+    turning, resting = record_at_rest({200.0: 8.0}), record_at_rest({})
+    questions.confirm(press_twice)
+    assert questions.settle(turning, record) is resting
+    assert (questions.asked, questions.accepted, records) == ([], [], 3)
 
 
 @pytest.mark.parametrize(

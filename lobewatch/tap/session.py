@@ -250,7 +250,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     check = logbook.chain_check(measurement.tap_id)
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
     texts += [f"Sensor chain: {check.text}."] if check.evidence is not None else []
-    texts += [f"{remark.finding.removesuffix('.')}." for remark in remarks]
+    texts += [remark.finding if remark.finding[-1] in ".!?" else f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
         ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)

@@ -18,6 +18,7 @@ from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, build_structure
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.start_questions import StartQuestions
 from lobewatch.tap.state import StatePublisher, TapState, TapStep
+from lobewatch.tap.steady_line import find_steady_line
 from tests.lobewatch.tap.conftest import RATE, Simulated
 
 INPUTS = tuple(SensorInput(number, channel) for number, channel in enumerate(EMULATED_CHANNELS))
@@ -81,6 +82,43 @@ def test_no_hit_counts_while_the_spindle_turns(
     assert "rpm" in str(error.value)
     assert ("mains hum" in str(error.value)) == (rpm != 13_020.0)
     assert (session.state.hits, folder.taps()) == ((), [])
+
+
+@pytest.mark.parametrize("noise", [0.02, 2.0])
+@pytest.mark.parametrize(
+    ("lines", "frequency"),
+    [
+        ({50.0: 0.3}, 50.0),
+        ({50.0: 0.5, 100.0: 0.1}, 50.0),
+        ({60.0: 0.5}, 60.0),
+        ({24.0: 0.3}, 24.0),
+        ({300.0: 1.0, 600.0: 0.2}, 300.0),
+        ({50.0: 3.0, 150.0: 0.9, 250.0: 0.3, 57.0: 0.6}, 57.0),  # hum, and a spindle at 3420 rpm
+        ({24.3: 0.03}, None),  # floor
+        ({50.0: 0.05}, None),
+        ({300.0: 0.4}, None),
+        ({}, None),
+    ],
+)
+def test_a_person_is_asked_from_the_smallest_severity_of_vibration(
+    lines: dict[float, float], frequency: float | None, noise: float
+) -> None:
+    line = find_steady_line(record_at_rest(lines, noise))
+    assert (line and round(line.frequency)) == frequency
+    assert line is None or (line.is_asked and line.rms == pytest.approx(lines[round(line.frequency)], rel=0.5))
+
+
+@pytest.mark.parametrize(("harmonics", "asked"), [({3: 0.3, 5: 0.1}, False), ({2: 0.2}, True), ({}, True)])
+def test_only_the_odd_harmonics_of_the_mains_show_that_it_is_hum(harmonics: dict[int, float], asked: bool) -> None:
+    line = find_steady_line(record_at_rest({50.0: 3.0} | {50.0 * k: 3.0 * share for k, share in harmonics.items()}))
+    assert line is not None
+    assert (line.frequency, line.is_asked) == (50.0, asked)
+    assert "mains hum" in line.finding
+
+
+@pytest.mark.parametrize("noise", [0.02, 2.0, 200.0])
+def test_noise_has_no_line(noise: float) -> None:
+    assert find_steady_line(record_at_rest({}, noise)) is None
 
 
 def test_weak_hum_only_warns(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
@@ -162,7 +200,7 @@ def test_two_presses_answer_one_question() -> None:
 @pytest.mark.parametrize(
     ("faults", "flag"),
     [
-        (EmulatedFaults(turning_rpm=3000, begin=3.0), HitFlags.STEADY_VIBRATION),
+        (EmulatedFaults(turning_rpm=12_000, begin=3.0), HitFlags.STEADY_VIBRATION),
         (EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION),
         (EmulatedFaults(EmulatedFault.RESPONSE_CABLE, begin=3.0), HitFlags.NO_RESPONSE),
         (EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE),

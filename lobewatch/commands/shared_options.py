@@ -44,6 +44,16 @@ def rpm(text: str | float) -> float:
         raise BadParameter(str(error)) from None
 
 
+def mass(text: str | float) -> float:
+    """Parse a mass of the check with a known mass (kg), within its limits."""
+    from lobewatch.tap.mass_check import read_mass
+
+    try:
+        return read_mass(str(text))
+    except ValueError as error:
+        raise BadParameter(str(error)) from None
+
+
 Command = Callable[..., None]
 FolderArgument = functools.partial(Argument, parser=to_folder_path)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
@@ -52,7 +62,7 @@ TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at leas
 SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with [spindle] in machine.toml.")]
 FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
 ExcludableEntry = Annotated[
-    str, Argument(help="Tap test (ID, file name or a unique part of the ID), or test cut (c1).")
+    str, Argument(help="Tap test (ID, file name or a unique part of the ID), test cut (c1) or mass check (m1).")
 ]
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]

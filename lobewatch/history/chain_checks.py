@@ -10,7 +10,13 @@ from acquisition import CROSS_TAP, Remark
 from lobewatch.history.history import HistoryRow
 from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
-from lobewatch.measurement.chain_check import ChainCheck, ChainEvidence, not_recorded_remark, unchecked_remark
+from lobewatch.measurement.chain_check import (
+    ChainCheck,
+    ChainEvidence,
+    format_check_command,
+    not_recorded_remark,
+    unchecked_remark,
+)
 from lobewatch.measurement.sensor_models import fits_sensor_models
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.measurement.tool_compliance import find_tool_beam, has_plausible_size
@@ -62,7 +68,8 @@ class ChainChecks:
         if other is not None:
             return other
         counting = [check for check in self._mass_checks if check.mass_kg is not None and not check.excluded]
-        remark = unchecked_remark(entry.direction, self._path, decides if is_measured else None, counting)
+        command = format_check_command(self._path, entry.direction, self._machine.daq.channel)
+        remark = unchecked_remark(entry.direction, self._path, command, decides if is_measured else None, counting)
         return ChainCheck(tap_id, remark=remark)
 
     def _find_other_evidence(

@@ -93,7 +93,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
         asked = (ONE_HIT_CODE,) if len(tap.accepted) == 1 else ()
-        known = about.conditions, asked, about.operator
+        known = about.conditions, asked, about.operator, SensorChain.of_tap(tap)
         return cls(tap.id, digest, len(content), *labels, source, *known, hit_decisions=tap.decisions)
 
     @classmethod

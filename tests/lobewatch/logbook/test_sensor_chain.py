@@ -20,9 +20,11 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import exclude_entry, store_mass_check
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
+from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable
 from lobewatch.measurement.sensor_models import fits_sensor_models
 from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
+from lobewatch.tap.device_connection import describe_device
 from lobewatch.tap.hit_check import average_hits
 from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
 from lobewatch.verdicts import Stability, Verdict
@@ -192,6 +194,58 @@ def test_a_result_that_is_no_measure_of_the_sensitivities_is_not_stored(plain: S
     assert store_mass_result(plain.folder, device, result) is None
     assert store_mass_result(plain.folder, device, replace(result, ratio_std=0.01, phase=20.0)) is None
     assert plain.folder.contents().mass_checks == ()
+
+
+def test_the_newest_of_the_checks_of_a_day_decides(plain: Shop) -> None:
+    tap_both(plain)
+    hit_mass(plain, 1.0, ratio=3.0)
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, 1.01)
+    assert evidence(plain) == ["mass-check"] * 2
+    hit_mass(plain, 1.02, ratio=1.2)
+    assert evidence(plain) == [None, None]
+
+
+def test_nan_is_not_stored(plain: Shop) -> None:
+    result = MassCalibration(1.0, 0.001, 0.1, False, 0.001, (50.0, 3000.0), 1.2, 10, SENSORS)
+    device: Any = type("Connected", (), {"channels": SENSORS, "identity": DeviceIdentity("board", "1234")})()
+    for name in ("ratio", "ratio_std", "phase"):
+        assert store_mass_result(plain.folder, device, replace(result, **{name: float("nan")})) is None
+
+
+@pytest.mark.parametrize(
+    ("model", "serial"),
+    [
+        ("Line (Focusrite, Inc.)", ""),
+        ("USB Audio, rev 2", "A, 7"),
+        ("Line In, serial number 5", ""),
+        ("", ""),
+        ("", "7"),
+    ],
+)
+def test_a_tap_test_has_the_chain_of_its_device(model: str, serial: str) -> None:
+    identity = DeviceIdentity(model, serial, "1.0, b")
+    device: Any = type("Connected", (), {"identity": identity, "loss_detection": "none"})()
+    about = Circumstances("m", DAY, "t", "x", device=describe_device(device))
+    assert SensorChain.of(identity, SENSORS) == SensorChain.of(about, SENSORS) is not None
+
+
+def test_a_live_device_without_a_name_is_checked_like_any_other(plain: Shop) -> None:
+    tap_both(plain, device="")
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, 1.0, model="", serial="")
+    assert evidence(plain) == ["mass-check"] * 2
+
+
+def test_a_tap_test_that_is_entered_again_keeps_its_chain(plain: Shop) -> None:
+    tap_both(plain)
+    hit_mass(plain, 1.0, ratio=3.0)
+    chains = [entry.chain for entry in plain.folder.contents().taps]
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        plain.path.joinpath(name).unlink(missing_ok=True)
+    rebuild_files(plain.path)
+    assert [entry.chain for entry in plain.folder.contents().taps] == chains != [None, None]
+    assert evidence(plain) == [None, None]
 
 
 def test_older_and_replayed_tests_keep_their_verdict_with_a_remark(plain: Shop) -> None:

@@ -142,17 +142,18 @@ def compare_with_tool(modes: Sequence[Mode], tool: ToolBeam | None, highest_freq
     return ToolAgreement.TOO_STIFF if is_stiff else ToolAgreement.AGREES
 
 
-def has_plausible_size(modes: Sequence[Mode], tool: ToolBeam | None, highest_frequency: float) -> bool:
+def has_plausible_size(compliance: float, tool: ToolBeam | None, highest_frequency: float) -> bool:
     """Tell whether the compliance at the tip is that of the tool, so that no sensitivity is wrong by a factor of 3.
 
     The true compliance is at least that of the tool alone, and at most that in a soft spindle. So three times the
-    least and a third of the most must be outside of the accepted range. Arguments as of `compare_with_tool`.
+    least and a third of the most must be outside of the accepted range. compliance: static at the tip (m/N); the others
+    as of `compare_with_tool`. NaN is not plausible.
     """
-    if tool is None or highest_frequency < tool.frequency:
+    if tool is None or not highest_frequency >= tool.frequency:
         return False
     most = 1 + SUPPORT_COMPLIANCE / tool.compliance
     low, high = max(MIN_COMPLIANCE_RATIO, most / TOOL_COMPLIANCE.limit), MIN_COMPLIANCE_RATIO * TOOL_COMPLIANCE.limit
-    return low < sum_compliance(modes) / tool.compliance < high
+    return low < compliance / tool.compliance < high
 
 
 def sum_compliance(modes: Sequence[Mode]) -> float:

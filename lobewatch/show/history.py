@@ -138,7 +138,7 @@ def history_json(logbook: Logbook) -> JsonObject:
     """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
-        "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
+        "taps": [_tap_json(row, logbook) for row in logbook.checked_history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": list(map(_excluded_json, logbook.files.excluded)),
         "events": list(map(event_json, logbook.files.contents.events)),

@@ -248,7 +248,8 @@ def test_one_of_two_accelerometers_hangs_on_the_mass(
     code, _, err = sensors(three, (FORCE, x, y), "--mass-kg", "1,2", *options)
     assert code == 0, err
     (check,) = folder.contents().mass_checks
-    assert (check.mass_kg, check.passed, check.chain.acceleration_v_per_m_s2) == (MASS, True, pytest.approx(used))
+    assert (check.mass_kg, check.passed) == (MASS, True)
+    assert check.chain.acceleration_v_per_m_s2 == pytest.approx(used)
 
 
 @pytest.mark.parametrize("mass", ["0", "nan", "inf", "1000", "0.01", "heavy"])

@@ -369,6 +369,8 @@ def test_sensitivities_fit_the_models_of_both_sensors(model: str, sensitivity: f
     chain = SensorChain.of(DeviceIdentity("board", "1234"), [table.build().channel for table in tables])
     assert chain is not None
     assert fits_sensor_models(DaqTable(driver="dataq", channel=tables), chain) is fits
+    recalibrated = input_table("force", "086C03", 2.4), tables[1]
+    assert fits_sensor_models(DaqTable(driver="dataq", channel=recalibrated), chain) is fits
     other = SensorChain("1234", 3 * chain.force_v_per_n, chain.acceleration_v_per_m_s2, 5.0, 5.0)
     assert not fits_sensor_models(DaqTable(driver="dataq", channel=tables), other)
 

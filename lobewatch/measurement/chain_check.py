@@ -96,7 +96,7 @@ def unchecked_remark(
     text, cure = "sensor chain not checked", f"Check both sensors with a known mass in two minutes: {command}"
     if failed is not None:
         text = f"mass check of {failed.date.astimezone():%Y-%m-%d} failed: ratio {failed.ratio:.3g}"
-        exclude = f'{format_command("exclude", Path(path))} {failed.id} --reason "wrong mass"'
+        exclude = f'{format_command("exclude", Path(path))} {failed.id} exclude_entry.reason "wrong mass"'
         cure = f"Correct the sensitivities and tap again. If only the mass was wrong, run {exclude}"
     elif others:
         date = f"{others[-1].date.astimezone():%Y-%m-%d}"

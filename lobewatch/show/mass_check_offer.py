@@ -4,7 +4,6 @@ from functools import partial
 
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.notify.publish_status import publish_on_change
 from lobewatch.sensors.sensor_checks import check_mass
 from lobewatch.show.sensors import mass_check_texts
 from lobewatch.show.terminal.output import emit, notes
@@ -31,7 +30,7 @@ def offer_mass_check(folder: MachineFolder, tap_id: str, port: str, operator: st
     port = port or folder.machine.daq.port
     tell = partial(notes.print, markup=False)
     direction = next((tap.direction for tap in logbook.taps if tap.id == tap_id), "x")
-    with publish_on_change(logbook), folder.locked(), open_device(folder.machine.daq, port) as device:
+    with folder.locked(), open_device(folder.machine.daq, port) as device:
         result = check_mass(folder, port, device, mass, tell, operator, direction)
     emit({}, False, *mass_check_texts(result))
 

@@ -41,6 +41,8 @@ MAX_STEP_HALF_WIDTHS = 0.5
 """Largest step of a pole (half-power half-widths)."""
 MAX_LAST_STEP = 1e-4
 """Largest step of a converged pole (half-power half-widths)."""
+MAX_INVERSE = 1e12
+"""Largest element of an inverse, of a matrix with diagonal 1; chosen: above it rounding (1e-16) leaves four digits."""
 MIN_POLE_ERROR = 1e-6
 """Least standard error of a pole (half-power half-widths), of hits without noise; chosen."""
 MAX_COMMON_START_EXCESS = 1.5
@@ -288,11 +290,14 @@ def _solve(columns: Complexes, target: Complexes) -> tuple[Complexes, Floats, Fl
 
 
 def _invert(normal: Complexes) -> Complexes:
-    """Return the inverses of matrices, and their pseudo-inverses, which take ten times as long, if one is singular."""
+    """Return the inverses of matrices, of those near singular the pseudo-inverses, which take ten times as long."""
     try:
-        return np.asarray(np.linalg.inv(normal))
+        inverse = np.asarray(np.linalg.inv(normal))
     except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(normal, hermitian=True))
+        inverse = np.full_like(normal, np.inf)
+    is_singular = np.max(np.abs(inverse), axis=(1, 2)) > MAX_INVERSE
+    inverse[is_singular] = np.linalg.pinv(normal[is_singular], hermitian=True)
+    return inverse
 
 
 def _cut_window(spectra: Sequence[_HitSpectrum], mode: _HitMode, neighbours: Sequence[float]) -> _Window:

@@ -12,7 +12,7 @@ from modal.arrays import Complexes, Floats
 from modal.bands.extract_modes import extract_modes
 from modal.fit_modes import fit_constants
 from modal.modes.match_modes import mac
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, change_covariances
 from modal.tip_compliance import relative_motion_error
 
 
@@ -124,7 +124,8 @@ def average_points(shape: ModeShape, groups: Sequence[Sequence[int]]) -> ModeSha
     Returns
     -------
     ModeShape
-        Mode shape over points, 1 at the driving point. Its errors include the scatter of the measurements.
+        Mode shape over points, 1 at the driving point, with the mean modal constant there. Its errors include the
+        scatter of the measurements.
     """
     share = np.zeros((len(groups), shape.motion.size))
     for place, group in enumerate(groups):
@@ -133,7 +134,18 @@ def average_points(shape: ModeShape, groups: Sequence[Sequence[int]]) -> ModeSha
     steps = share * np.abs(shape.motion) / np.maximum(np.abs(mean), np.finfo(float).tiny)[:, np.newaxis]
     scatter = [_relative_scatter(shape.motion[[*group]]) for group in groups]
     covariance = steps @ shape.size_covariance @ steps.T + np.diag(np.square(scatter))
-    return replace(shape, motion=mean / mean[0], size_covariance=covariance)
+    mode = _multiply_constant(shape.mode, complex(mean[0]), scatter[0])
+    return replace(shape, mode=mode, motion=mean / mean[0], size_covariance=covariance)
+
+
+def _multiply_constant(mode: Mode, factor: complex, relative_error: float) -> Mode:
+    """Multiply the modal constant by a factor with a relative error of its own."""
+    turned = mode.phase_deg + float(np.degrees(np.angle(factor)))
+    half_turns = round(turned / 180)
+    stiffness = mode.stiffness / abs(factor) * (-1) ** half_turns
+    scale, added = np.diag([1, 1, stiffness / mode.stiffness]), np.diag([0, 0, (relative_error * stiffness) ** 2])
+    changed = change_covariances(mode, lambda covariance: scale @ covariance @ scale + added)
+    return replace(changed, stiffness=stiffness, phase_deg=turned - 180 * half_turns)
 
 
 def _relative_scatter(values: Complexes) -> float:

@@ -1,10 +1,11 @@
 """Options shared by several commands: facts about a file, edited modes, cuts and numbers."""
 
+import contextlib
 import functools
 import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -54,6 +55,20 @@ def mass(text: str | float) -> float:
         raise BadParameter(str(error)) from None
 
 
+FIRST_NOW, LAST_NOW = (datetime(year, 1, 1, tzinfo=UTC) for year in (1970, 2200))
+"""Range of dates that ages may be counted to; chosen, as no clock of a computer is beyond it."""
+
+
+def present_time(text: str) -> datetime:
+    """Parse a date or time (ISO 8601); local time without a time zone."""
+    with contextlib.suppress(ValueError, OverflowError):
+        time = datetime.fromisoformat(text)
+        if FIRST_NOW <= (time if time.tzinfo else time.replace(tzinfo=UTC)) < LAST_NOW:
+            return time.astimezone()
+    dates = f"{FIRST_NOW:%Y-%m-%d} to {LAST_NOW - timedelta(days=1):%Y-%m-%d}"
+    raise BadParameter(f"{text!r} is not a date from {dates}. Write 2026-11-27, 2026-11-27T08:30 or 2026-11-27T08:30Z.")
+
+
 Command = Callable[..., None]
 FolderArgument = functools.partial(Argument, parser=to_folder_path)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
@@ -71,7 +86,8 @@ CutDepth = Annotated[float | None, Option(parser=number, help="Axial depth of cu
 Now = Annotated[
     datetime | None,
     Option(
-        callback=lambda value: value and value.astimezone(),
+        parser=present_time,
+        metavar="DATE",
         help="Date that the age of tap tests is counted to, for tests and scripts (local time). Default: now.",
     ),
 ]

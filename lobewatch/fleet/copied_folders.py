@@ -32,7 +32,7 @@ def read_first_tap(folder: Path | str) -> tuple[str, str]:
 def find_copies(machines: Mapping[str, Path]) -> dict[str, Remark]:
     """Return a remark for each machine whose first tap test is also that of another one, by name.
 
-    A single machine is compared with the other folders next to it.
+    A single machine is compared with the other folders next to it. A link to the same folder is no copy.
     """
     folders = {key: str(path) for key, path in machines.items()}
     if len(machines) == 1:
@@ -42,12 +42,12 @@ def find_copies(machines: Mapping[str, Path]) -> dict[str, Remark]:
     for key, folder in folders.items():
         by_first.setdefault(read_first_tap(folder), []).append(key)
     by_first.pop(("", ""), None)
-    return {
-        key: _copy_remark([name for name in names if name != key])
-        for names in by_first.values()
-        for key in names
-        if len(names) > 1 and key in machines
-    }
+    found: dict[str, Remark] = {}
+    for names in by_first.values():
+        places = {name: os.path.realpath(folders[name]) for name in names}
+        copies = {key: [name for name in names if places[name] != places[key]] for key in names if key in machines}
+        found |= {key: _copy_remark(others) for key, others in copies.items() if others}
+    return found
 
 
 def _list_neighbors(path: Path) -> list[str]:

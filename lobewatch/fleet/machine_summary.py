@@ -108,7 +108,7 @@ class MachineSummary(
     programs: dict[str, str] = {}
     """Verdict on each program as of its tap tests, by name; `programs_at` gives those of a time."""
     tap_times: dict[str, datetime] = {}
-    """Time of the newest tap test behind each program, by name; empty without an agreed tap interval."""
+    """Time that the age of its tap tests counts from, by program; empty without an agreed tap interval."""
     forecasts: dict[str, ProgramForecast] = {}
     """Forecast of each program, by name."""
     limits: LimitForecasts = ()

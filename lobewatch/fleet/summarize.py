@@ -163,8 +163,8 @@ def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: Ren
 
 
 def _collect_tap_times(logbook: Logbook) -> dict[str, datetime]:
-    """Return the time of the newest tap test behind each program."""
-    times = {program.name: logbook.history.newest_time(program.tool) for program in logbook.machine.program}
+    """Return the time that the age of the tap tests behind each program counts from."""
+    times = {program.name: logbook.history.tapped_since(program.tool) for program in logbook.machine.program}
     return {name: time for name, time in times.items() if time is not None}
 
 

@@ -113,6 +113,11 @@ class HistoryRow:
         return next((remark.about for remark in self.remarks if remark.code == HIT_DECISIONS_CODE), "")
 
     @property
+    def predicts_tools(self) -> bool:
+        """True if other tools can be predicted from it: calibrated, with stiffness, without open questions."""
+        return self.bearing_stiffness.is_known and self.stiffness.is_known and not self.questions
+
+    @property
     def followed(self) -> ModeValues:
         """Followed mode; NaN without one."""
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
@@ -154,16 +159,19 @@ class History:
         """Codes of the open questions by tap test."""
         return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
 
-    def newest_time(self, tool: str) -> datetime | None:
-        """Return the time of the newest tap test of a tool in x or y, or of any tool if it was never tapped.
+    def tapped_since(self, tool: str) -> datetime | None:
+        """Return the time that the age of a tool counts from: the older of its newest tap tests in x and in y.
+
+        For a tool that was never tapped it is that of the tests behind its prediction, None without any.
 
         Parameters
         ----------
         tool
             Name of the tool.
         """
-        rows = [row for row in self.current if row.direction != CROSS_TAP]
-        return max((row.time for row in [row for row in rows if row.tool == tool] or rows), default=None)
+        rows = [row for row in self.current if row.tool == tool and row.direction != CROSS_TAP]
+        rows = rows or [row for row in self.rows if row.baseline == self.baseline and row.predicts_tools]
+        return min({row.direction: row.time for row in rows}.values(), default=None)
 
     def with_verdicts(self, number: int, verdicts: Mapping[str, StoredVerdict] | None) -> History:
         """Return the history with the verdicts after one of its rows.

@@ -1,5 +1,6 @@
 """Earlier tests of a series from the rows of the history, and the questions that they raise."""
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,19 +16,39 @@ from lobewatch.measurement.series_questions import (
     check_same_direction,
     check_series,
 )
-from lobewatch.tool.tap_series import TapPlace, iterate_earlier
+from lobewatch.tool.tap_series import TapPlace
 
 
-def find_reference(place: TapPlace, among: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> SeriesReference:
-    """Return the earlier tests of the series of a tap test, those in question not included."""
-    own = find_earlier_tests([rows[number] for number in iterate_earlier(place, among)][::-1])
-    if place.other_direction is None:
-        return SeriesReference(own)
-    other = among[place.other_direction]
-    across, newest = [rows[number] for number in iterate_earlier(other, among)], rows[other.number]
-    same_day = place.entry.created - other.entry.created <= MAX_DAY
-    frequencies = tuple(mode[0] for mode in newest.modes) if same_day else ()
-    return SeriesReference(own, find_earlier_tests([*reversed(across), newest]), frequencies)
+class EarlierTestIndex:
+    """Index of the earlier tests of each series and direction, each row read once."""
+
+    def __init__(self) -> None:
+        self._tests: dict[tuple[str, str], list[EarlierTest]] = {}
+        self._numbers: dict[tuple[str, str], list[int]] = {}
+        self._rows = 0
+
+    def find_reference(self, place: TapPlace, among: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> SeriesReference:
+        """Return the earlier tests of the series of a tap test, those in question not included.
+
+        rows: at least the history before it, and the same as before.
+        """
+        for number, row in enumerate(rows[self._rows :], self._rows):
+            for test in find_earlier_tests([row]):
+                self._tests.setdefault((row.series, row.direction), []).append(test)
+                self._numbers.setdefault((row.series, row.direction), []).append(number)
+        self._rows = max(self._rows, len(rows))
+        own = self._before(place.number, place.series, place.entry.direction)
+        if place.other_direction is None:
+            return SeriesReference(own)
+        other = among[place.other_direction]
+        same_day = place.entry.created - other.entry.created <= MAX_DAY
+        frequencies = tuple(mode[0] for mode in rows[other.number].modes) if same_day else ()
+        return SeriesReference(own, self._before(place.number, place.series, other.entry.direction), frequencies)
+
+    def _before(self, number: int, series: str, direction: str) -> tuple[EarlierTest, ...]:
+        """Return the tests of one direction of a series before a number."""
+        key = series, direction
+        return tuple(self._tests.get(key, [])[: bisect_left(self._numbers.get(key, []), number)])
 
 
 def find_earlier_tests(rows: Sequence[HistoryRow]) -> tuple[EarlierTest, ...]:

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from acquisition import CROSS_TAP, DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
-from lobewatch.history.series_reference import find_reference, find_series_questions
+from lobewatch.history.series_reference import EarlierTestIndex, find_series_questions
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
@@ -208,13 +208,14 @@ class _RowArchive:
 
     def __init__(self, ordered: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> None:
         self.places, self.rows = ordered, rows
-        self._followed = FollowedModeIndex()
+        self._followed, self._earlier = FollowedModeIndex(), EarlierTestIndex()
 
     def basis_of(self, place: TapPlace, row: HistoryRow) -> _RowBasis:
         before = (self.rows[number] for number in iterate_earlier(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
-        remarks = (*place.remarks, *find_series_questions(row, find_reference(place, self.places, self.rows)))
+        reference = self._earlier.find_reference(place, self.places, self.rows)
+        remarks = (*place.remarks, *find_series_questions(row, reference))
         if place.other_direction is None:
             return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry
@@ -291,7 +292,7 @@ class TapMeasurements:
     def __init__(self, folder: MachineFolder, places: Sequence[TapPlace], fits: Mapping[str, TapFit]) -> None:
         self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
-        self._followed = FollowedModeIndex()
+        self._followed, self._earlier = FollowedModeIndex(), EarlierTestIndex()
 
     def measurement(self, place: TapPlace, rows: Sequence[HistoryRow]) -> Measurement:
         """Return the measurement of one tap test."""
@@ -300,7 +301,8 @@ class TapMeasurements:
             before = (rows[number] for number in iterate_earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             fit, machine = self._fits.get(place.entry.id), self._folder.machine
-            reference, by_hand = find_reference(place, self._places, rows), place.entry.by_hand
+            reference = self._earlier.find_reference(place, self._places, rows)
+            by_hand = place.entry.by_hand
             if fit is None:
                 measurement = measure(self._folder.read(place.entry), machine, last, by_hand, reference)
             else:
@@ -339,7 +341,7 @@ class TapMeasurements:
         calibrated = [place for place in reversed(places) if rows[place.number].bearing_stiffness.is_known]
         for place in calibrated:
             row = rows[place.number]
-            if row.stiffness.is_known and not row.questions and row.direction not in newest:
+            if row.predicts_tools and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
         if calibrated and not any(rows[place.number].stiffness.is_known for place in calibrated):
             text = "stiffness K is unknown (no force measured). Tap again with an instrumented hammer."

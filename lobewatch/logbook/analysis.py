@@ -171,10 +171,10 @@ class Analysis:
 
     def _with_age(self, assembly: Assembly) -> Assembly:
         """Return an assembly with the age of its tap tests, and the remark on old ones."""
-        time, now, table = self.history.newest_time(assembly.tool), self.now, self.machine.machine
+        time, now, table = self.history.tapped_since(assembly.tool), self.now, self.machine.machine
         if time is None:
             return assembly
-        aged = replace(assembly, age_days=tap_age_days(time, now))
+        aged = replace(assembly, tapped_since=time, age_days=tap_age_days(time, now))
         if not is_too_old(time, now, table.interval_days):
             return aged
         if table.tap_interval_days is None:

@@ -317,7 +317,7 @@ class MachineFolder:
             text = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, text), entry, self.path) from error
 
-    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> TapEntry:
+    def commit(self, tap: TapTest, asked: Sequence[str] = (), answered: Sequence[str] = ()) -> TapEntry:
         """Write the tap file, then its journal line, which lasts on return.
 
         Parameters
@@ -326,6 +326,8 @@ class MachineFolder:
             Tap test.
         asked
             Codes of the questions about its time and device.
+        answered
+            Codes of the questions that a person has answered before its first hit.
 
         Raises
         ------
@@ -337,12 +339,19 @@ class MachineFolder:
         make_folder(path.parent)
         content = write_tap(path, tap)
         entry = TapEntry.of(tap, content)
-        entry = msgspec.structs.replace(entry, asked=(*entry.asked, *asked))
+        entry = msgspec.structs.replace(
+            entry,
+            asked=(*entry.asked, *asked),
+            asked_live=tuple(answered),
+            accepted=tuple(answered),
+        )
         known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
         counting = {decision.hit for decision in tap.decisions}
         changes = [HitDecision(decision.hit, "undo") for decision in known if decision.hit not in counting]
         changes += [decision for decision in tap.decisions if decision not in known]
-        self.journal.append(*journal_entries.make_hit_entries(tap.id, changes), entry.line, reading=reading)
+        hit_entries = journal_entries.make_hit_entries(tap.id, changes)
+        answers = [make_entry("accept", tap=tap.id, code=code) for code in answered]
+        self.journal.append(*hit_entries, entry.line, *answers, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
         return entry
 

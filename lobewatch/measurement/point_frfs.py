@@ -48,7 +48,8 @@ def read_point_frfs(rows: Sequence[PointRow], description: Description) -> list[
 def _read_points(rows: Sequence[PointRow], description: Description) -> Iterator[PointFrf]:
     tip = rows[0]
     for row in rows:
-        is_turned = row.node is None and row.direction.startswith("-") != tip.direction.startswith("-")
+        direction = row.direction or tip.direction
+        is_turned = row.node is None and direction.startswith("-") != tip.direction.startswith("-")
         sign = -1.0 if is_turned else 1.0
         for number, role in _find_measurements(row, tip):
             own = replace(description, response=number or description.response)

@@ -53,7 +53,7 @@ def read_point_table(folder: Path) -> tuple[PointRow, ...]:
     """Read points.csv, the point at the tool tip first, then by the distance from the tip.
 
     Raises DataError with line and point for a missing table or file, an unknown part, role or column, a number that is
-    none, a point in two places, parts out of order, and fewer than three points.
+    none, a point in two places, parts out of order, fewer than three points, and all points in one position.
     """
     path = folder / POINT_TABLE_NAME
     if not path.is_file():
@@ -146,6 +146,9 @@ def _check_points(path: Path, rows: Sequence[PointRow]) -> None:
             raise DataError(f"{row.where}: same position and part as point {same}. Give both the same name.")
     if len(places) < MIN_POINTS:
         raise DataError(f"{path}: {len(places)} points. A mode shape needs at least {MIN_POINTS} points.")
+    if rows[0].position == rows[-1].position:
+        finding = f"position_mm {rows[0].position * 1e3:g} for all points"
+        raise DataError(f"{path}: {finding}. Give each point its distance from the tool tip in mm.")
     _check_order(rows)
 
 

@@ -64,6 +64,13 @@ STIFFNESS_JUMP = RecordingQuestion(
 """Limit: smallest relative difference from the expected stiffness that is asked about (`series_questions`); chosen.
 
 A larger scatter of the series raises it."""
+STIFFNESS_DRIFT = RecordingQuestion(
+    "stiffness-jump",
+    0.12,
+    "stiffness K {now} N/um of the newest {recent} (median) is {ratio:.3g} times the {expected} N/um expected from the "
+    "first {count} (limit {limit:.0f} %): gain, range, sensitivity or tool changed little by little?",
+)
+"""Limit: as of STIFFNESS_JUMP, between the two ends of a level; chosen."""
 FREQUENCY_RISE = RecordingQuestion(
     "frequency-jump",
     0.05,
@@ -188,15 +195,16 @@ def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:
 
 def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
     """Return the remarks on a test and its time, with accepted questions replaced by remarks on the answers."""
-    remarks = (*remarks, *(_question_at_commit(code, tap) for code in tap.asked))
+    remarks = (*remarks, *filter(None, (_question_at_commit(code, tap) for code in (*tap.asked, *tap.asked_live))))
     texts = {remark.code: str(remark) for remark in remarks}
     answers = [Remark(ACCEPTED_CODE, code, texts.get(code, "no longer asked")) for code in tap.accepted]
     return (*(remark for remark in remarks if remark.code not in tap.accepted), *answers)
 
 
-def _question_at_commit(code: str, tap: TapEntry) -> Remark:
+def _question_at_commit(code: str, tap: TapEntry) -> Remark | None:
+    """Return the question of a code, None for one of a newer version."""
     asked = {question.code: question.ask() for question in (EMULATED_DEVICE, ONE_HIT, SPINDLE_TURNING)}
-    return asked[code] if code in asked else clock.clock_question(code, tap.time)
+    return clock.clock_question(code, tap.time) if code in clock.CLOCK_QUESTIONS else asked.get(code)
 
 
 def find_open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:

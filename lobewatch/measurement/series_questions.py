@@ -18,6 +18,7 @@ from lobewatch.measurement.recording_questions import (
     FREQUENCY_RISE,
     NO_MODE_TO_FOLLOW,
     SAME_DIRECTION,
+    STIFFNESS_DRIFT,
     STIFFNESS_JUMP,
 )
 from modal import Mode
@@ -32,6 +33,15 @@ moves most, to 3.8, if the shaft does. The tests of a series narrow it down."""
 STIFFNESS_STD, STIFFNESS_STD_TESTS = 0.052, 4
 """Relative standard deviation of K from test to test before a series shows its own, and the differences that it counts
 for; chosen between a careful operator (3 %) and three different ones (6 %)."""
+MAX_YOUNG_STD, N_YOUNG_CHANGES = 0.06, 24
+"""Largest relative standard deviation of K that a series can show before it has so many changes from test to test.
+
+Machines have 3 to 6 %. A gain that changes in every test is the larger part of the changes of a young series, and would
+hide itself in its scatter."""
+MAX_EXPONENT_DIFFERENCE = 1.9
+"""Largest difference of the exponent b from STIFFNESS_EXPONENT in models of spindles (0.1 to 3.8)."""
+N_FIRST_TESTS, N_NEWEST_TESTS = 3, 3
+"""Largest numbers of tests at the two ends of a level whose medians of K are compared; chosen."""
 FREQUENCY_STD = 0.003
 """The same of the frequency, by reclamping; chosen."""
 N_STD_ASKED = 4.0
@@ -150,11 +160,33 @@ def _check_level_stiffness(now: Mode, reference: SeriesReference) -> Remark | No
     """Return the question about a stiffness that the frequency does not explain, or None."""
     expected = expect_stiffness(reference, now.frequency)
     if expected is None or not expected.is_beyond(now.stiffness):
-        return None
+        return _check_drift(now, reference)
     here, there = (format_rounded(value, scale=1e6, digits=3) for value in (now.stiffness, expected.value))
     count, limit = len(reference.level), 100 * math.expm1(expected.limit)
     asked = {"now": here, "expected": there, "ratio": now.stiffness / expected.value, "s": "s" * (count > 1)}
     return STIFFNESS_JUMP.ask(f"{now.frequency:.0f} Hz", count=count, limit=limit, **asked)
+
+
+def _check_drift(now: Mode, reference: SeriesReference) -> Remark | None:
+    """Return the question about the newest tests of a level far from its first ones, or None.
+
+    Steps that are too small to be asked about one by one move the median of a series along, but not its first tests.
+    """
+    earlier = [(test.frequency, test.stiffness) for test in reference.level if math.isfinite(test.stiffness)]
+    tests = np.log([*earlier, (now.frequency, now.stiffness)])
+    std = _stiffness_std(reference)
+    for count in range(1, min(N_FIRST_TESTS, len(earlier)) + 1):
+        newest = tests[max(count, len(tests) - N_NEWEST_TESTS) :]
+        (first_f, first_k), (f, k) = np.median(tests[:count], axis=0), np.median(newest, axis=0)
+        spread = std * math.sqrt(_median_variance(count) + _median_variance(len(newest)))
+        limit = N_STD_ASKED * spread + MAX_EXPONENT_DIFFERENCE * abs(f - first_f)
+        expected = first_k + STIFFNESS_EXPONENT * (f - first_f)
+        if abs(k - expected) > max(limit, math.log1p(STIFFNESS_DRIFT.limit)):
+            here, there = (format_rounded(math.exp(value), scale=1e6, digits=3) for value in (k, expected))
+            asked = {"now": here, "expected": there, "ratio": math.exp(k - expected), "recent": len(newest)}
+            percent = 100 * math.expm1(limit)
+            return STIFFNESS_DRIFT.ask(f"{now.frequency:.0f} Hz", count=count, limit=percent, **asked)
+    return None
 
 
 def expect_stiffness(reference: SeriesReference, frequency: float) -> ExpectedValue | None:
@@ -179,12 +211,13 @@ def expect_stiffness(reference: SeriesReference, frequency: float) -> ExpectedVa
     if not tests:
         return None
     at, mass = np.log([test.frequency for test in tests]), _log_masses(tests)
-    std = _robust_std([np.exp(_log_masses(level)) for level in reference.levels], STIFFNESS_STD)
+    std = _stiffness_std(reference)
     distance, new_distance = at - np.median(at), math.log(frequency) - float(np.median(at))
     weight = float(distance @ distance) + (std / STIFFNESS_EXPONENT_STD) ** 2
     slope = float(distance @ (mass - np.median(mass))) / weight
+    slope = min(max(slope, -MAX_EXPONENT_DIFFERENCE), MAX_EXPONENT_DIFFERENCE)
     centre = float(np.median(mass - slope * distance)) + slope * new_distance
-    spread = std * math.sqrt(1 + math.pi / 2 / len(tests) + new_distance**2 / weight)
+    spread = std * math.sqrt(1 + _median_variance(len(tests)) + new_distance**2 / weight)
     limit = max(math.log1p(STIFFNESS_JUMP.limit), N_STD_ASKED * spread)
     return ExpectedValue(math.exp(centre + STIFFNESS_EXPONENT * math.log(frequency)), limit)
 
@@ -193,6 +226,19 @@ def _log_masses(tests: Sequence[EarlierTest]) -> Floats:
     """Return ln(K / f^2) of the tests with K, shape (n,)."""
     known = [test for test in tests if math.isfinite(test.stiffness)]
     return np.array([math.log(test.stiffness) - STIFFNESS_EXPONENT * math.log(test.frequency) for test in known])
+
+
+def _stiffness_std(reference: SeriesReference) -> float:
+    """Return the relative standard deviation of K of a series."""
+    masses = [_log_masses(level) for level in reference.levels]
+    std = _robust_std([np.exp(mass) for mass in masses], STIFFNESS_STD)
+    is_young = sum(max(mass.size - 1, 0) for mass in masses) < N_YOUNG_CHANGES
+    return min(std, MAX_YOUNG_STD) if is_young else std
+
+
+def _median_variance(count: int) -> float:
+    """Return the variance of the median of normal values over that of one: exact for one and for very many."""
+    return math.pi / (2 * count + math.pi - 2)
 
 
 def _robust_std(series: Sequence[Sequence[float] | Floats], prior: float) -> float:

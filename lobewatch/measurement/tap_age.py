@@ -3,7 +3,6 @@
 The fleet overview imports this module, so it needs neither numpy nor tap files.
 """
 
-import math
 from datetime import datetime, timedelta
 
 from acquisition import Remark
@@ -19,6 +18,16 @@ def tap_age_days(time: datetime, now: datetime) -> float:
     return (now - time) / timedelta(days=1)
 
 
+def format_age(days: float) -> str:
+    """Format an age in whole days.
+
+    >>> format_age(1.9), format_age(-2.1), format_age(-0.1)
+    ('1 day old', '2 days in the future', '0 days old')
+    """
+    whole = int(days)
+    return f"{abs(whole)} day{'' if abs(whole) == 1 else 's'} {'in the future' if whole < 0 else 'old'}"
+
+
 def is_too_old(time: datetime, now: datetime, interval_days: float) -> bool:
     """Tell whether a tap test is older than two tap intervals (days)."""
     return tap_age_days(time, now) > MAX_TAP_AGE_INTERVALS * interval_days
@@ -26,8 +35,8 @@ def is_too_old(time: datetime, now: datetime, interval_days: float) -> bool:
 
 def too_old_remark(about: str, time: datetime, now: datetime, interval_days: float) -> Remark:
     """Return the remark on a tap test that is too old for an agreed interval (days). about: program or tool."""
-    age = _age_text(time, now)
-    return Remark("tap-too-old", about, f"{age}, more than two intervals of {interval_days:g} days", "Tap again")
+    interval = f"two tap_interval_days of {interval_days:g} days (older versions of init set 30)"
+    return Remark("tap-too-old", about, f"{_age_text(time, now)}, more than {interval}", "Tap again")
 
 
 def old_remark(about: str, time: datetime, now: datetime) -> Remark:
@@ -36,4 +45,4 @@ def old_remark(about: str, time: datetime, now: datetime) -> Remark:
 
 
 def _age_text(time: datetime, now: datetime) -> str:
-    return f"newest tap test is {math.floor(tap_age_days(time, now))} days old"
+    return f"newest tap test in x or y is {format_age(tap_age_days(time, now))}"

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import modal
@@ -26,6 +26,8 @@ MIN_COMPLIANCE_RATIO = 0.8
 
 Tip compliance adds holder and spindle to the tool: tests have 1.2 and more. The tool alone is known within a fifth:
 effective diameter within 3 %, stick-out within 3 %, Young's modulus within 5 %."""
+STANDARD_SHANKS = (0.006, 0.008, 0.010, 0.012, 0.014, 0.016, 0.018, 0.020, 0.025, 0.032)
+"""Shank diameters of solid end mills (m), DIN 6535 from 6 mm on: cutters of up to 6 mm have the first (DIN 6527)."""
 SUPPORT_COMPLIANCE = 5e-8
 """Static compliance of a soft holder and spindle (m/N), 20 N/um; chosen."""
 CANTILEVER_CONSTANT = 1.8751
@@ -58,20 +60,37 @@ class ToolBeam:
     material: str
     """Material of the body, a name of `dsm.MATERIALS`."""
 
+    shank_diameter: float | None = None
+    """Diameter above the flutes (m); None if unknown, then counted as that of the cutter."""
+
     @property
     def compliance(self) -> float:
         """Static compliance at the tip (m/N): beam of two diameters, fluted and solid."""
         modulus, fluted = MATERIALS[self.material].youngs_modulus, min(self.flute_length, self.stick_out)
-        solid = math.pi * self.diameter**4 / 64
-        bent = fluted**3 / EFFECTIVE_DIAMETER_RATIO**4 + self.stick_out**3 - fluted**3
-        return bent / (3 * modulus * solid)
+        bent = fluted**3 / (EFFECTIVE_DIAMETER_RATIO * self.diameter) ** 4
+        bent += (self.stick_out**3 - fluted**3) / self.solid_diameter**4
+        return 64 * bent / (3 * math.pi * modulus)
+
+    @property
+    def solid_diameter(self) -> float:
+        """Diameter above the flutes (m)."""
+        return self.diameter if self.shank_diameter is None else self.shank_diameter
+
+    @property
+    def stiffest(self) -> "ToolBeam":
+        """Stiffest tool that it can be: an unknown shank is the next standard one, and unknown flutes are short."""
+        shank = next((size for size in STANDARD_SHANKS if size >= 0.999 * self.diameter), self.diameter)
+        if self.shank_diameter is not None or shank <= 1.001 * self.diameter:
+            return self
+        flutes = self.flute_length if self.flute_length < self.stick_out else self.diameter
+        return replace(self, shank_diameter=shank, flute_length=flutes)
 
     @property
     def frequency(self) -> float:
         """First natural frequency of the solid cantilever (Hz), above that of the clamped tool."""
         material = MATERIALS[self.material]
         speed = math.sqrt(material.youngs_modulus / material.density)
-        return CANTILEVER_CONSTANT**2 * self.diameter / 4 * speed / (2 * math.pi * self.stick_out**2)
+        return CANTILEVER_CONSTANT**2 * self.solid_diameter / 4 * speed / (2 * math.pi * self.stick_out**2)
 
 
 def find_tool_beam(machine: Machine, name: str) -> ToolBeam | None:
@@ -98,7 +117,9 @@ def find_tool_beam(machine: Machine, name: str) -> ToolBeam | None:
     if stick_out < MIN_SLENDERNESS * tool.diameter_mm:
         return None
     flutes = stick_out if tool.flute_length_mm is None else tool.flute_length_mm
-    return ToolBeam(tool.diameter_mm / 1e3, stick_out / 1e3, flutes / 1e3, material)
+    of_shank = None if table is None else table.shank_diameter_mm
+    shank = None if of_shank is None else of_shank / 1e3
+    return ToolBeam(tool.diameter_mm / 1e3, stick_out / 1e3, flutes / 1e3, material, shank)
 
 
 def compare_with_tool(modes: Sequence[Mode], tool: ToolBeam | None, highest_frequency: float) -> ToolAgreement:
@@ -136,9 +157,9 @@ def compare_with_tool(modes: Sequence[Mode], tool: ToolBeam | None, highest_freq
         return ToolAgreement.UNKNOWN
     if measured > TOOL_COMPLIANCE.limit * (tool.compliance + SUPPORT_COMPLIANCE):
         return ToolAgreement.TOO_SOFT
-    if highest_frequency < tool.frequency:
+    if highest_frequency < tool.stiffest.frequency:
         return ToolAgreement.UNKNOWN
-    is_stiff = measured < MIN_COMPLIANCE_RATIO * tool.compliance
+    is_stiff = measured < MIN_COMPLIANCE_RATIO * tool.stiffest.compliance
     return ToolAgreement.TOO_STIFF if is_stiff else ToolAgreement.AGREES
 
 
@@ -149,11 +170,11 @@ def has_plausible_size(compliance: float, tool: ToolBeam | None, highest_frequen
     least and a third of the most must be outside of the accepted range. compliance: static at the tip (m/N); the others
     as of `compare_with_tool`. NaN is not plausible.
     """
-    if tool is None or not highest_frequency >= tool.frequency:
+    if tool is None or not highest_frequency >= tool.stiffest.frequency:
         return False
-    most = 1 + SUPPORT_COMPLIANCE / tool.compliance
-    low, high = max(MIN_COMPLIANCE_RATIO, most / TOOL_COMPLIANCE.limit), MIN_COMPLIANCE_RATIO * TOOL_COMPLIANCE.limit
-    return low < compliance / tool.compliance < high
+    least, most = MIN_COMPLIANCE_RATIO * tool.stiffest.compliance, tool.compliance + SUPPORT_COMPLIANCE
+    limit = TOOL_COMPLIANCE.limit
+    return max(least, most / limit) < compliance < limit * least
 
 
 def sum_compliance(modes: Sequence[Mode]) -> float:
@@ -172,7 +193,8 @@ def check_tool_compliance(
     agreement = compare_with_tool(credible, tool, highest_frequency)
     if agreement in (ToolAgreement.AGREES, ToolAgreement.UNKNOWN):
         return None
-    measured = format_rounded(1 / sum_compliance(credible), scale=1e6, digits=3)
-    alone = format_rounded(1 / tool.compliance, scale=1e6, digits=3)
-    about = f"tool {tool_name!r}"
-    return TOOL_COMPLIANCE.ask(about, measured=measured, alone=alone, agreement=agreement.value)
+    alone = tool.stiffest if agreement is ToolAgreement.TOO_STIFF else tool
+    here, there = (
+        format_rounded(1 / each, scale=1e6, digits=3) for each in (sum_compliance(credible), alone.compliance)
+    )
+    return TOOL_COMPLIANCE.ask(f"tool {tool_name!r}", measured=here, alone=there, agreement=agreement.value)

@@ -251,7 +251,7 @@ def _old_program_remarks(history: History, machine: Machine, now: datetime) -> I
     """Yield a remark for each stable program whose tap tests are too old for the agreed interval."""
     interval, verdicts = machine.machine.tap_interval_days, history.current[-1].verdicts or {}
     for program in machine.program:
-        time = history.newest_time(program.tool)
+        time = history.tapped_since(program.tool)
         is_stable = program.name in verdicts and verdicts[program.name].stability is Stability.STABLE
         if is_stable and interval is not None and time is not None and is_too_old(time, now, interval):
             yield too_old_remark(program.name, time, now, interval)

@@ -222,7 +222,7 @@ STATUS_RULES = (
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),
-    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "tap-in-future", TOO_OLD_CODE),
+    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "spindle-turning", "tap-in-future", TOO_OLD_CODE),
     *_rules_of("chain-not-checked"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )
@@ -261,8 +261,9 @@ def is_early_alarm(ordered: Sequence[Remark]) -> bool:
 
 
 def find_next_step(ordered: Sequence[Remark], default_step: str) -> str:
-    """Return the next step; default_step: if no remark has one."""
-    return ordered[0].cure if ordered and ordered[0].cure else default_step
+    """Return the next step; default_step: if no remark has one. A copied folder keeps the step of its machine."""
+    cures = [remark.cure for remark in ordered if remark.code != FOLDER_COPIED.code]
+    return cures[0] if cures and cures[0] else default_step
 
 
 def next_tap_step(newest: datetime, interval_days: float) -> str:

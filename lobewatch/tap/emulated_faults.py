@@ -47,7 +47,9 @@ SENSOR_HALF_LIFE = 2.0
 SOFT_TIP_WIDTH = (2.75e-3, 3.75e-3)
 """Range of the foot width of a pulse with a soft tip (s), chosen."""
 UNBALANCE_ACCELERATION = 8.0
-"""Acceleration at once per revolution of the turning spindle (m/s^2 rms), chosen."""
+"""Acceleration at once per revolution of a spindle that turns at UNBALANCE_RPM (m/s^2 rms), chosen: 0.5 at 3000 rpm."""
+UNBALANCE_RPM = 12_000.0
+"""Speed of this acceleration (rpm), which grows with the square of the speed."""
 UNBALANCE_HARMONICS = {1: 1.0, 2: 0.2}
 """Harmonics of the spindle speed and their relative amplitudes, chosen."""
 
@@ -88,7 +90,8 @@ class EmulatedFaults:
 
     def _disturb(self, rows: Floats, time: Floats, channels: Sequence[Channel], drift: Floats) -> Floats:
         quantities = [channel.quantity for channel in channels]
-        unbalance = UNBALANCE_ACCELERATION * _make_tone(time, self.turning_rpm / 60, UNBALANCE_HARMONICS)
+        growth = (self.turning_rpm / UNBALANCE_RPM) ** 2
+        unbalance = UNBALANCE_ACCELERATION * growth * _make_tone(time, self.turning_rpm / 60, UNBALANCE_HARMONICS)
         if self.kind is EmulatedFault.SWAPPED:
             return _swap(rows, channels)
         return np.stack(

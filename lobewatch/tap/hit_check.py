@@ -11,7 +11,7 @@ from acquisition.hit_quality.decide_hits import average_decided_hits
 from acquisition.hit_quality.evaluate_hit import compare_magnitude
 from acquisition.tap_test import decide_flags
 from lobewatch.tap.self_check import find_quiet_part
-from lobewatch.tap.steady_line import find_steady_line
+from lobewatch.tap.steady_line import MIN_LINE_POWER_SHARE, find_steady_line
 
 N_FIRST_HITS = 3
 """Number of first good hits with which the strength of a response is compared, as in a mean."""
@@ -29,7 +29,9 @@ def add_steady_vibration(verdict: HitVerdict, hit: Hit, baseline: Hit | None) ->
     quiet = find_quiet_part(hit)
     line = None if quiet is hit else find_steady_line(quiet)
     fault = HIT_FAULTS[HitFlags.STEADY_VIBRATION]
-    if line is None or line.rms <= fault.limits["rest_ratio"] * float(np.std(baseline.acceleration)):
+    if line is None or line.power_share <= MIN_LINE_POWER_SHARE:
+        return verdict
+    if line.rms <= fault.limits["rest_ratio"] * float(np.std(baseline.acceleration)):
         return verdict
     return HitVerdict.from_findings({HitFlags.STEADY_VIBRATION: fault.state(finding=line.finding)})
 

@@ -16,7 +16,7 @@ from lobewatch.machine.folder_lock import RESERVE_BYTES
 from lobewatch.measurement.sensor_effects import MAX_DECAY_FREQUENCY_RATIO
 from lobewatch.tap.state import Check
 from lobewatch.tap.steady_line import (
-    MIN_LINE_CODES,
+    MIN_HUM_CODES,
     MIN_LINE_POWER_SHARE,
     compute_power_spectrum,
     find_steady_line,
@@ -140,7 +140,7 @@ def _check_hum(baseline: Hit) -> Check:
     for channel, signal, unit in _list_signals(baseline):
         frequency, power = compute_power_spectrum(signal, baseline.sample_rate)
         hum, mains = measure_hum(frequency, power)
-        if hum**2 > MIN_LINE_POWER_SHARE * np.sum(power) and hum > MIN_LINE_CODES * abs(channel.scale):
+        if hum**2 > MIN_LINE_POWER_SHARE * np.sum(power) and hum > MIN_HUM_CODES * abs(channel.scale):
             name = channel.quantity
             texts[name] = f"{hum:.2g} {unit} rms at {mains:g} Hz and harmonics in the {name} signal"
     if not texts:

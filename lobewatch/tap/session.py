@@ -203,14 +203,15 @@ class TapSession:
         self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
-        commit = partial(logbook.commit, now=now)
-        if self.questions.asked:
-            commit = partial(commit, asked=self.questions.asked)
+        answered = self.questions.asked
+        commit = partial(logbook.commit, now=now, answered=answered)
         commit(tap)
         self.across = commit_cross_tap(in_progress, commit)
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]
         try:
-            self.unasked = logbook.accept(self.saved, self.questions.accepted)
+            self.unasked = logbook.accept(
+                self.saved, [code for code in self.questions.accepted if code not in answered]
+            )
             self._measurement = logbook.measurement(tap.id)
             outcome = build_outcome(logbook, self._measurement, self.across) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
@@ -249,7 +250,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     check = logbook.chain_check(measurement.tap_id)
     texts = [*_format_values(measurement, series), *([across.text] if across else [])]
     texts += [f"Sensor chain: {check.text}."] if check.evidence is not None else []
-    texts += [f"{remark.finding.removesuffix('.')}." for remark in remarks]
+    texts += [remark.finding if remark.finding[-1] in ".!?" else f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
         ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)

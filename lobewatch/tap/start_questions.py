@@ -11,7 +11,7 @@ from lobewatch.tap.steady_line import find_steady_line
 
 START_CHOICE = Choice("start", "Yes, start")
 """Answer that begins a test."""
-STILL_CHOICE = Choice("start", "It stands still, continue")
+STILL_CHOICE = Choice("still", "It stands still, continue")
 """Answer to a steady vibration."""
 
 
@@ -40,7 +40,7 @@ class StartQuestions:
         if self.is_confirmed:
             return
         self._show(f"Is the spindle stopped? Is tool {self._tool} in it?", START_CHOICE)
-        while not self._is_answered():
+        while not self._is_answered(START_CHOICE):
             wait()
         self.is_confirmed = True
 
@@ -54,23 +54,26 @@ class StartQuestions:
             if SPINDLE_TURNING.code in self.accepted:
                 return baseline
             if not self._asks:
-                answer = f"If it stands still, add accept_questions.codes {SPINDLE_TURNING.code}"
+                answer = "If it stands still, check the accelerometer cable, or add accept_questions.codes"
+                answer += f" {SPINDLE_TURNING.code}"
                 raise DataError(join_sentences(line.finding, "Stop the spindle and repeat the command", answer))
             self._show(line.text, STILL_CHOICE)
             baseline = record()
-            if self._is_answered():
+            if self._is_answered(STILL_CHOICE):
                 self.accepted.append(SPINDLE_TURNING.code)
         self.asked = []
         self._publisher.show(choices=())
         return baseline
 
     def _show(self, reason: str, choice: Choice) -> None:
+        """Show a question. An answer to the one before does not count."""
         if (self._publisher.state.word, self._publisher.state.reason) != (TapStep.ASK, reason):
+            self._answers = queue.SimpleQueue[str]()
             self._publisher.show(word=TapStep.ASK, reason=reason, choices=(choice,))
 
-    def _is_answered(self) -> bool:
-        if self._answers.empty():
-            return False
-        self._answers.get()
-        self._publisher.show(choices=())
-        return True
+    def _is_answered(self, choice: Choice) -> bool:
+        while not self._answers.empty():
+            if self._answers.get() == choice.key:
+                self._publisher.show(choices=())
+                return True
+        return False

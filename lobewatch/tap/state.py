@@ -102,7 +102,7 @@ class Choice(NamedTuple):
     """Choice between two tests."""
 
     key: str
-    """Key of the choice: "x", "y", "tool" or "done"."""
+    """Key of the choice: "start", "still", "x", "y", "xy", "tool" or "done"."""
     text: str
     """Text of its button."""
 

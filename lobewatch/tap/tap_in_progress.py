@@ -29,6 +29,7 @@ from acquisition.file_io import make_folder
 from acquisition.hit_quality.best_hits import choose_best_hits
 from acquisition.hit_quality.decide_hits import add_decisions
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
+from acquisition.sensors.daq_timing import RATE_TOLERANCE
 from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
@@ -68,6 +69,8 @@ class TapInProgress:
     """Mean of the good hits, always of all of them."""
     n_resumed: int = 0
     """Number of hits that an interrupted test already had."""
+    corrected_rate: float | None = None
+    """Sample rate (Hz) that replaces a wrong one in the hits of an interrupted test, None if theirs was right."""
     trigger: acquisition.Trigger | None = None
     """Trigger settings of its hits, None until chosen."""
     baseline: Hit | None = None
@@ -120,7 +123,14 @@ class TapInProgress:
         return {"hits": hits, "good": self.good, **mean}
 
     def accept_device(self, sample_rate: float, channels: tuple[acquisition.Channel, ...], description: str) -> None:
-        """Note the set-up of the coming hits. ValueError if earlier hits have another one."""
+        """Note the set-up of the coming hits. ValueError if earlier hits have another one.
+
+        A corrected rate of earlier hits becomes the new one if both agree: the rate was measured again.
+        """
+        kept = self.corrected_rate
+        if kept is not None and 0 < abs(sample_rate / kept - 1) <= RATE_TOLERANCE:
+            self.hits, self.corrected_rate = [correct_rate(hit, sample_rate) for hit in self.hits], sample_rate
+            self.resume_mean()
         earlier = self.hits[-1] if self.hits else self.baseline
         if earlier is not None and (earlier.sample_rate, earlier.sensors) != (sample_rate, channels):
             raise self.make_setup_error()
@@ -307,6 +317,7 @@ def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:
         is_recent = circumstances.created - about.created < spool.MAX_RESUME_AGE
         if resume and newest is None and same and is_recent and not fault:
             newest = TapInProgress(path.name, about, folder, trigger=spool.read_spooled_trigger(path, new.damaged))
+            newest.corrected_rate = rate
             for hit in (first, *hits):
                 newest.add_spooled(hit._replace(hit=correct_rate(hit.hit, rate)))
             newest.resume_mean()

@@ -151,8 +151,10 @@ class Assembly:
     """Remarks that say the modes do not cover the measurement; no answer silences them."""
     hit_remarks: tuple[Remark, ...] = ()
     """Remarks on decisions on hits of these tap tests."""
+    tapped_since: datetime | None = None
+    """Time of the older of its newest tap tests in x and in y; None as of its newest test."""
     age_days: float | None = None
-    """Age of its newest tap test (days), from the clock; None as of that test."""
+    """Age since then (days), from the clock; None as of its newest test."""
     age_remarks: tuple[Remark, ...] = ()
     """Remark on an old tap test where nobody has agreed an interval; it limits no verdict."""
     chain_checks: tuple[ChainCheck, ...] = ()

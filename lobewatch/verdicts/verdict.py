@@ -20,7 +20,7 @@ from lobewatch.verdicts.monte_carlo import MonteCarloResult, estimate_chatter_ri
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
-from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED
+from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED, UNTAPPED, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -228,7 +228,8 @@ def apply_checks(verdict: Verdict, checked: Assembly) -> Verdict:
     known = _stable_remarks(checked) if verdict.stability is Stability.STABLE else ()
     unchecked = checked.unchecked if verdict.samples is not None else ()
     verdict = replace(verdict, assembly=checked, remarks=(*verdict.remarks, *known, *unchecked))
-    if not unchecked or not verdict.is_stable or verdict.decisive_cause in (QUESTION.name, COVERAGE.name):
+    missing_first = UNTAPPED.name, WORKPIECE.name, QUESTION.name, COVERAGE.name
+    if not unchecked or not verdict.is_stable or verdict.decisive_cause in missing_first:
         return verdict
     others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
     advice = program_remarks.decisive_remark(verdict.program.name, *describe_uncovered(unchecked))

@@ -58,6 +58,9 @@ DOUBTFUL_MATCH_DISTANCE = 2.5
 """Distance above which a mode may be another one."""
 MAX_FOLLOWED_FREQUENCY_CHANGE = 0.15
 """Largest relative change of frequency of an otherwise unchanged mode."""
+MAX_GAIN_FREQUENCY_CHANGE = 0.02
+"""Largest relative change of frequency of a mode whose stiffness alone has changed, four times a large scatter of
+reclamping; chosen."""
 MIN_RIVAL_DISTANCE_RATIO = 2.0
 """Distance of the second nearest mode over that of the nearest below which it is a rival."""
 
@@ -79,6 +82,7 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     stiffness,
     each in units of a typical change (stiffness if both know it), and of 1 - MAC if both modes have shapes over
     the same points. A mode that is alike but for its frequency is the same up to 15 %, the largest drop of a spindle.
+    One that is alike but for its stiffness is the same within 2 % of the frequency: the gain has changed.
 
     Parameters
     ----------
@@ -101,9 +105,11 @@ def follow_mode(last: Mode, modes: Sequence[Mode]) -> ModeMatch:
     >>> follow_mode(last, now[1:]).mode is None
     True
     """
-    near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
-    if not near or not _is_same_mode(last, near[0]):
-        nearest = f", nearest mode at {near[0].frequency:.1f} Hz" if near else ""
+    ordered = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _match_distance(last, mode))
+    is_near = bool(ordered) and _is_same_mode(last, ordered[0])
+    near = ordered if is_near else [mode for mode in ordered if _has_other_gain(last, mode)]
+    if not near:
+        nearest = f", nearest mode at {ordered[0].frequency:.1f} Hz" if ordered else ""
         text = f"followed mode not found again{nearest}"
         return ModeMatch(None, (mode_remark(last, "no-mode-to-follow", text),))
     first = _match_distance(last, near[0])
@@ -122,6 +128,11 @@ def _is_same_mode(last: Mode, mode: Mode) -> bool:
         return True
     moved = abs(mode.frequency / last.frequency - 1) <= MAX_FOLLOWED_FREQUENCY_CHANGE
     return moved and _match_distance(replace(last, frequency=mode.frequency), mode) <= DOUBTFUL_MATCH_DISTANCE
+
+
+def _has_other_gain(last: Mode, mode: Mode) -> bool:
+    is_near = abs(mode.frequency / last.frequency - 1) <= MAX_GAIN_FREQUENCY_CHANGE
+    return is_near and _match_distance(replace(last, stiffness=mode.stiffness), mode) <= DOUBTFUL_MATCH_DISTANCE
 
 
 def _values_text(mode: Mode) -> str:

@@ -195,3 +195,16 @@ def test_nothing_near_is_no_mode() -> None:
     assert [(remark.code, remark.about) for remark in far.remarks] == [("no-mode-to-follow", "1700 Hz")]
     assert "2600.0 Hz" in far.remarks[0].text
     assert follow_mode(LAST, [replace(LAST, stiffness=-3.5e7)]).mode is None
+
+
+@pytest.mark.parametrize("gain", [0.01, 0.1, 10.0])
+def test_a_mode_is_the_same_at_another_gain_if_its_frequency_and_damping_are(gain: float) -> None:
+    same = Mode(1701.0, 0.029, 3.5e7 * gain)
+    found = follow_mode(LAST, [Mode(2300.0, 0.03, 3.3e7), same])
+    assert found.mode is same
+    assert [remark.code for remark in found.remarks] == ["large-change"]
+
+
+@pytest.mark.parametrize("other", [Mode(1740.0, 0.03, 3.5e8), Mode(1701.0, 0.12, 3.5e8)])
+def test_it_is_another_mode_if_frequency_or_damping_differ_too(other: Mode) -> None:
+    assert follow_mode(LAST, [other]).mode is None

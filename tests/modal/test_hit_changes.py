@@ -79,6 +79,17 @@ def test_small_changes_are_not_reported() -> None:
     assert find_hit_changes(tap(lambda number, _: 1 - 0.06 * ZETA * number / 9)) == []
 
 
+def test_two_equal_hits_without_response_leave_the_change_of_the_others() -> None:
+    hits = tap(lambda number, _: 1 - ZETA * number / 9)
+    expected, silent = first(hits), {4, 5}
+    for number in silent:
+        hits[number] = replace(hits[number], acceleration=np.zeros_like(hits[number].acceleration))
+    partial, drift = find_hit_changes(hits)[:2]
+    assert (partial.kind, {*partial.hits}) == (HitChangeKind.PARTIAL, {*range(10)} - silent)
+    assert drift.kind is HitChangeKind.DRIFT
+    assert drift.spread == pytest.approx(expected.spread, rel=0.01)
+
+
 def test_hits_of_two_lengths_are_rejected() -> None:
     hits = tap(lambda *_: 1.0)
     hits[3] = replace(hits[3], force=hits[3].force[:-1], acceleration=hits[3].acceleration[:-1])

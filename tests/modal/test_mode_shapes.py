@@ -116,6 +116,19 @@ def test_repeated_points_are_averaged_and_normalised_to_the_tip() -> None:
     assert shape.motion_error[1] == pytest.approx(0.4 * np.hypot(*errors[:2]))
 
 
+@pytest.mark.parametrize("ratio", [1.2, 1.2 * np.exp(0.2j), -3.0])
+def test_the_tip_measured_twice_has_the_mean_modal_constant(ratio: complex) -> None:
+    single, factor = shape_of([1.0, ratio, 0.5]), (1 + ratio) / 2
+    tap = replace(single.mode, covariance=np.diag([0.1, 1e-4, 2e5]) ** 2)
+    found = average_points(replace(single, mode=tap), [[0, 1], [2]])
+    assert found.mode.constant == pytest.approx(factor * tap.constant)
+    at_tip, before = found.mass_normalized, single.mass_normalized
+    assert at_tip[0] * at_tip == pytest.approx(before[0] * np.array([before[0] * factor, before[2]]))
+    scatter = abs(1 - ratio) / 2 / abs(factor)
+    relative = found.mode.standard_error / [1, 1, found.mode.stiffness * np.sign(factor.real)]
+    assert relative == pytest.approx([0.1, 1e-4, np.hypot(0.01, scatter)])
+
+
 def test_the_same_frf_agrees_whatever_its_size_and_sign() -> None:
     frf = synthesize_frf([Mode(500.0, 0.02, 2e7), Mode(1500.0, 0.02, 3e7)], LINES)
     other = synthesize_frf([Mode(650.0, 0.02, 2e7)], LINES)

@@ -16,11 +16,11 @@ import numpy as np
 from delayed_milling import DelayedCase, growth_per_turn
 from disturbed_study import FORCES, N_HITS, make_hit
 from numpy.typing import NDArray
-from verdict_study import MACHINE
 
 from acquisition import Circumstances, Frf, TapDirection, TapTest, check_hit, estimate_frf
 from lobes import program_limit, project_modes
-from lobewatch.machine import FEED_ANGLES, ProgramTable
+from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
+from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.measurement.tap_measurement import measure
 from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.verdicts.program_case import ProgramCase, build_program
@@ -28,6 +28,10 @@ from lobewatch.verdicts.program_samples import find_worst_limit
 from lobewatch.verdicts.verdict import Stability, Verdict, evaluate_program
 from modal import Mode, fit_modes, select_credible_modes, synthesize_frf
 
+MACHINE: Machine = parse_machine_file(
+    '[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\ndrop_percent = [0, 0]\n'
+)
+"""Machine whose frequencies do not drop at speed, so that only directions decide."""
 LINES = np.arange(100.0, 5000.0, 2.0)
 NOISE = 0.001
 """Noise of each line of an FRF over its tallest peak."""

@@ -96,15 +96,16 @@ def ask_all(sessions: list[Session], error: float) -> list[list[str]]:
     return asked
 
 
-def gain_error(rng: np.random.Generator) -> tuple[int, Error]:
+def gain_error(rng: np.random.Generator, firsts: tuple[int, int], *, five_steps: bool = False) -> tuple[int, Error]:
     """Return a gain of 1.3 to 3 or its inverse, and the first session with all of it.
 
-    In one step, in two steps, or slowly over three to eight sessions.
+    In one step, in two steps, or slowly over three to eight sessions; or in five steps.
+    firsts: range of the session of the first step.
     """
     ratio = float(np.exp(rng.uniform(np.log(1.3), np.log(3)) * rng.choice([-1, 1])))
-    first, slowly = int(rng.integers(4, N_TESTS - 1)), int(rng.integers(3, 9))
+    first, slowly = int(rng.integers(*firsts)), int(rng.integers(3, 9))
     ways = [[first], [first, int(rng.integers(first + 1, N_TESTS))], [*range(first, min(first + slowly, N_TESTS))]]
-    steps = np.array(ways[rng.integers(3)])
+    steps = np.arange(first, first + 5) if five_steps else np.array(ways[rng.integers(3)])
     directions = ("x", "y") if rng.random() < 0.7 else ("y",)
 
     def change(number: int, session: Session) -> Session:
@@ -162,8 +163,9 @@ def count_questions(machines: int, stiffness_std: float, seed: int) -> list[int]
 
 def make_error(kind: str, machine: Machine, rng: np.random.Generator) -> tuple[int, Error]:
     """Return a human error of a kind, and its first session."""
-    if kind == "gain":
-        return gain_error(rng)
+    if "gain" in kind:
+        firsts = (1, 4) if "young" in kind else (4, N_TESTS - 5)
+        return gain_error(rng, firsts, five_steps=kind.endswith("in five steps"))
     if kind == "shorter tool":
         return shorter_tool(rng)
     return sensor_left(rng, 0 if kind.endswith("at once") else int(rng.integers(4, N_TESTS)), machine.error)

@@ -68,6 +68,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Name of the operator; empty if unknown and in lines of older versions."""
     chain: SensorChain | None = None
     """Measurement chain; None in lines of older versions, for replayed tests and without a force sensor."""
+    asked_live: tuple[str, ...] = ()
+    """Codes of the questions that were asked and answered before its first hit; older versions ignore them."""
     accepted: tuple[str, ...] = ()
     """Codes of its accepted questions, from other lines."""
     excluded: str = ""
@@ -115,10 +117,11 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        left_out = (*FIELDS_OF_OTHER_LINES, "chain")
+        left_out = (*FIELDS_OF_OTHER_LINES, "chain", "asked_live")
         fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in left_out}
-        chain = {} if self.chain is None else {"chain": msgspec.to_builtins(self.chain)}
-        return {"kind": "tap", **fields, "conditions": self.conditions.specified, "asked": list(self.asked), **chain}
+        fields |= {"conditions": self.conditions.specified, "asked": list(self.asked)}
+        fields |= {} if self.chain is None else {"chain": msgspec.to_builtins(self.chain)}
+        return {"kind": "tap", **fields} | ({"asked_live": list(self.asked_live)} if self.asked_live else {})
 
     @property
     def file(self) -> str:

@@ -3,7 +3,7 @@
 import hashlib
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -296,12 +296,17 @@ class Machine(toml.TomlTable, frozen=True):
         return tables | {program.name: program for program in self.program}
 
     def _tool_body(self, tool: ToolTable) -> tuple[Any, ...] | None:
-        """Return all settings behind the compliance of a tool; None if it is unknown."""
+        """Return the values behind the compliance of a tool, its own or those of all of its programs; None if unknown.
+
+        The same as of `find_tool_properties`, so that a further program of the tool changes nothing.
+        """
         stick_out = self.tap.conditions(tool.name).stick_out_mm or tool.stick_out_mm
-        if stick_out is None or tool.tool_material is None:
+        programs = [cut for cut in self.all_programs if cut.tool == tool.name]
+        diameter = tool.diameter_mm or _common_value(cut.tool_diameter_mm for cut in programs)
+        if None in (stick_out, tool.tool_material, diameter):
             return None
-        programs = [(cut.tool_diameter_mm, cut.flute_length_mm) for cut in self.program if cut.tool == tool.name]
-        return tool.name, tool.tool_material, tool.diameter_mm, tool.flute_length_mm, stick_out, programs
+        flutes = tool.flute_length_mm or _common_value(cut.flute_length_mm for cut in programs)
+        return tool.name, tool.tool_material, diameter, flutes, stick_out, tool.shank_diameter_mm
 
     @property
     def settings_hash(self) -> str:
@@ -311,6 +316,12 @@ class Machine(toml.TomlTable, frozen=True):
         bodies = [*filter(None, map(self._tool_body, self.tool))]
         settings = ("questions, K against the model", self.mode, self.spindle, tools, *tap, *bodies)
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+
+
+def _common_value(values: Iterable[float | None]) -> float | None:
+    """Return the value that all have in common; None without one."""
+    same = set(values)
+    return same.pop() if len(same) == 1 else None
 
 
 def read_machine_file(path: Path) -> Machine:

@@ -183,6 +183,7 @@ class ToolTable(TomlTable, frozen=True):
     helix_deg: Annotated[float, Meta(ge=0, lt=90), Plausible(1, 70)] | None = None
     flute_length_mm: Annotated[Positive, Plausible(0.5, 499)] | None = None
     stick_out_mm: Annotated[Positive, Plausible(3, 1000)] | None = None
+    shank_diameter_mm: Annotated[Positive, Plausible(2, 150)] | None = None
     tool_material: ToolMaterial | None = None
     cutting_speed_m_min: Annotated[Positive | ValueRange, Plausible(5, 4999)] | None = None
     feed_per_tooth_mm: Annotated[Positive | ValueRange, Plausible(0.002, 1.9)] | None = None

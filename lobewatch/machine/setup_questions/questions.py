@@ -148,8 +148,11 @@ def _current_speeds(draft: MachineDraft) -> str:
 
 def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
     names, limits = ("lowest speed in rpm", "highest speed in rpm"), _limits(SpeedTable, "low_rpm", "high_rpm")
-    low, high = setup.parse_numbers(answer, names, limits=limits)
-    return draft.set("speed", low_rpm=low, high_rpm=high)
+    speeds = setup.parse_numbers(answer, names, limits=limits)
+    for name, speed, (least, most) in zip(names, speeds, filter(None, limits), strict=True):
+        if not least <= speed <= most:
+            raise ValueError(f"{answer!r}: {name} is {speed:g}, outside {least:g} to {most:g}. Write speeds as 18000.")
+    return draft.set("speed", low_rpm=speeds[0], high_rpm=speeds[1])
 
 
 def _current_drive(draft: MachineDraft) -> str:

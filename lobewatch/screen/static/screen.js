@@ -151,6 +151,9 @@ function showOutcome() {
   put("next", outcome.next_step && `Next: ${outcome.next_step}`);
 }
 
+// Letters of the choices. Those of the two questions before the first hit differ: two presses answer only one.
+const LETTERS = { start: "y", still: "s", x: "x", y: "y" };
+
 // Between two tests the choices replace the buttons of a running test.
 function showChoices() {
   const { choices } = state;
@@ -158,7 +161,7 @@ function showChoices() {
     ...choices.map(({ key, text }) => {
       const button = element("button", text);
       button.type = "button";
-      if (key === "start") button.prepend(element("kbd", "Y"), " ");
+      if (state.kind === "ask") button.prepend(element("kbd", LETTERS[key].toUpperCase()), " ");
       button.addEventListener("click", () => { button.blur(); choose(key); });
       return button;
     }),
@@ -188,11 +191,11 @@ async function choose(key, tool = "") {
 // Before the test and while the sensor is moved, the foot switch selects the first choice.
 function chooseByKey(key) {
   if (at("choices").hidden) return false;
-  const first = state.choices[0].key;
-  const keys = { move: UNDO_KEYS, ask: [...UNDO_KEYS, "Enter", "y", "Y"] }[state.kind] ?? [];
-  const pressed = keys.includes(key) ? first : key.toLowerCase();
-  if (!["x", "y", "start"].includes(pressed) || !state.choices.some((choice) => choice.key === pressed)) return false;
-  choose(pressed);
+  const keys = { move: UNDO_KEYS, ask: [...UNDO_KEYS, "Enter"] }[state.kind] ?? [];
+  const isFirst = keys.includes(key);
+  const chosen = state.choices.find((choice) => isFirst || LETTERS[choice.key] === key.toLowerCase());
+  if (!chosen) return false;
+  choose(chosen.key);
   return true;
 }
 

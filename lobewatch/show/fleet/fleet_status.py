@@ -45,7 +45,7 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "series": worst.name if worst else "",
         "last_tap": summary.last_tap,
         "days_left": dated.days_left,
-        "tap_age_days": None if summary.time is None else math.floor(tap_age_days(summary.time, dated.time)),
+        "tap_age_days": None if summary.time is None else int(tap_age_days(summary.time, dated.time)),
         "reasons": reasons,
         "drop_reasons": [remark.finding for remark in remarks if remark.code in SEPARATE_REASON_CODES[:2]],
         "note": join_sentences(*reasons),

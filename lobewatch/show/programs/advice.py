@@ -216,7 +216,7 @@ def risk_text(setting: Setting) -> str:
 
 def margins_text(setting: Setting) -> str:
     """Return the margins of a setting in depth and frequency, rounded down."""
-    margin = f"Depth margin {math.floor(100 * setting.depth_margin + 1e-6)} %"
+    margin = f"Depth margin (not rotating) {math.floor(100 * setting.depth_margin + 1e-6)} %"
     if setting.drop_margin <= 0:
         return f"{margin}, not stable if f1 drops another {100 * CHECKED_DROPS[1]:g} %"
     more = " or more" if setting.drop_margin >= CHECKED_DROPS[-1] else ""

@@ -19,7 +19,7 @@ from lobewatch.show.programs.advice import (
     window_text,
     worst_feed_text,
 )
-from lobewatch.show.programs.verdicts import tap_age_json, tap_age_text
+from lobewatch.show.programs.verdicts import limits_json, tap_age_json, tap_age_text
 from lobewatch.show.terminal.output import (
     MIN_COLUMN_WIDTH,
     JsonObject,
@@ -63,6 +63,7 @@ def _recommended_json(setting: Setting | None, verdict: Verdict | None, answer: 
         "worst_feed_deg": math.degrees(verdict.feed_angle),
         "verdict": verdict.stability,
         "measured": verdict.is_measured,
+        **limits_json(verdict),
         "cuts": verdict.n_cuts,
         "chance_turning": verdict.chatter_risk,
         "tap_age_days": tap_age_json(verdict.assembly),

@@ -13,6 +13,7 @@ from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, SpeedTable, UncertaintyTable
 from lobewatch.measurement.chain_check import find_weakest_check
+from lobewatch.measurement.tap_age import format_age
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
 from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.tool import Assembly
@@ -54,14 +55,15 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
 
 
 def tap_age_json(assembly: Assembly | None) -> int | None:
-    """Return the age of the newest tap test in whole days; None if unknown."""
-    return None if assembly is None or assembly.age_days is None else math.floor(assembly.age_days)
+    """Return the age of the older of the newest tap tests in x and y, in whole days; None if unknown."""
+    return None if assembly is None or assembly.age_days is None else int(assembly.age_days)
 
 
 def tap_age_text(assembly: Assembly) -> str:
-    """Return date and age of the newest tap test."""
-    age = tap_age_json(assembly)
-    return f"Newest tap test: {assembly.time.astimezone():%Y-%m-%d}" + ("" if age is None else f", {age} days old")
+    """Return the date of the newest tap test, that of an older direction, and the age."""
+    dates = [f"{time.astimezone():%Y-%m-%d}" for time in (assembly.time, assembly.tapped_since) if time is not None]
+    age = [] if assembly.age_days is None else [format_age(assembly.age_days)]
+    return f"Newest tap test: {', other direction: '.join(dict.fromkeys(dates))}" + "".join(f", {text}" for text in age)
 
 
 def _tap_age_lines(verdicts: Sequence[Verdict]) -> list[str]:
@@ -236,11 +238,7 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "stable": verdict.is_stable,
         "verdict": verdict.stability,
         "measured": verdict.is_measured,
-        "limit_mm": verdict.limit * 1e3,
-        "limit_low_mm": verdict.limit_low * 1e3,
-        "limit_high_mm": verdict.limit_high * 1e3,
-        "limit_at_speed_mm": verdict.limit_at_speed * 1e3,
-        "drop_at_speed": None if samples is None else [samples.drop.low, samples.drop.high],
+        **limits_json(verdict),
         "depth_margin": verdict.depth_margin,
         "chance_turning": verdict.chatter_risk,
         "decided_by": verdict.decisive_cause or None,
@@ -253,6 +251,18 @@ def verdict_json(verdict: Verdict) -> JsonObject:
         "doubt": None if samples is None else uncertainty_json(samples.uncertainty),
         "method": verdict.method,
         "method_detail": verdict.detail,
+    }
+
+
+def limits_json(verdict: Verdict) -> JsonObject:
+    """Return the limits of one verdict, not rotating and at speed, as a JSON object."""
+    drop = None if verdict.samples is None else verdict.samples.drop
+    return {
+        "limit_mm": verdict.limit * 1e3,
+        "limit_low_mm": verdict.limit_low * 1e3,
+        "limit_high_mm": verdict.limit_high * 1e3,
+        "limit_at_speed_mm": verdict.limit_at_speed * 1e3,
+        "drop_at_speed": None if drop is None else [drop.low, drop.high],
     }
 
 
@@ -299,18 +309,20 @@ def chatter_risk_text(verdict: Verdict) -> str:
     return {0: "< 1 %", 100: "> 99 %"}.get(percent, f"{percent} %")
 
 
-EVEN_CHANCE, NEAR_CERTAINTY = 0.5, 0.95
-"""Chances above which words count tenths, and call an event almost certain."""
+EVEN_CHANCE, NEAR_CERTAINTY = 0.55, 0.95
+"""Chances from which words count tenths, and call an event almost certain."""
 WORDED_CHANCES = (2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50, 70, 100)
 """Numbers N of the words "about 1 in N"; the last bounds a chance of which no sample is evidence."""
 
 
 def chance_text(chance: float) -> str:
-    """Return a chance in words, such as "about 1 in 50"."""
+    """Return a chance in words, such as "about 1 in 50"; "unknown" for NaN."""
+    if math.isnan(chance):
+        return "unknown"
     if chance * WORDED_CHANCES[-1] < 1:
         return f"less than 1 in {WORDED_CHANCES[-1]}"
-    if chance > EVEN_CHANCE:
-        return "almost certain" if chance > NEAR_CERTAINTY else f"about {round(10 * chance)} in 10"
+    if chance >= EVEN_CHANCE:
+        return "almost certain" if chance >= NEAR_CERTAINTY else f"about {min(round(10 * chance), 9)} in 10"
     return f"about 1 in {min(WORDED_CHANCES, key=lambda number: abs(math.log(number * chance)))}"
 
 

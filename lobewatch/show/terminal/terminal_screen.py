@@ -198,7 +198,7 @@ DECISION_KEYS: Mapping[str, bool] = {"a": True, "r": False}
 """Keys that accept (True) and reject the last hit, or the hit whose number was typed."""
 MAX_NUMBER_DIGITS = 4
 """Largest number of digits of a typed hit number; chosen."""
-CHOICE_KEYS: Mapping[str, str] = {"start": "y", "x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
+CHOICE_KEYS: Mapping[str, str] = {"start": "y", "still": "s", "x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
 """Key of each choice."""
 
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 from typer import BadParameter
 
-from lobewatch.commands.shared_options import rpm
+from lobewatch.commands.shared_options import present_time, rpm
 from lobewatch.commands.verbosity import apply_verbosity
 from lobewatch.show.terminal.output import notes
 from lobewatch.step_times import STEP_TIMES, time_step
@@ -136,3 +137,21 @@ def test_a_speed_may_have_separators_of_thousands(text: str, speed: float) -> No
 def test_a_speed_of_two_values_is_rejected(text: str, facts: str) -> None:
     with pytest.raises(BadParameter, match=f"'{text}'.*{facts}"):
         rpm(text)
+
+
+@pytest.mark.parametrize("text", ["2026-03-01T23:30Z", "2026-03-02 05:00+05:30", "2026-03-01T18:30:00-05:00"])
+def test_the_present_time_may_have_a_time_zone(text: str) -> None:
+    assert present_time(text) == datetime(2026, 3, 1, 23, 30, tzinfo=UTC)
+
+
+@pytest.mark.parametrize("text", ["2026-03-02", "2026-03-02T08:30", "1970-01-01", "2199-12-31"])
+def test_the_present_time_without_a_zone_is_local(text: str) -> None:
+    assert present_time(text) == datetime.fromisoformat(text).astimezone()
+
+
+@pytest.mark.parametrize(
+    "text", ["0001-01-01", "0001-01-01T00:00+14:00", "1969-12-31", "2200-01-01", "9999-12-31", "2026-13-01", "soon", ""]
+)
+def test_other_present_times_are_rejected_with_the_range(text: str) -> None:
+    with pytest.raises(BadParameter, match="1970-01-01 to 2199-12-31"):
+        present_time(text)

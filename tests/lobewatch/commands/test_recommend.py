@@ -51,6 +51,9 @@ def test_the_recommended_slot_is_saved_as_a_program_that_check_calls_stable(shop
         *(best[key] for key in ("speed_rpm", "depth_mm")),
         "stable",
     ]
+    limits = [f"limit_{end}mm" for end in ("", "low_", "high_", "at_speed_")]
+    assert [best[key] for key in limits] == pytest.approx([checked[key] for key in limits])
+    assert best["depth_margin"] == pytest.approx(best["limit_mm"] / best["depth_mm"] - 1)
 
 
 def test_a_cut_milled_in_either_direction_is_safe_in_both(shop: Shop, run: Any) -> None:
@@ -65,8 +68,9 @@ def test_a_cut_milled_in_either_direction_is_safe_in_both(shop: Shop, run: Any) 
 
 def test_a_depth_that_is_asked_for_has_the_fastest_window_and_others_follow(shop: Shop, run: Any) -> None:
     shop.tap_both()
+    shop.edit("drop_percent = [0, 0]", "drop_percent = [1, 2]")
     answer = json.loads(run("recommend", "--depth", "1", "--speed", "6500", "--json")[1])
-    assert answer["recommended"]["depth_mm"] == 1
+    assert (answer["recommended"]["depth_mm"], answer["recommended"]["drop_at_speed"]) == (1, [0.01, 0.02])
     most, here = answer["alternatives"]
     assert (most["what"], here["what"], here["speed_rpm"]) == ("most chips", "deepest at the present speed", 6500)
     assert most["speed_rpm"] * most["depth_mm"] > answer["recommended"]["speed_rpm"]

@@ -131,6 +131,14 @@ def test_a_sensor_in_the_opposite_direction_changes_the_sign(run: Run, folder: P
     assert after == pytest.approx([-value if i == 5 else value for i, value in enumerate(before)], abs=1e-4)
 
 
+def test_points_without_a_direction_have_that_of_the_tip(run: Run, folder: Path) -> None:
+    before = run("shapes", folder, "--json").json["modes"][0]["shape"]["real"]
+    turned = {"p0": "-x", "p5": "x"}
+    change_table(folder, lambda rows: [f"{row},{turned.get(row[:2], '')}" for row in rows], f"{HEAD},direction")
+    after = run("shapes", folder, "--json").json["modes"][0]["shape"]["real"]
+    assert after == pytest.approx([-value if i == 5 else value for i, value in enumerate(before)], abs=1e-4)
+
+
 def test_an_earlier_set_is_compared_by_the_names_of_its_points(run: Run, folder: Path, tmp_path: Path) -> None:
     earlier = Path(shutil.copytree(folder, tmp_path / "earlier"))
     change_table(earlier, lambda rows: rows[::-1][:4] + rows[:1])
@@ -182,9 +190,12 @@ def test_nodes_say_what_was_hit_and_in_which_direction(run: Run, tmp_path: Path)
     rows = [f"n{node},{40 * node},tool,all.uff,{node}" for node in (1, 2, 3)]
     write_table(tmp_path, rows, f"{HEAD},node")
     assert run("shapes", tmp_path).code == 2  # node 2 has x and y
-    write_table(tmp_path, [f"{row},x" for row in rows], f"{HEAD},node,direction")
-    answer = run("shapes", tmp_path, "--json").json
-    assert answer["modes"][0]["shape"]["real"] == pytest.approx([1.0, 0.505, -0.3], abs=1e-3)
+    for own in ("x", "-x"):  # the file has the signs, whatever the table says of one point
+        directions = ("x", own, own)
+        table = [f"{row},{direction}" for row, direction in zip(rows, directions, strict=True)]
+        write_table(tmp_path, table, f"{HEAD},node,direction")
+        answer = run("shapes", tmp_path, "--json").json
+        assert answer["modes"][0]["shape"]["real"] == pytest.approx([1.0, 0.505, -0.3], abs=1e-3)
     (check,) = answer["checks"]
     assert (check["point"], check["kind"], check["scale"]) == ("n2", "reciprocity", pytest.approx(1.02, abs=1e-3))
 

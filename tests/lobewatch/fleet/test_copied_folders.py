@@ -48,6 +48,9 @@ def test_the_status_names_it_and_its_level_stays(mills: Path, shop: Shop) -> Non
     named = {key for key, current in found.items() if "folder-copied" in {one.code for one in current.remarks}}
     assert named == {"copy", "original"}
     assert found["copy"].status is StatusLevel.GOOD
+    (alone,) = Fleet({"m": shutil.copytree(mills / "copy", mills / "elsewhere" / "m")}).assess_machines(shop.start)
+    assert alone.current.remarks == ()
+    assert found["copy"].next_step == alone.current.next_step
 
 
 def test_one_machine_is_compared_with_its_neighbours(mills: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,6 +60,17 @@ def test_one_machine_is_compared_with_its_neighbours(mills: Path, monkeypatch: p
     assert find_copies({"untapped": mills / "untapped"}) == {}
     monkeypatch.chdir(mills / "copy")
     assert "original" in find_copies({"copy": Path()})["copy"].text
+
+
+def test_a_link_to_a_folder_is_no_copy(mills: Path) -> None:
+    (mills / "link").symlink_to(mills / "other")
+    (mills / "link to a copy").symlink_to(mills / "copy")
+    found = copies(find_machines(mills))
+    assert set(found) == {"copy", "original", "link to a copy"}
+    assert "original" in found["copy"] & found["link to a copy"]
+    assert "link" not in found["copy"]
+    for one in ("other", "link"):
+        assert find_copies({one: mills / one}) == {}
 
 
 def test_many_copies_are_counted(mills: Path) -> None:

@@ -13,6 +13,7 @@ from lobewatch.history.history import decode_row, encode_row
 from lobewatch.logbook import Logbook
 from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS
+from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.verdicts.verdict import Stability, StoredVerdict
 from modal import Mode, synthesize_frf
 from tests.lobewatch.conftest import LINES, START, Shop
@@ -60,6 +61,7 @@ def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: Histor
 def test_no_question_is_overlooked(code: str) -> None:
     asked = replace(PLAIN, remarks=(Remark("one-direction", "reference", "x alone"), Remark(code, "", "is it?")))
     assert [one.code for one in decode_row(encode_row(0, asked, HASHES), HASHES)[1].questions] == [code]
+    assert STATUS_BY_CODE[code] is not StatusLevel.GOOD
 
 
 def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_reopened(shop: Shop) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from acquisition import TapDirection
 from lobewatch.fleet.fleet import Fleet
 from lobewatch.logbook import LobeComparison, Logbook, compare_lobes
 from lobewatch.logbook.requested_cuts import recommend_requested
@@ -75,12 +77,53 @@ def test_the_verdict_is_the_same_everywhere(path: Path) -> None:
     assert set(everywhere(path, OLD).values()) == {"doubtful"}
 
 
+@pytest.fixture
+def copied(path: Path, tmp_path: Path) -> Shop:
+    """Return a copy of the machine, to be tapped further."""
+    shop = Shop(tmp_path / "new")
+    shop.path = shutil.copytree(path, tmp_path / "m")
+    return shop
+
+
+def test_one_new_direction_makes_the_other_no_younger(copied: Shop) -> None:
+    copied.tap(60.5, 1713.0)
+    assert set(everywhere(copied.path, OLD).values()) == {"doubtful"}
+    logbook = Logbook.open(copied.path, OLD)
+    (verdict,) = logbook.verdicts()
+    assert (verdict.decisive_cause, verdict_json(verdict)["tap_age_days"]) == ("unchecked", 60)
+    assert "tap-too-old" in {remark.code for remark in logbook.status().remarks}
+    copied.tap(60.6, 1690.0, "y")
+    (verdict,) = Logbook.open(copied.path, OLD).verdicts()
+    assert (verdict.stability, verdict_json(verdict)["tap_age_days"]) == ("stable", 0)
+
+
+@pytest.mark.parametrize(("direction", "frequency", "days"), [("x", 1713.0, 0.1), ("y", 1690.0, 0.0)])
+def test_a_prediction_is_as_old_as_the_tests_behind_it(
+    copied: Shop, direction: TapDirection, frequency: float, days: float
+) -> None:
+    copied.tap(60.5, frequency, direction)
+    logbook = copied.logbook
+    times = [logbook.history.tapped_since(tool) for tool in ("reference", "long end mill")]
+    assert times == [START + timedelta(days=days)] * 2
+    assert logbook.assembly("long end mill").predicted
+
+
+def test_age_leaves_an_earlier_cause(path: Path, tmp_path: Path) -> None:
+    shop = Shop(tmp_path / "m")
+    (shop.path / "machine.toml").write_text((path / "machine.toml").read_text("utf-8"), "utf-8")
+    shop.tap(0.0, 1713.0)
+    for now, codes in ((NEW, set[str]()), (OLD, {"tap-too-old"})):
+        (verdict,) = Logbook.open(shop.path, now).verdicts()
+        assert (verdict.stability, verdict.decisive_cause) == ("doubtful", "untapped")
+        assert codes == {remark.code for remark in verdict.remarks} & {"tap-too-old"}
+
+
 def test_the_cause_and_the_remedy_are_named(path: Path) -> None:
     logbook = Logbook.open(path, OLD)
     (verdict,) = logbook.verdicts()
     own = logbook.verdict_for(verdict.program)
     for one in (verdict, own):
-        assert (one.decisive_cause, verdict_json(one)["tap_age_days"]) == ("unchecked", 60)
+        assert (one.decisive_cause, verdict_json(one)["tap_age_days"]) == ("unchecked", 61)
         codes = {remark.code: remark.cure for remark in one.remarks}
         assert codes["tap-too-old"] == codes["doubt-decides"] == "Tap again"
     assert verdict_json(verdict) | {"worst_feed_deg": 0} == verdict_json(own) | {"worst_feed_deg": 0}

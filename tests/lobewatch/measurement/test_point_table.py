@@ -59,6 +59,12 @@ def test_a_wrong_cell_is_named_with_its_line(tmp_path: Path, line: str, facts: t
     assert [fact for fact in facts if fact not in str(wrong.value)] == []
 
 
+def test_points_in_one_position_are_refused(tmp_path: Path) -> None:
+    lines = ("a,50,tool,a.csv", "b,50,holder,a.csv", "c,50,spindle,a.csv")
+    with pytest.raises(DataError, match=r"points\.csv: position_mm 50"):
+        write(tmp_path, "point,position_mm,part,file", *lines)
+
+
 def test_a_table_in_another_encoding_is_refused(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_bytes(b"point,position_mm,part,file\n\xfc,0,tool,a.csv\n")
     with pytest.raises(DataError, match="UTF-8"):

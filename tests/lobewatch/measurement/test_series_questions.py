@@ -103,6 +103,48 @@ def test_two_steps_are_asked_both_times_and_an_answer_begins_a_level() -> None:
 
 
 @pytest.mark.quick
+@pytest.mark.parametrize("honest", [1, 3, 6])
+@pytest.mark.parametrize("step", [1.25, 1.4, 1.1, 1 / 1.25, 1 / 1.1])
+def test_a_gain_in_five_steps_is_asked_about_from_the_second_test_on(honest: int, step: float) -> None:
+    values = [(F, K * np.exp(0.02 * (-1) ** i) * step ** min(max(i - honest + 1, 0), 5)) for i in range(honest + 8)]
+    tests: list[Values] = []
+    silent = 0
+    for value in values:  # both directions change alike, and tests in question are no reference
+        codes = asked(*value, series(*tests), series(*tests, hours=1))
+        tests += [] if codes else [value]
+        silent += not codes
+    assert silent < len(values)
+
+
+@pytest.mark.quick
+def test_small_steps_are_asked_against_the_first_tests() -> None:
+    steps = series(*[(F, K * 1.02**i) for i in range(9)])
+    assert asked(F, K * 1.02**5, steps[:5]) == []
+    expected = expect_stiffness(SeriesReference(steps), F)
+    assert expected is not None
+    assert not expected.is_beyond(K * 1.02**9)
+    assert asked(F, K * 1.02**9, steps) == ["stiffness-jump"]
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("n", [2, 5, 12])
+def test_a_young_series_cannot_raise_its_own_limit(n: int) -> None:
+    wild = series(*scattered(n, 0.3))
+    expected = expect_stiffness(SeriesReference(wild, wild), F)
+    assert expected is not None
+    assert expected.limit <= 4 * 0.06 * np.sqrt(2)
+
+
+@pytest.mark.quick
+def test_the_slope_stays_within_models_of_spindles() -> None:
+    steep = series(*[(F * w, K * w**9) for w in np.linspace(1, 0.95, 12)])
+    expected = expect_stiffness(SeriesReference(steep), 0.9 * F)
+    middle = float(np.median([test.frequency for test in steep]))
+    assert expected is not None
+    assert expected.value == pytest.approx(K * (middle / F) ** 9 * (0.9 * F / middle) ** 3.9, rel=2e-3)
+
+
+@pytest.mark.quick
 @pytest.mark.parametrize(("rise", "is_asked"), [(0.12, True), (0.052, True), (0.048, False), (-0.14, False)])
 def test_a_rise_asks_for_the_tool_and_a_fall_does_not(rise: float, is_asked: bool) -> None:
     values = F * (1 + rise), K * (1 + rise) ** 3

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lobewatch.measurement.tap_age import is_too_old, old_remark, tap_age_days, too_old_remark
+from lobewatch.measurement.tap_age import format_age, is_too_old, old_remark, tap_age_days, too_old_remark
 
 pytestmark = pytest.mark.quick
 TAPPED = datetime(2026, 1, 15, 9, tzinfo=UTC)
@@ -25,6 +25,15 @@ def test_age_counts_days_in_any_time_zone(days: float, interval: float, offset: 
 def test_two_intervals_are_not_too_old() -> None:
     assert not is_too_old(TAPPED, TAPPED + timedelta(days=60), 30.0)
     assert is_too_old(TAPPED, TAPPED + timedelta(days=60, seconds=1), 30.0)
+
+
+def test_an_age_counts_whole_days_on_both_sides_of_now() -> None:
+    ages = (0.0, -0.5, 0.9, 1.5, -1.5, 400.9, -20785.2)
+    words = [format_age(age).split()[0] for age in ages]
+    assert words == ["0", "0", "0", "1", "1", "400", "20785"]
+    assert format_age(-0.5) == format_age(0.5) != format_age(1.5)
+    assert "days" not in format_age(1.5) + format_age(-1.5)
+    assert format_age(-2.0) != format_age(2.0)
 
 
 def test_remarks_name_the_age_in_whole_days() -> None:

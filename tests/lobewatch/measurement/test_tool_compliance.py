@@ -78,6 +78,26 @@ def test_a_tip_is_compared_with_its_tool(ratio: float, highest: float, agreement
     assert compare_with_tool(modes(1 / (ratio * TOOL.compliance)), TOOL, highest) is agreement
 
 
+@pytest.mark.parametrize(("shank", "flutes"), [(None, 0.008), (None, 0.030), (0.006, 0.008)])
+def test_a_small_cutter_on_a_thicker_shank_is_not_too_stiff(shank: float | None, flutes: float) -> None:
+    """Cutter of 3 mm with 8 mm of flutes on a shank of 6 mm: from the tip 8 mm with 2.4 mm, then 22 mm with 6 mm."""
+    fluted, whole = 0.008**3 / 0.0024**4, (0.030**3 - 0.008**3) / 0.006**4
+    true = 64 * (fluted + whole) / (3 * math.pi * MATERIALS["carbide"].youngs_modulus)
+    tool = ToolBeam(0.003, 0.030, flutes, "carbide", shank)
+    assert tool.stiffest.compliance <= true * (1 + 1e-12)
+    assert compare_with_tool(modes(1 / true), tool, 2e4) is ToolAgreement.AGREES
+    assert compare_with_tool(modes(5 / true), tool, 2e4) is ToolAgreement.TOO_STIFF
+
+
+def test_a_known_shank_is_the_stiffest() -> None:
+    known = replace(TOOL, diameter=0.015, shank_diameter=0.015)
+    assert known.stiffest == known
+    assert TOOL.stiffest == TOOL
+    assert replace(TOOL, diameter=0.015).stiffest.shank_diameter == 0.016
+    text = TOML.replace("stick_out_mm = 80", "stick_out_mm = 80\nshank_diameter_mm = 20")
+    assert find_tool_beam(parse_machine_file(text), "T1") == replace(TOOL, shank_diameter=0.020)
+
+
 def test_nothing_is_known_without_tool_or_stiffness() -> None:
     free = Mode(900.0, 0.02, math.nan, relative_peak=1.0)
     assert compare_with_tool(modes(1e7), None, HIGH) is ToolAgreement.UNKNOWN

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
@@ -22,7 +23,7 @@ from acquisition import (
     MeasuredRate,
 )
 from acquisition.sensors.stream_rate import StreamRate
-from lobewatch.machine.daq_rates import apply_measured_rate, find_stored_rate
+from lobewatch.machine.daq_rates import apply_measured_rate, find_stored_rate, replace_stored_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, build_structure
 from lobewatch.tap.tap_in_progress import begin_tap
@@ -101,6 +102,29 @@ def test_a_wrong_rate_refuses_the_test_and_its_hits_are_corrected_later(
     assert check.passed
     truth = Board(folder, error).frequency
     assert session.measurement.followed.frequency == pytest.approx(truth, rel=1e-3)
+
+
+@pytest.mark.parametrize(("change", "n_kept"), [(2e-4, 1), (5e-3, 0)])
+def test_kept_hits_get_a_rate_that_was_measured_again(
+    tapped: Callable[[float], Any], folder: MachineFolder, change: float, n_kept: int
+) -> None:
+    error = -0.05
+    with pytest.raises(DataError):
+        tapped(error)
+    stored = find_stored_rate(folder, Board(folder, error))
+    assert stored is not None
+    again = replace(stored, rate=stored.rate * (1 + change))
+    replace_stored_rate(folder, Board(folder, error), again)
+    accept_measured_rate(folder)
+    if not n_kept:
+        with pytest.raises(ValueError, match="resume"):
+            tapped(error)
+        return
+    session = tapped(error)
+    (entry,) = folder.taps()
+    assert {hit.sample_rate for hit in folder.read(entry).hits} == {again.rate}
+    assert sum(hit.earlier for hit in session.state.hits) >= n_kept
+    assert session.measurement.followed.frequency == pytest.approx(Board(folder, error).frequency, rel=1e-3)
 
 
 def test_hits_of_an_unknown_rate_are_not_resumed(tapped: Callable[[float], Any], folder: MachineFolder) -> None:

@@ -22,6 +22,7 @@ from acquisition import Device, DeviceIdentity, HammeredStructure, Hammering, Me
 from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.tap.kept_rate import RATE_FILE_NAME
 
 RATE = 48000
 FULL_SCALE = 5.0
@@ -62,6 +63,15 @@ def record_hits(path: Path, structure: Structure, seconds: float) -> None:
         file.writeframes(codes.T.tobytes())
 
 
+def play_and_run(command: list[str], environment: dict[str, str], file: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command while the cable carries a sound file."""
+    with subprocess.Popen(["paplay", "--device=wire", str(file)], env=environment) as player:
+        try:
+            return subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=90)
+        finally:
+            player.terminate()
+
+
 def test_a_whole_tap_test_through_a_sound_server(cable: dict[str, str], structure: Structure, tmp_path: Path) -> None:
     record_hits(tmp_path / "hits.wav", structure, 60.0)
     make_machine_folder(tmp_path / "trial", "new_machine.toml")
@@ -69,28 +79,21 @@ def test_a_whole_tap_test_through_a_sound_server(cable: dict[str, str], structur
     channel = '[[daq.channel]]\ninput = {}\nquantity = "{}"\n{}\nrange_v = 5\n'
     force = channel.format(0, "force", "sensitivity_mv_per_n = 2.25")
     acceleration = channel.format(1, "acceleration", "sensitivity_mv_per_g = 10")
-    daq = f'[daq]\ndriver = "audio"\nport = "audio:wire"\n{force}{acceleration}\n'
+    daq = f'[daq]\ndriver = "audio"\nport = "audio:wire"\naccept_measured_rate = true\n{force}{acceleration}\n'
     toml.write_text(toml.read_text("utf-8").replace("[daq]\n", daq, 1), "utf-8")
     known = SimpleNamespace(identity=DeviceIdentity("wire", "wire"), sample_rate=float(RATE), follows_clock=True)
-    apply_measured_rate(
-        MachineFolder(toml.parent), cast("Device", known), MeasuredRate(float(RATE), 1.0, 5 * RATE, 5.0)
-    )
+    folder, nominal = MachineFolder(toml.parent), MeasuredRate(float(RATE), 1.0, 5 * RATE, 5.0)
+    apply_measured_rate(folder, cast("Device", known), nominal)
     lobewatch = [sys.executable, "-m", "lobewatch.cli"]
     listed = subprocess.run([*lobewatch, "ports", "--json"], env=cable, capture_output=True, text=True, check=True)
     assert "audio:wire" in [port["device"] for port in json.loads(listed.stdout)["ports"]]
-    with subprocess.Popen(["paplay", "--device=wire", str(tmp_path / "hits.wav")], env=cable) as player:
-        try:
-            tapped = subprocess.run(
-                [*lobewatch, "tap", str(toml.parent), "--direction", "x", "--json"],
-                env=cable,
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=90,
-            )
-        finally:
-            player.terminate()
+    tap = [*lobewatch, "tap", str(toml.parent), "--direction", "x", "--json"]
+    tapped = play_and_run(tap, cable, tmp_path / "hits.wav")
+    if tapped.returncode == 2 and list(folder.spool.glob(f"*/{RATE_FILE_NAME}")):  # refused: the null sink is slow
+        tapped = play_and_run(tap, cable, tmp_path / "hits.wav")
     assert tapped.returncode == 0, tapped.stderr
-    followed = json.loads(tapped.stdout)["followed"]
-    assert followed["frequency_hz"] == pytest.approx(1722.0, abs=max(0.3, 4 * followed["frequency_hz_std"]))
-    assert followed["stiffness_n_per_m"] == pytest.approx(3.2289e7, rel=0.01)
+    (rate,) = {hit.sample_rate for entry in folder.taps() for hit in folder.read(entry).hits}
+    assert rate == pytest.approx(RATE, rel=0.01)
+    followed, ratio = json.loads(tapped.stdout)["followed"], rate / RATE
+    assert followed["frequency_hz"] == pytest.approx(ratio * 1722.0, abs=max(0.3, 4 * followed["frequency_hz_std"]))
+    assert followed["stiffness_n_per_m"] == pytest.approx(ratio**2 * 3.2289e7, rel=0.01)

@@ -8,17 +8,31 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition import DataError, HammeredStructure, Hammering, HitFlags, SensorInput
+from acquisition import DataError, HammeredStructure, Hammering, Hit, HitFlags, SensorInput
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.measurement.recording_questions import SPINDLE_TURNING
+from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.measurement.recording_questions import ACCEPTED_CODE, SPINDLE_TURNING, mark_accepted
 from lobewatch.tap.emulated_faults import SOFT_TIP_WIDTH, EmulatedFault, EmulatedFaults
 from lobewatch.tap.emulated_spindle import EMULATED_CHANNELS, build_structure
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.start_questions import StartQuestions
+from lobewatch.tap.state import StatePublisher, TapState, TapStep
+from lobewatch.tap.steady_line import find_steady_line
 from tests.lobewatch.tap.conftest import RATE, Simulated
 
 INPUTS = tuple(SensorInput(number, channel) for number, channel in enumerate(EMULATED_CHANNELS))
 Watch = Callable[[TapState], None]
+
+
+def record_at_rest(lines: dict[float, float], noise: float = 0.02) -> Hit:
+    """Return a record of 1 s with lines of these frequencies (Hz) and rms (m/s^2)."""
+    random, time = np.random.default_rng(1), np.arange(round(RATE)) / RATE
+    tones = [np.sqrt(2) * rms * np.sin(2 * np.pi * frequency * time) for frequency, rms in lines.items()]
+    response = random.normal(0, noise, time.size) + np.sum([0 * time, *tones], axis=0)
+    signals = random.normal(0, 0.05, time.size), response
+    codes = np.array([sensor.channel.encode(signal) for sensor, signal in zip(INPUTS, signals, strict=True)])
+    return Hit.from_codes(codes, EMULATED_CHANNELS, RATE)
 
 
 class Chain(Simulated):
@@ -70,6 +84,43 @@ def test_no_hit_counts_while_the_spindle_turns(
     assert (session.state.hits, folder.taps()) == ((), [])
 
 
+@pytest.mark.parametrize("noise", [0.02, 2.0])
+@pytest.mark.parametrize(
+    ("lines", "frequency"),
+    [
+        ({50.0: 0.3}, 50.0),
+        ({50.0: 0.5, 100.0: 0.1}, 50.0),
+        ({60.0: 0.5}, 60.0),
+        ({24.0: 0.3}, 24.0),
+        ({300.0: 1.0, 600.0: 0.2}, 300.0),
+        ({50.0: 3.0, 150.0: 0.9, 250.0: 0.3, 57.0: 0.6}, 57.0),  # hum, and a spindle at 3420 rpm
+        ({24.3: 0.03}, None),  # floor
+        ({50.0: 0.05}, None),
+        ({300.0: 0.4}, None),
+        ({}, None),
+    ],
+)
+def test_a_person_is_asked_from_the_smallest_severity_of_vibration(
+    lines: dict[float, float], frequency: float | None, noise: float
+) -> None:
+    line = find_steady_line(record_at_rest(lines, noise))
+    assert (line and round(line.frequency)) == frequency
+    assert line is None or (line.is_asked and line.rms == pytest.approx(lines[round(line.frequency)], rel=0.5))
+
+
+@pytest.mark.parametrize(("harmonics", "asked"), [({3: 0.3, 5: 0.1}, False), ({2: 0.2}, True), ({}, True)])
+def test_only_the_odd_harmonics_of_the_mains_show_that_it_is_hum(harmonics: dict[int, float], asked: bool) -> None:
+    line = find_steady_line(record_at_rest({50.0: 3.0} | {50.0 * k: 3.0 * share for k, share in harmonics.items()}))
+    assert line is not None
+    assert (line.frequency, line.is_asked) == (50.0, asked)
+    assert "mains hum" in line.finding
+
+
+@pytest.mark.parametrize("noise", [0.02, 2.0, 200.0])
+def test_noise_has_no_line(noise: float) -> None:
+    assert find_steady_line(record_at_rest({}, noise)) is None
+
+
 def test_weak_hum_only_warns(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
     session = session_of(folder, lambda: Chain(folder, EmulatedFaults(EmulatedFault.MAINS_HUM)))
     run(session, until=lambda state: state.good)
@@ -79,8 +130,17 @@ def test_weak_hum_only_warns(folder: MachineFolder, session_of: Callable[..., An
 def test_an_accepted_line_is_kept_in_the_journal(folder: MachineFolder, session_of: Callable[..., Any]) -> None:
     session_of(folder, lambda: Chain(folder, EmulatedFaults(turning_rpm=3000)), accept=[SPINDLE_TURNING.code]).run()
     (entry,) = MachineFolder(folder.path).taps()
-    assert SPINDLE_TURNING.code in entry.asked
-    assert SPINDLE_TURNING.code in entry.accepted
+    assert (entry.asked, entry.asked_live, entry.accepted) == ((), (SPINDLE_TURNING.code,), (SPINDLE_TURNING.code,))
+    logbook = Logbook.open(folder.path)
+    assert logbook.questions == {}
+    assert ACCEPTED_CODE in [remark.code for remark in logbook.measurement(entry.id).remarks]
+
+
+def test_a_question_of_a_newer_version_is_no_error() -> None:
+    known = TapEntry("t", "", 0, "2026-06-01T08:00:00+00:00", "R", "x", "", asked_live=("new", SPINDLE_TURNING.code))
+    entry = TapEntry.from_line(known.line)
+    assert entry == known
+    assert [remark.code for remark in mark_accepted((), entry)] == [SPINDLE_TURNING.code]
 
 
 @pytest.mark.parametrize("rpm", [0.0, 12_000.0])
@@ -116,10 +176,31 @@ def test_an_answer_that_nobody_asked_for_is_rejected(folder: MachineFolder, sess
         session_of(folder, lambda: Chain(folder, EmulatedFaults())).choose("start")
 
 
+def test_two_presses_answer_one_question() -> None:
+    publisher = StatePublisher(TapState(0, TapStep.CHECKING, "m", "x", wanted=3), lambda: 0.0)
+    questions = StartQuestions(publisher, "R", [], asks=True)
+
+    def press_twice() -> None:
+        for _ in range(2):
+            questions.answer(publisher.state.choices[0].key)
+
+    records = 0
+
+    def record() -> Hit:
+        nonlocal records
+        records += 1
+        return turning if records < 3 else resting
+
+    turning, resting = record_at_rest({200.0: 8.0}), record_at_rest({})
+    questions.confirm(press_twice)
+    assert questions.settle(turning, record) is resting
+    assert (questions.asked, questions.accepted, records) == ([], [], 3)
+
+
 @pytest.mark.parametrize(
     ("faults", "flag"),
     [
-        (EmulatedFaults(turning_rpm=3000, begin=3.0), HitFlags.STEADY_VIBRATION),
+        (EmulatedFaults(turning_rpm=12_000, begin=3.0), HitFlags.STEADY_VIBRATION),
         (EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION),
         (EmulatedFaults(EmulatedFault.RESPONSE_CABLE, begin=3.0), HitFlags.NO_RESPONSE),
         (EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE),

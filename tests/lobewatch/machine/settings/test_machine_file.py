@@ -275,3 +275,13 @@ def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() ->
         changed = parse_machine_file(EXAMPLE.replace(old, new))
         assert (changed.settings_hash == machine.settings_hash) is same
         assert (hash_programs(changed) == hash_programs(machine)) is same_words
+
+
+def test_a_further_program_of_a_described_tool_changes_no_result_of_its_tap_tests() -> None:
+    described = EXAMPLE + '\n[[tool]]\nname = "plain"\ntool_material = "carbide"\ndiameter_mm = 20\nstick_out_mm = 60\n'
+    program = described[described.index("[[program]]") :].split("\n\n")[0]
+    named = re.sub(r'^(name|tool) = ".*"', lambda found: f'{found[1]} = "plain"', program, flags=re.MULTILINE)
+    hashes = [parse_machine_file(text).settings_hash for text in (described, f"{described}\n{named}\n")]
+    assert hashes[0] == hashes[1]
+    shank = described.replace("stick_out_mm = 60", "stick_out_mm = 60\nshank_diameter_mm = 20")
+    assert parse_machine_file(shank).settings_hash != hashes[0]

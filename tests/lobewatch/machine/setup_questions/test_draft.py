@@ -47,6 +47,27 @@ def test_speeds_of_two_values_or_another_count_are_rejected(answer: str) -> None
         find_setup_question("speeds").apply_answer(MachineDraft(TEMPLATE, {}), answer)
 
 
+@pytest.mark.parametrize(
+    ("answer", "facts"),
+    [
+        ("1,5 18,000", "1.5.* 10 to 60000"),
+        ("9.99 18000", "9.99.* 10 to 60000"),
+        ("0 18000", "0.* 10 to 60000"),
+        ("1000 18", "18.* 300 to 250000"),
+        ("1000 250001", "250001.* 300 to 250000"),
+    ],
+)
+def test_speeds_that_no_spindle_has_are_rejected(answer: str, facts: str) -> None:
+    with pytest.raises(ValueError, match=facts):
+        find_setup_question("speeds").apply_answer(MachineDraft(TEMPLATE, {}), answer)
+
+
+@pytest.mark.parametrize("answer", ["10 300", "60000 250000"])
+def test_the_ends_of_the_plausible_speeds_are_accepted(answer: str) -> None:
+    table = find_setup_question("speeds").apply_answer(MachineDraft(TEMPLATE, {}), answer).table("speed")
+    assert f"{table['low_rpm']:g} {table['high_rpm']:.0f}" == answer
+
+
 def test_each_answer_knows_its_plausible_range() -> None:
     draft = MachineDraft(TEMPLATE, {})
     draft = find_setup_question("tool").apply_answer(draft, "4 12.700 30 80,500")

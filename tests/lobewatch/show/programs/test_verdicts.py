@@ -14,6 +14,7 @@ from lobewatch.machine import ProgramTable
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import (
     VERDICT_STYLES,
+    chance_text,
     chatter_risk_text,
     is_safe,
     limits_text,
@@ -175,3 +176,23 @@ def test_json_says_limits_in_millimetres_and_angles_in_degrees() -> None:
     assert limits == pytest.approx([3.0, 2.0, 4.0, 7.0])
     assert said["depth_margin"] == pytest.approx(3.0 / 2.0 - 1)
     assert (said["worst_feed_deg"], said["chatter_frequency_hz"]) == (pytest.approx(90.0), 1700.0)
+
+
+CHANCES = [math.nan, 0.0, 0.0099, 0.01, 0.02, 0.1, 0.5, 0.51, 0.54, 0.55, 0.6, 0.9, 0.9499, 0.95, 1.0]
+
+
+def test_a_chance_in_words_is_near_the_chance() -> None:
+    texts = [chance_text(chance) for chance in CHANCES]
+    assert texts[:2] == ["unknown", "less than 1 in 100"]
+    assert texts[2] == texts[1]
+    assert texts[-2:] == ["almost certain"] * 2
+    for chance, text in list(zip(CHANCES, texts, strict=True))[3:-2]:
+        shown, total = map(int, re.findall(r"\d+", text))
+        assert 0 < shown < total
+        assert shown / total == pytest.approx(chance, abs=0.0501)
+
+
+@given(st.floats(0.01, 0.9499))
+def test_no_chance_in_words_is_a_quarter_off(chance: float) -> None:
+    shown, total = map(int, re.findall(r"\d+", chance_text(chance)))
+    assert 0.7 <= shown / total / chance <= 1.4

@@ -13,7 +13,14 @@ import pytest
 from rich.console import Console
 
 from acquisition import HitFlags
-from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen, normalize_keys, render_state
+from lobewatch.show.terminal.terminal_screen import (
+    CHOICE_KEYS,
+    TapPrinter,
+    TerminalScreen,
+    normalize_keys,
+    render_state,
+)
+from lobewatch.tap.start_questions import START_CHOICE, STILL_CHOICE
 from lobewatch.tap.state import Check, Choice, ListedHit, Outcome, ProgramVerdict, TapState, TapStep
 
 GOOD = ListedHit(1, HitFlags.OK, "231 N")
@@ -277,3 +284,11 @@ def test_an_accepted_hit_shows_its_faults_and_a_typed_number_is_shown() -> None:
     console = Console(file=io.StringIO(), width=100)
     console.print(render_state(STATE, muted=False, typed_number="12"))
     assert "hit 12" in console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def test_a_second_press_of_a_key_does_not_answer_the_next_question() -> None:
+    session = Session(replace(STATE, word=TapStep.ASK, choices=(STILL_CHOICE,)))
+    screen, _ = screen_of(session)
+    for key in (CHOICE_KEYS[START_CHOICE.key], CHOICE_KEYS[STILL_CHOICE.key]):
+        screen.handle_key(key)
+    assert session.asked == [f"choose {STILL_CHOICE.key}"]

@@ -92,6 +92,26 @@ UNKNOWN_CONDITIONS = Conditions()
 """Conditions that are all unknown."""
 
 
+def parse_device(text: str) -> DeviceIdentity:
+    """Return model and serial number from the text that a tap test keeps of its recording device.
+
+    A comma and a space end either, as the text has no other mark between its parts.
+
+    Parameters
+    ----------
+    text
+        Model, serial number and more, joined with ", ".
+
+    Examples
+    --------
+    >>> parse_device("DI-2108, serial number 5C76F3AA, firmware 1.03").serial
+    '5C76F3AA'
+    """
+    model, *details = text.split(", ")
+    serials = [part.removeprefix(SERIAL_PREFIX) for part in details if part.startswith(SERIAL_PREFIX)]
+    return DeviceIdentity(model, next(iter(serials), ""))
+
+
 @dataclass(frozen=True)
 class Circumstances:
     """Operator, machine, tool, direction and time of a tap test.
@@ -129,9 +149,7 @@ class Circumstances:
     @property
     def device_identity(self) -> DeviceIdentity:
         """Model and serial number of the recording device; empty if unknown."""
-        model, *details = self.device.split(", ")
-        serials = [text.removeprefix(SERIAL_PREFIX) for text in details if text.startswith(SERIAL_PREFIX)]
-        return DeviceIdentity(model, next(iter(serials), ""))
+        return parse_device(self.device)
 
     @property
     def is_emulated(self) -> bool:

@@ -88,7 +88,7 @@ class Trigger:
             raise ValueError(f"pre_trigger={self.pre_trigger} samples is not between 1 and n_samples={self.n_samples}")
 
 
-def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
+def capture_hits(source: Source, trigger: Trigger, direction: str = "") -> Iterator[Hit]:
     """Yield the hits of a started source without evaluating them.
 
     Nothing is interpolated: a record with a gap has its samples closed up and `lost_scans` > 0.
@@ -99,6 +99,8 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
         Started source.
     trigger
         Start and length of a record.
+    direction
+        Direction of the hits; selects one of several responses as `TapInputs.select` does.
 
     Yields
     ------
@@ -117,7 +119,7 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
     >>> len(hits), [check_hit(hit) == HitFlags.OK for hit in hits]
     (4, [True, True, True, True])
     """
-    search = HitSearch(source.channels, source.sample_rate, trigger)
+    search = HitSearch(source.channels, source.sample_rate, trigger, direction)
     for block in source.blocks():
         yield from search.feed(block)
 

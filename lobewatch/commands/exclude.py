@@ -14,7 +14,7 @@ def exclude(
     reason: Annotated[str, Option(help="Reason for the exclusion.")],
     as_json: Json = False,
 ) -> None:
-    """Exclude a tap test or test cut from all results.
+    """Exclude a tap test, test cut or mass check from all results.
 
     The file is kept. lobewatch include undoes the exclusion.
 

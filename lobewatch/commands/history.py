@@ -36,7 +36,7 @@ def history(
         from lobewatch.history.history import make_export_columns
         from lobewatch.show.terminal.option_names import with_option_names
 
-        write_history(hdf5, make_export_columns(logbook.history, logbook.machine, with_option_names))
+        write_history(hdf5, make_export_columns(logbook.checked_history, logbook.machine, with_option_names))
     if as_csv:
         results.out(history_csv(logbook), end="", highlight=False)
     else:

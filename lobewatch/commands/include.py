@@ -1,11 +1,11 @@
-"""Command `lobewatch include`: include an excluded tap test again."""
+"""Command `lobewatch include`: include an excluded entry again."""
 
 from lobewatch.commands.shared_options import ExcludableEntry, Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def include(machine: Machine, tap: ExcludableEntry, as_json: Json = False) -> None:
-    """Include an excluded tap test or test cut again.
+    """Include an excluded tap test, test cut or mass check again.
 
     Examples
     --------

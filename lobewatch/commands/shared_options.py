@@ -45,6 +45,16 @@ def rpm(text: str | float) -> float:
         raise BadParameter(str(error)) from None
 
 
+def mass(text: str | float) -> float:
+    """Parse a mass of the check with a known mass (kg), within its limits."""
+    from lobewatch.tap.mass_check import read_mass
+
+    try:
+        return read_mass(str(text))
+    except ValueError as error:
+        raise BadParameter(str(error)) from None
+
+
 FIRST_NOW, LAST_NOW = (datetime(year, 1, 1, tzinfo=UTC) for year in (1970, 2200))
 """Range of dates that ages may be counted to; chosen, as no clock of a computer is beyond it."""
 
@@ -67,7 +77,7 @@ TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at leas
 SpindleMachine = Annotated[Path, FolderArgument(help="Machine folder with [spindle] in machine.toml.")]
 FleetFolder = Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")]
 ExcludableEntry = Annotated[
-    str, Argument(help="Tap test (ID, file name or a unique part of the ID), or test cut (c1).")
+    str, Argument(help="Tap test (ID, file name or a unique part of the ID), test cut (c1) or mass check (m1).")
 ]
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]

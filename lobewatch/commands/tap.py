@@ -61,7 +61,7 @@ def tap(
     """
     from acquisition import Conditions, TapDirection, parse_direction
     from lobewatch.logbook import Logbook
-    from lobewatch.notify.publish_status import publish_status
+    from lobewatch.notify.publish_status import publish_on_change, publish_status
     from lobewatch.show.mass_check_offer import offer_mass_check
     from lobewatch.show.measurement import emit_tap_results
     from lobewatch.show.terminal.terminal_screen import TapPrinter, TerminalScreen
@@ -97,7 +97,8 @@ def tap(
         raise KeyboardInterrupt from stopped
     emit_tap_results(Logbook(folder), finished, as_json, details)
     if is_guided and not screen:
-        offer_mass_check(folder, finished[-1].saved[0], port, operator)
+        with publish_on_change(Logbook(folder)):
+            offer_mass_check(folder, finished[-1].saved[0], port, operator)
 
 
 def _open_folder(path: Path) -> "MachineFolder":

@@ -137,7 +137,7 @@ def summarize_machine(logbook: Logbook, now: datetime | None = None, render_text
 
 
 def _build_summary(logbook: Logbook, forecast: MachineForecast, render_text: RenderText) -> MachineSummary:
-    machine, rows, status = logbook.machine, logbook.history.current, forecast.status
+    machine, rows, status = logbook.machine, logbook.checked_history.current, forecast.status
     last, interval = status.last_tap, machine.machine.interval_days
     return MachineSummary(
         name=machine.machine.name,

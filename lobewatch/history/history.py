@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Remark
+from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Frf, Remark
 from lobes import SldHistory, StabilityLobes
 from lobewatch.arrays import Floats
 from lobewatch.machine import Machine
@@ -22,6 +22,7 @@ from lobewatch.measurement.hit_choice import HIT_DECISIONS_CODE
 from lobewatch.measurement.recording_questions import find_accepted_codes, find_open_questions
 from lobewatch.measurement.software import CURRENT_SOFTWARE
 from lobewatch.measurement.tap_measurement import MODE_EDIT_CODES, Measurement
+from lobewatch.measurement.tool_compliance import sum_compliance
 from lobewatch.tool.assembly import Assembly, compute_tip_lobes, speed_grid
 from lobewatch.tool.tap_series import TapPlace
 from lobewatch.verdicts.verdict import StoredVerdict
@@ -86,6 +87,10 @@ class HistoryRow:
     """Name of the operator; empty if unknown."""
     software: str = ""
     """Version of the program that made the row."""
+    tip_compliance: float = np.nan
+    """Static compliance of its modes at the tool tip (m/N)."""
+    highest_frequency: float = np.nan
+    """Upper end of its usable band (Hz); NaN without an FRF."""
 
     @cached_property
     def questions(self) -> tuple[Remark, ...]:
@@ -213,9 +218,17 @@ def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
         values["modal_tip_stiffness"] = m.calibration.modal_stiffness_after
     values |= {"baseline": place.baseline, "series": place.series, "remarks": tuple(assembly.remarks)}
     values |= {"conditions": place.entry.conditions, "operator": place.entry.operator}
+    values |= {"tip_compliance": sum_compliance(m.at_tip), "highest_frequency": _usable_end(m.frf)}
     modes = {"modes": m.modes[:MAX_STORED_MODES], "x": assembly.x or (), "y": assembly.y or ()}
     values |= {name: _mode_values(part) for name, part in modes.items()}
     return HistoryRow(m.tap_id, m.time, m.tool, m.direction, **values)
+
+
+def _usable_end(frf: Frf | None) -> float:
+    """Return the upper end of the usable band of an FRF (Hz), or of all its lines; NaN without an FRF."""
+    if frf is None:
+        return np.nan
+    return float(frf.frequency[-1] if frf.usable_band is None else frf.usable_band[1])
 
 
 def _mode_values(modes: Sequence[Mode]) -> tuple[ModeValues, ...]:
@@ -254,12 +267,13 @@ def find_older_version_remarks(history: History | None) -> list[Remark]:
 
 RECORD_FIELDS = ["tap_id", "time", "tool", "direction", "baseline", "series", "conditions", *ESTIMATE_UNITS]
 RECORD_FIELDS += [*MODEL_VALUE_UNITS, "modes", "x", "y", "remarks", "verdicts"]
-"""Stored fields of a row in their order; software and operator follow, which the first rows lack."""
+"""Stored fields of a row in their order; those that the first rows lack follow."""
 RECORD_TYPES = get_type_hints(HistoryRow) | {"time": str, "baseline": str, "conditions": dict[str, Any]}
 RECORD_TYPES |= {"verdicts": dict[str, tuple[str, StoredVerdict]]}
 """Types of these fields: times as text with their zone, and each verdict with the hash of its program."""
 _stored: list[Any] = [("number", int), *((name, RECORD_TYPES[name]) for name in RECORD_FIELDS)]
 _stored += [(name, str, "") for name in ("software", "operator")]
+_stored += [(name, float, np.nan) for name in ("tip_compliance", "highest_frequency")]
 RowRecord = msgspec.defstruct("RowRecord", _stored, array_like=True, gc=False)
 """Stored form of a row."""
 _encode_record, _decode_record = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(RowRecord).decode

@@ -10,7 +10,7 @@ from acquisition.errors import format_error
 from lobewatch.history.history import History, HistoryRow, decode_row, encode_row, keep_unusable_row, make_empty_history
 from lobewatch.history.tap_measurements import NO_REUSABLE_ROWS, ReusableRows, UsableTaps, is_row_of
 from lobewatch.machine import BusyError, Machine, MachineFolder
-from lobewatch.machine.folder import FolderContents
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.row_file import append_rows, read_rows, write_rows
 from lobewatch.machine.settings.setting_questions import hash_programs
 from lobewatch.measurement.software import ANALYSIS_REVISION
@@ -45,7 +45,7 @@ class HistoryCache:
         Rows of tap tests with unusable files are kept aside.
         """
         empty, lost_ids = make_empty_history(self._folder.machine), {entry.id for entry in files.lost}
-        hashes = _hash_programs(self._folder.machine, files.contents)
+        hashes = _hash_programs(self._folder.machine, files.contents.cuts)
         if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
             self._hashes = hashes
             self._read(_cache_header(empty))
@@ -132,13 +132,12 @@ class HistoryCache:
         self._stamp = self._stamp_now
 
 
-def _hash_programs(machine: Machine, contents: FolderContents) -> dict[str, str]:
-    """Return the hash of all that decides the verdict on each program, test cuts of its tool and sensors included."""
-    hashes, checks = hash_programs(machine), [check.id for check in contents.mass_checks if not check.excluded]
-    checks += [channel.model for channel in machine.daq.channel if channel.model]
+def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]:
+    """Return the hash of all that decides the stored verdict on each program, test cuts of its tool included."""
+    hashes = hash_programs(machine)
     for program in machine.program:
-        taught = [cut.id for cut in contents.cuts if cut.is_usable and cut.tool == program.tool]
-        hashes[program.name] += "".join(f" {name}" for name in (*taught, *checks))
+        taught = [f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool]
+        hashes[program.name] += "".join(taught)
     return hashes
 
 

@@ -18,7 +18,7 @@ from lobewatch.monitoring.machine_status import MachineStatus, assess_status
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts import Advice, StoredVerdict, Verdict, advise
 from lobewatch.verdicts.setting_robustness import build_stored_verdict, is_verdict_missing
-from lobewatch.verdicts.verdict import apply_tap_age
+from lobewatch.verdicts.verdict import apply_checks
 
 MAX_CACHED_VERDICT_SETS = 8
 """Number of tap tests whose verdicts stay in memory, most recently used last."""
@@ -100,6 +100,13 @@ class Analysis:
         self._cache.store(self._measure_rows())
 
     @property
+    def checked_history(self) -> History:
+        """History whose verdicts are limited by the present checks of the sensors, to show."""
+        history, checks = self.history, self.chain_checks
+        rows = (replace(row, verdicts=checks.limit_verdicts(row, row.verdicts or {})) for row in history.rows)
+        return replace(history, rows=tuple(rows))
+
+    @property
     def cached_history(self) -> History | None:
         """Cached history, or None."""
         return self._history
@@ -134,7 +141,7 @@ class Analysis:
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
         """Combine the newest x and y of a tool, or predict the tool by the model if it was never tapped.
 
-        Without `until` it is as of now, with the age of its tap tests.
+        Without `until` it is as of now, with the age of its tap tests and the checks of their sensors.
 
         Parameters
         ----------
@@ -155,8 +162,12 @@ class Analysis:
         assembly = self.measurements.assembly_of(tool, places, rows)
         is_now = places[-1] is self.files.places[-1]
         damage = self.files.newest_damaged_remarks("" if assembly.predicted else tool) if is_now else ()
-        checked = self.chain_checks.attach(replace(assembly, questions=(*assembly.questions, *damage)))
-        return self._with_age(checked) if until is None else checked
+        assembly = replace(assembly, questions=(*assembly.questions, *damage))
+        return self._with_checks(assembly) if until is None else assembly
+
+    def _with_checks(self, assembly: Assembly) -> Assembly:
+        """Return an assembly as of now, with the checks of its sensors and its age."""
+        return self._with_age(self.chain_checks.attach(assembly))
 
     def _with_age(self, assembly: Assembly) -> Assembly:
         """Return an assembly with the age of its tap tests, and the remark on old ones."""
@@ -175,7 +186,7 @@ class Analysis:
         """Checks of the sensors behind the tap tests."""
         files, rows = self.files, self.history.rows
         of_files = files.by_id, files.contents.mass_checks, self.folder.path
-        return ChainChecks(self.machine, rows, *of_files, self.measurement)
+        return ChainChecks(self.machine, rows, *of_files)
 
     def chain_check(self, tap_id: str) -> ChainCheck:
         """Return the check of the sensors behind one tap test.
@@ -228,7 +239,8 @@ class Analysis:
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """Evaluate programs on the newest tap tests of their tools.
 
-        Without `until` the verdicts are as of now, and at most doubtful if the tap tests are too old.
+        Without `until` the verdicts are as of now, and at most doubtful if the tap tests are too old or their sensors
+        not checked.
 
         Parameters
         ----------
@@ -254,8 +266,7 @@ class Analysis:
         return [*map(self._as_of_now, found)] if is_now else found
 
     def _as_of_now(self, verdict: Verdict) -> Verdict:
-        aged = verdict.assembly if verdict.assembly is None else self._with_age(verdict.assembly)
-        return verdict if aged is None else apply_tap_age(verdict, aged)
+        return verdict if verdict.assembly is None else apply_checks(verdict, self._with_checks(verdict.assembly))
 
     def verdict_for(self, table: ProgramTable) -> Verdict:
         """Evaluate a program that is not in machine.toml.
@@ -285,6 +296,8 @@ class Analysis:
     ) -> Mapping[str, StoredVerdict]:
         """Return the verdict on every program after a tap test, and store the new ones in the history.
 
+        The checks of the sensors count as they are now. They limit what is returned, not what is stored.
+
         Parameters
         ----------
         tap_id
@@ -303,7 +316,7 @@ class Analysis:
             stored = {table.name: stored[table.name] for table in self.machine.program}
             history = self._history = self.history.with_verdicts(number, stored)
             self._cache.store(self._without_doubtful_verdicts(history))
-        return stored
+        return self.chain_checks.limit_verdicts(self.history.rows[number], stored)
 
     def initial_verdict(self, now: Verdict) -> StoredVerdict | None:
         """Return the verdict on a program at the first tap tests of its tool in the same directions.
@@ -350,4 +363,4 @@ class Analysis:
         acknowledged, scatter = files.contents.acknowledgements, files.fleet_scatter
         chain = [*self.chain_checks.newest_remarks(self.history.current)]
         of_files = files.remarks, acknowledged, scatter, chain
-        return assess_status(self.machine, self.history, time, self.folder.path, *of_files)
+        return assess_status(self.machine, self.checked_history, time, self.folder.path, *of_files)

@@ -185,6 +185,11 @@ class Logbook:
         return self.query(lambda analysis: analysis.history)
 
     @property
+    def checked_history(self) -> History:
+        """History whose verdicts are limited by the present checks of the sensors, to show."""
+        return self.query(lambda analysis: analysis.checked_history)
+
+    @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
         """Codes of the open questions, by tap test; `accept` answers them."""
         return self.history.questions

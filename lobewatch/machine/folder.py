@@ -25,7 +25,7 @@ from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.machine.journal.entries import CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, journal_damage_remark, make_entry
-from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
+from lobewatch.machine.journal.mass_checks import MassCheckEntry
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
@@ -344,7 +344,6 @@ class MachineFolder:
             asked=(*entry.asked, *asked),
             asked_live=tuple(answered),
             accepted=tuple(answered),
-            chain=SensorChain.of_tap(tap),
         )
         known = journal_entries.read_hit_decisions(reading.other_entries).get(tap.id, ())
         counting = {decision.hit for decision in tap.decisions}

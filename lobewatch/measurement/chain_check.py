@@ -6,9 +6,10 @@ from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 
-from acquisition import Remark
+from acquisition import Channel, Remark
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
+from lobewatch.machine.settings.setup_tables import ChannelTable
 
 CHAIN_CODE = "chain-not-checked"
 """Code of the remark on a tap test whose sensors nothing has checked."""
@@ -77,18 +78,26 @@ def not_recorded_remark(tool: str) -> Remark:
     return Remark(CHAIN_CODE, tool, text, "Check both sensors with a known mass, and tap again")
 
 
+def format_check_command(path: Path | str, direction: str, inputs: Sequence[Channel | ChannelTable]) -> str:
+    """Return the command of a mass check; it names the direction if the inputs have several accelerometers."""
+    command = f"{format_command('sensors', Path(path))} check_mass.mass KG"
+    is_one = sum(sensor.quantity == "acceleration" for sensor in inputs) < 2
+    return command if is_one else f"{command} check_mass.direction {direction[-1:] or 'x'}"
+
+
 def unchecked_remark(
-    direction: str, path: Path | str, failed: MassCheckEntry | None, others: Sequence[MassCheckEntry]
+    direction: str, path: Path | str, command: str, failed: MassCheckEntry | None, others: Sequence[MassCheckEntry]
 ) -> Remark:
     """Return the remark on a tap test without evidence.
 
-    failed: failed mass check that decides on it; others: mass checks, oldest first, of other chains if none failed.
+    command: of a mass check; failed: failed mass check that decides on it; others: mass checks, oldest first, of other
+    chains if none failed.
     """
-    command = f"{format_command('sensors', Path(path))} check_mass.mass KG"
     text, cure = "sensor chain not checked", f"Check both sensors with a known mass in two minutes: {command}"
     if failed is not None:
         text = f"mass check of {failed.date.astimezone():%Y-%m-%d} failed: ratio {failed.ratio:.3g}"
-        cure = f"Correct the sensitivities, check the mass again with {command}, and tap again"
+        exclude = f'{format_command("exclude", Path(path))} {failed.id} exclude_entry.reason "wrong mass"'
+        cure = f"Correct the sensitivities and tap again. If only the mass was wrong, run {exclude}"
     elif others:
         date = f"{others[-1].date.astimezone():%Y-%m-%d}"
         text += f", because DAQ, sensitivity or range is not that of the mass check of {date}"

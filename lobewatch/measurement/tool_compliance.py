@@ -163,17 +163,18 @@ def compare_with_tool(modes: Sequence[Mode], tool: ToolBeam | None, highest_freq
     return ToolAgreement.TOO_STIFF if is_stiff else ToolAgreement.AGREES
 
 
-def has_plausible_size(modes: Sequence[Mode], tool: ToolBeam | None, highest_frequency: float) -> bool:
+def has_plausible_size(compliance: float, tool: ToolBeam | None, highest_frequency: float) -> bool:
     """Tell whether the compliance at the tip is that of the tool, so that no sensitivity is wrong by a factor of 3.
 
     The true compliance is at least that of the tool alone, and at most that in a soft spindle. So three times the
-    least and a third of the most must be outside of the accepted range. Arguments as of `compare_with_tool`.
+    least and a third of the most must be outside of the accepted range. compliance: static at the tip (m/N); the others
+    as of `compare_with_tool`. NaN is not plausible.
     """
-    if tool is None or highest_frequency < tool.stiffest.frequency:
+    if tool is None or not highest_frequency >= tool.stiffest.frequency:
         return False
     least, most = MIN_COMPLIANCE_RATIO * tool.stiffest.compliance, tool.compliance + SUPPORT_COMPLIANCE
     limit = TOOL_COMPLIANCE.limit
-    return max(least, most / limit) < sum_compliance(modes) < limit * least
+    return max(least, most / limit) < compliance < limit * least
 
 
 def sum_compliance(modes: Sequence[Mode]) -> float:

@@ -98,6 +98,7 @@ def check_mass(
     mass: float,
     tell: Callable[[str], None],
     operator: str = "",
+    direction: str = "x",
 ) -> MassCheck:
     """Compare force with mass times acceleration on a freely hung mass, and write the result to the journal.
 
@@ -115,13 +116,15 @@ def check_mass(
         Function called with instructions and the verdict on each hit.
     operator
         Name of the operator.
+    direction
+        Direction of the accelerometer on the mass, for a DAQ with several.
 
     Returns
     -------
     MassCheck
         Calibration, where to correct a sensitivity, and the line in the journal.
     """
-    result = measure_mass(folder, device, mass, tell)
+    result = measure_mass(folder, device, mass, tell, direction)
     entry = store_mass_result(folder, device, result, operator)
     return MassCheck(result, find_sensor_data(folder.machine.daq, port), entry)
 

@@ -16,6 +16,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
+from lobewatch.machine.journal.mass_checks import MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text
@@ -42,6 +43,14 @@ def cut_result_text(cut: CutEntry) -> str:
         error = cut.chatter_frequency_std_hz
         heard += f" at {cut.chatter_frequency_hz:.5g}{'' if error is None else f' +- {2 * error:.2g}'} Hz"
     return heard + (f" ({cut.reason})" if cut.reason else "")
+
+
+def mass_check_result_text(check: MassCheckEntry) -> str:
+    """Return the result of a mass check in words."""
+    if check.mass_kg is None:
+        return "emulated device"
+    result = "passed" if check.passed else "failed"
+    return f"{result}, ratio {check.ratio:.3f} on {check.mass_kg:g} kg"
 
 
 def _utc_text(time: datetime | str) -> str:
@@ -129,7 +138,7 @@ def history_json(logbook: Logbook) -> JsonObject:
     """Return the whole history; excluded tap tests have no values, and those of kept ones do not count."""
     return {
         "machine": logbook.machine.machine.name,
-        "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
+        "taps": [_tap_json(row, logbook) for row in logbook.checked_history.rows],
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": list(map(_excluded_json, logbook.files.excluded)),
         "events": list(map(event_json, logbook.files.contents.events)),
@@ -191,7 +200,7 @@ def _history_cells(line: Mapping[str, Any]) -> list[str]:
 
 
 def _history_entries(logbook: Logbook) -> list[JsonObject]:
-    """Return tap tests, excluded ones, events, acknowledgements and test cuts as JSON objects, oldest first."""
+    """Return tap tests, excluded ones, events, acknowledgements, cuts and mass checks as JSON objects, oldest first."""
     history = history_json(logbook)
     groups = ("tap", history["taps"]), ("kept", history["kept"]), ("excluded", history["excluded"])
     entries = [{**tap, "kind": kind} for kind, taps in groups for tap in taps]
@@ -201,6 +210,10 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
     for cut in history["cuts"]:
         shown = {"kind": "excluded" if cut["excluded"] else "cut", "reason": cut["excluded"], "conditions": {}}
         entries.append(shown | {"name": cut["id"], **{name: cut[name] for name in ("id", "time", "tool", "text")}})
+    for check in logbook.files.contents.mass_checks:
+        shown = {"kind": "excluded" if check.excluded else "mass-check", "reason": check.excluded, "conditions": {}}
+        named = {"id": check.id, "name": check.id, "time": _utc_text(check.date)}
+        entries.append(shown | named | {"text": f"{check.id}: {mass_check_result_text(check)}"})
     for ack in logbook.files.contents.acknowledgements:
         told = {"kind": "ack", "id": ack.alarm_id, "time": _utc_text(ack.time)}
         entries.append(told | {"text": f"{ack.alarm_id}: {ack}"})

@@ -8,6 +8,7 @@ from lobewatch.sensors.sensor_checks import check_mass
 from lobewatch.show.sensors import mass_check_texts
 from lobewatch.show.terminal.output import emit, notes
 from lobewatch.tap.device_connection import open_device
+from lobewatch.tap.mass_check import read_mass
 
 
 def offer_mass_check(folder: MachineFolder, tap_id: str, port: str, operator: str) -> None:
@@ -15,7 +16,8 @@ def offer_mass_check(folder: MachineFolder, tap_id: str, port: str, operator: st
 
     An empty answer leaves it for later: the check counts for tap tests before it.
     """
-    check = Logbook(folder).chain_check(tap_id)
+    logbook = Logbook(folder)
+    check = logbook.chain_check(tap_id)
     if check.evidence is not None or not check.is_recorded:
         return
     question = (
@@ -26,8 +28,10 @@ def offer_mass_check(folder: MachineFolder, tap_id: str, port: str, operator: st
     if mass is None:
         return
     port = port or folder.machine.daq.port
+    tell = partial(notes.print, markup=False)
+    direction = next((tap.direction for tap in logbook.taps if tap.id == tap_id), "x")
     with folder.locked(), open_device(folder.machine.daq, port) as device:
-        result = check_mass(folder, port, device, mass, partial(notes.print, markup=False), operator)
+        result = check_mass(folder, port, device, mass, tell, operator, direction)
     emit({}, False, *mass_check_texts(result))
 
 
@@ -36,11 +40,9 @@ def _ask_mass() -> float | None:
     while True:
         try:
             answer = input().strip()
-            mass = float(answer.replace(",", ".")) if answer else None
+            return read_mass(answer) if answer else None
         except EOFError:
             return None
-        except ValueError:
-            mass = 0.0
-        if mass is None or mass > 0:
-            return mass
-        notes.print("Enter a mass above 0 in kg, such as 1.052, or Enter for later: ", end="", markup=False)
+        except ValueError as error:
+            text = f"{error}\nMass in kg, such as 1.052, or Enter for later: "
+            notes.print(text, end="", markup=False)

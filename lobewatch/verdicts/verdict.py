@@ -14,7 +14,6 @@ from lobewatch.machine import CutTable, Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.settings.tool_limits import find_feed_per_tooth
 from lobewatch.measurement.coverage import describe_uncovered
-from lobewatch.measurement.tap_age import TOO_OLD_CODE
 from lobewatch.tool.assembly import DIRECTION_CODES, Assembly
 from lobewatch.verdicts import program_remarks
 from lobewatch.verdicts.monte_carlo import MonteCarloResult, estimate_chatter_risk, run_monte_carlo
@@ -188,9 +187,7 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     median, stability, cause = result.median, classify_stability(case, result), ""
     remarks = [*_verdict_remarks(case), *program_remarks.assumption_remarks(case, result)]
     if stability is Stability.STABLE:
-        unrecorded = (check.remark for check in case.assembly.chain_checks if not check.is_recorded)
-        remarks += dict.fromkeys(filter(None, unrecorded))
-        remarks += case.assembly.age_remarks
+        remarks += _stable_remarks(case.assembly)
     if stability is Stability.DOUBTFUL:
         cause = program_remarks.find_decisive_cause(case, result)
         remarks.append(program_remarks.uncertainty_advice(cause, case, result))
@@ -217,16 +214,25 @@ def _build_verdict(case: ProgramCase, result: MonteCarloResult) -> Verdict:
     )
 
 
-def apply_tap_age(verdict: Verdict, aged: Assembly) -> Verdict:
-    """Return a verdict as of now: at most doubtful if its tap tests are too old. aged: its tool with the age."""
-    old = aged.age_remarks if verdict.stability is Stability.STABLE else ()
-    too_old = [remark for remark in aged.unchecked if remark.code == TOO_OLD_CODE and verdict.samples is not None]
-    verdict = replace(verdict, assembly=aged, remarks=(*verdict.remarks, *old, *too_old))
+def _stable_remarks(assembly: Assembly) -> tuple[Remark, ...]:
+    """Return the remarks on tap tests that are old or do not record their sensors."""
+    unrecorded = (check.remark for check in assembly.chain_checks if not check.is_recorded)
+    return (*dict.fromkeys(filter(None, unrecorded)), *assembly.age_remarks)
+
+
+def apply_checks(verdict: Verdict, checked: Assembly) -> Verdict:
+    """Return a verdict as of now: at most doubtful if its tap tests are too old, or nothing checks their sensors.
+
+    checked: its tool with its age and the checks of its sensors.
+    """
+    known = _stable_remarks(checked) if verdict.stability is Stability.STABLE else ()
+    unchecked = checked.unchecked if verdict.samples is not None else ()
+    verdict = replace(verdict, assembly=checked, remarks=(*verdict.remarks, *known, *unchecked))
     missing_first = UNTAPPED.name, WORKPIECE.name, QUESTION.name, COVERAGE.name
-    if not too_old or not verdict.is_stable or verdict.decisive_cause in missing_first:
+    if not unchecked or not verdict.is_stable or verdict.decisive_cause in missing_first:
         return verdict
     others = (remark for remark in verdict.remarks if remark.code != "doubt-decides")
-    advice = program_remarks.decisive_remark(verdict.program.name, *describe_uncovered(aged.unchecked))
+    advice = program_remarks.decisive_remark(verdict.program.name, *describe_uncovered(unchecked))
     return replace(verdict, stability=Stability.DOUBTFUL, decisive_cause=UNCHECKED.name, remarks=(*others, advice))
 
 

@@ -5,23 +5,26 @@ for all tap tests with the same chain, so a change of any of these ends it.
 """
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any, Self
 
 import msgspec
 
 from acquisition import Channel, Circumstances, DeviceIdentity, TapTest
 from acquisition.source import EMULATED_SERIAL, EMULATED_SERIALS
+from acquisition.tap_test import SERIAL_PREFIX, parse_device
 
 MASS_CHECK_KIND = "mass-check"
 """Kind of the journal line of a check with a known mass."""
+MAX_REPEAT_TIME = timedelta(hours=24)
+"""Time within which a check repeats an earlier one, such as after a wrong weighing; chosen."""
 
 
 class SensorChain(msgspec.Struct, frozen=True):
     """DAQ, sensitivities and ranges between the sensors and the values of a tap test."""
 
     daq: str
-    """Serial number of the DAQ; its model if it has none, and "EMULATED" for every emulated one."""
+    """Serial number of the DAQ, else its model; "EMULATED" for every emulated one, empty if it reports neither."""
     force_v_per_n: float
     """Sensitivity of the hammer with its gain (V/N)."""
     acceleration_v_per_m_s2: float
@@ -36,7 +39,11 @@ class SensorChain(msgspec.Struct, frozen=True):
         """Make it from the device and its force and acceleration channel; None without a force or for a recording."""
         if isinstance(device, Circumstances):
             device = device.device_identity
-        if device.is_recording or not device.model or len(channels) < 2:
+        else:  # as a tap test keeps it
+            device = parse_device(
+                ", ".join([device.model, *([SERIAL_PREFIX + device.serial] if device.serial else [])])
+            )
+        if device.is_recording or len(channels) < 2:
             return None
         daq = EMULATED_SERIAL if device.serial in EMULATED_SERIALS else device.serial or device.model
         force, response = channels[0], channels[-1]
@@ -81,8 +88,10 @@ class MassCheckEntry(msgspec.Struct, frozen=True):
 def find_deciding_check(chain: SensorChain, time: datetime, checks: Sequence[MassCheckEntry]) -> MassCheckEntry | None:
     """Find the check that decides on a tap test: the first one after it with its chain, else the last one before it.
 
-    So a check that fails after a series ends the trust in all its tests since the last good one (ISO 7626-5).
+    So a check that fails after a series ends the trust in all its tests since the last good one (ISO 7626-5). Of checks
+    repeated within a day the newest one counts.
     """
     same = [check for check in checks if check.chain == chain and not check.excluded]
     later = [check for check in same if check.date >= time]
-    return next(iter([*later[:1], *same[-1:]]), None)
+    repeated = [check for check in later if check.date - later[0].date < MAX_REPEAT_TIME]
+    return next(reversed(repeated or same), None)

@@ -95,8 +95,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
         asked = (ONE_HIT_CODE,) if len(tap.accepted) == 1 else ()
-        known = about.conditions, asked, about.operator
-        return cls(tap.id, digest, len(content), *labels, source, *known, hit_decisions=tap.decisions)
+        known, chain = (about.conditions, asked, about.operator), SensorChain.of_tap(tap)
+        return cls(tap.id, digest, len(content), *labels, source, *known, chain, hit_decisions=tap.decisions)
 
     @classmethod
     def from_line(cls, line: dict[str, Any]) -> Self:

@@ -322,7 +322,7 @@ def make_test_cuts(data: ReportData) -> list[Section]:
 
 def make_tap_tests(data: ReportData) -> list[Section]:
     """Make the table of tap tests, the newest first, and their numbers, the oldest first."""
-    history = data.analysis.history.current
+    history = data.analysis.checked_history.current
     heads = ["time", "tool", "direction", "f1 (Hz)", "zeta (%)", "K (N/µm)", "k_b (N/µm)", "questions, verdicts"]
     numbers = NumberTable(TAP_TABLE_HEADS, [_tap_values(row) for row in history])
     table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers)

@@ -21,6 +21,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "build_power_reading.power_kw": "--power",
     "calibrate_joints.mode": "--mode",
     "calibrate_joints.tools": "--tool",
+    "check_mass.direction": "--direction",
     "check_mass.mass": "--mass-kg",
     "choose_cut.cut": "--cut",
     "choose_cut.program": "--program",

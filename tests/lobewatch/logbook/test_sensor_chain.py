@@ -16,17 +16,25 @@ from hypothesis import strategies as st
 
 from acquisition import Channel, Circumstances, Hit, HitFlags, MassCalibration, Structure, TapDirection, new_tap_id
 from acquisition.source import DeviceIdentity
+from lobewatch.fleet.summarize import summarize_machine
+from lobewatch.history.chain_checks import ChainChecks
+from lobewatch.history.history import HistoryRow
 from lobewatch.logbook import Logbook
+from lobewatch.machine import Machine
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import exclude_entry, store_mass_check
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, find_deciding_check
+from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable
+from lobewatch.machine.settings.spindle_tables import ToolTable
+from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.sensor_models import fits_sensor_models
-from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, has_plausible_size
+from lobewatch.measurement.tool_compliance import SUPPORT_COMPLIANCE, ToolBeam, find_tool_beam, has_plausible_size
+from lobewatch.tap.device_connection import describe_device
 from lobewatch.tap.hit_check import average_hits
 from lobewatch.tap.mass_check import store_emulator_check, store_mass_result
 from lobewatch.verdicts import Stability, Verdict
-from modal import Mode
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -194,6 +202,58 @@ def test_a_result_that_is_no_measure_of_the_sensitivities_is_not_stored(plain: S
     assert plain.folder.contents().mass_checks == ()
 
 
+def test_the_newest_of_the_checks_of_a_day_decides(plain: Shop) -> None:
+    tap_both(plain)
+    hit_mass(plain, 1.0, ratio=3.0)
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, 1.01)
+    assert evidence(plain) == ["mass-check"] * 2
+    hit_mass(plain, 1.02, ratio=1.2)
+    assert evidence(plain) == [None, None]
+
+
+def test_nan_is_not_stored(plain: Shop) -> None:
+    result = MassCalibration(1.0, 0.001, 0.1, False, 0.001, (50.0, 3000.0), 1.2, 10, SENSORS)
+    device: Any = type("Connected", (), {"channels": SENSORS, "identity": DeviceIdentity("board", "1234")})()
+    for name in ("ratio", "ratio_std", "phase"):
+        assert store_mass_result(plain.folder, device, replace(result, **{name: float("nan")})) is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("model", "serial"),
+    [
+        ("Line (Focusrite, Inc.)", ""),
+        ("USB Audio, rev 2", "A, 7"),
+        ("Line In, serial number 5", ""),
+        ("", ""),
+        ("", "7"),
+    ],
+)
+def test_a_tap_test_has_the_chain_of_its_device(model: str, serial: str) -> None:
+    identity = DeviceIdentity(model, serial, "1.0, b")
+    device: Any = type("Connected", (), {"identity": identity, "loss_detection": "none"})()
+    about = Circumstances("m", DAY, "t", "x", device=describe_device(device))
+    assert SensorChain.of(identity, SENSORS) == SensorChain.of(about, SENSORS) is not None
+
+
+def test_a_live_device_without_a_name_is_checked_like_any_other(plain: Shop) -> None:
+    tap_both(plain, device="")
+    assert evidence(plain) == [None, None]
+    hit_mass(plain, 1.0, model="", serial="")
+    assert evidence(plain) == ["mass-check"] * 2
+
+
+def test_a_tap_test_that_is_entered_again_keeps_its_chain(plain: Shop) -> None:
+    tap_both(plain)
+    hit_mass(plain, 1.0, ratio=3.0)
+    chains = [entry.chain for entry in plain.folder.contents().taps]
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        plain.path.joinpath(name).unlink(missing_ok=True)
+    rebuild_files(plain.path)
+    assert [entry.chain for entry in plain.folder.contents().taps] == chains != [None, None]
+    assert evidence(plain) == [None, None]
+
+
 def test_older_and_replayed_tests_keep_their_verdict_with_a_remark(plain: Shop) -> None:
     tap_both(plain, device="replay of hits.h5")
     found = verdict(plain)
@@ -254,7 +314,7 @@ def test_the_geometry_of_a_tool_excludes_a_factor_of_3_in_every_plausible_spindl
     true = tool.compliance * share + (SUPPORT_COMPLIANCE if is_soft else 0.0)
 
     def is_plausible(compliance: float, highest: float = 2e4) -> bool:
-        return has_plausible_size([Mode(900.0, 0.02, 1 / compliance)], tool, highest)
+        return has_plausible_size(compliance, tool, highest)
 
     assert not is_plausible(3.001 * true)
     assert not is_plausible(true / 3.75)
@@ -309,6 +369,8 @@ def test_sensitivities_fit_the_models_of_both_sensors(model: str, sensitivity: f
     chain = SensorChain.of(DeviceIdentity("board", "1234"), [table.build().channel for table in tables])
     assert chain is not None
     assert fits_sensor_models(DaqTable(driver="dataq", channel=tables), chain) is fits
+    recalibrated = input_table("force", "086C03", 2.4), tables[1]
+    assert fits_sensor_models(DaqTable(driver="dataq", channel=recalibrated), chain) is fits
     other = SensorChain("1234", 3 * chain.force_v_per_n, chain.acceleration_v_per_m_s2, 5.0, 5.0)
     assert not fits_sensor_models(DaqTable(driver="dataq", channel=tables), other)
 
@@ -353,3 +415,59 @@ def test_a_stored_verdict_follows_the_check(plain: Shop) -> None:
     chain = SensorChain("1234", 2.25e-3, 1.02e-3, 5.0, 5.0)
     store_mass_check(plain.folder, MassCheckEntry("", DAY, 1.2, 1.0, 0.001, True, chain))
     assert Logbook.open(plain.path).stored_verdicts(newest)["A"].stability is Stability.STABLE
+
+
+def test_a_check_changes_no_stored_row_but_what_is_shown(plain: Shop) -> None:
+    def shown() -> set[str]:
+        logbook = Logbook.open(plain.path)
+        newest = logbook.checked_history.rows[-1].verdicts or {}
+        return {newest["A"].stability, summarize_machine(logbook, DAY).programs["A"]}
+
+    tap_both(plain)
+    assert shown() == {Stability.DOUBTFUL}
+    stored = plain.folder.history_path.read_bytes()
+    hit_mass(plain, 1.0)
+    assert shown() == {Stability.STABLE}
+    hit_mass(plain, 5.0, serial="99")
+    hit_mass(plain, 0.5, ratio=2.0)
+    assert shown() == {Stability.STABLE}
+    assert plain.folder.history_path.read_bytes() == stored
+    (row,) = [row for row in Logbook.open(plain.path).history.rows if row.direction == "y"]
+    assert row.verdicts is not None
+    assert row.verdicts["A"].stability is Stability.STABLE
+
+
+def test_a_check_keeps_the_acknowledgement_of_an_alarm(plain: Shop) -> None:
+    text = plain.path.joinpath("machine.toml").read_text("utf-8")
+    plain.path.joinpath("machine.toml").write_text(text.replace("depth_mm = 0.05", "depth_mm = 5"), "utf-8")
+    for number in range(2):
+        tap_both(plain, 30.0 * number)
+        Logbook.open(plain.path).status(DAY + timedelta(days=30 * number))
+    alarms = [alarm.id for alarm in Logbook.open(plain.path).status(DAY + timedelta(days=31)).alarms]
+    assert alarms
+    hit_mass(plain, 31.0)
+    assert [alarm.id for alarm in Logbook.open(plain.path).status(DAY + timedelta(days=31)).alarms] == alarms
+
+
+@pytest.mark.parametrize(
+    ("ratio", "found"), [(1.1, "model"), (1.5, "tool-geometry"), (1 / 1.5, "tool-geometry"), (2.1, None), (0.4, None)]
+)
+def test_the_geometry_serves_where_the_drawing_is_roughly_right(shop: Shop, ratio: float, found: str | None) -> None:
+    chain = SensorChain("1234", 2.25e-3, 1.02e-3, 5.0, 5.0)
+    beam = find_tool_beam(with_tool(shop.folder.machine), "t")
+    assert beam is not None
+    row = HistoryRow(
+        *("a", DAY, "t", "x"),
+        stiffness=Estimate(ratio * 1e6, 1.0),
+        modal_tip_stiffness=1e6,
+        tip_compliance=1.4 * beam.compliance,
+        highest_frequency=2e4,
+    )
+    entry = TapEntry("a", "", 1, DAY.isoformat(), "t", "x", "", chain=chain)
+    check = ChainChecks(with_tool(shop.folder.machine), [row], {"a": entry}, (), "m").check("a")
+    assert check.evidence == found
+
+
+def with_tool(machine: Machine) -> Machine:
+    tool = ToolTable(name="t", diameter_mm=16, stick_out_mm=100, tool_material="carbide")
+    return msgspec.structs.replace(machine, tool=(tool,))

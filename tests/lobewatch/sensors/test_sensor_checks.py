@@ -230,3 +230,33 @@ def test_wrong_use(sensors: Sensors, folder: MachineFolder) -> None:
     code, _, err = sensors(lambda _, n: np.zeros((1, n)), (ACCELERATION,), "--skew")
     assert (code, "[[daq.channel]]" in err) == (2, True)
     assert "mass=-1.0 kg" in sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", -1)[2]
+
+
+@pytest.mark.parametrize(("options", "used"), [((), 1.02e-3), (("--direction", "y"), 1.07e-3)])
+def test_one_of_two_accelerometers_hangs_on_the_mass(
+    sensors: Sensors, folder: MachineFolder, options: tuple[str, ...], used: float
+) -> None:
+    signal, row = hung_mass(MASS), 2 if options else 1
+
+    def three(first: int, n: int) -> NDArray[np.float64]:
+        values = np.random.default_rng(first).normal(scale=0.2, size=(3, n))
+        values[[0, row]] = signal(first, n)
+        return values
+
+    x = replace(ACCELERATION, direction="x")
+    y = replace(ACCELERATION, direction="y", sensitivity=1.07e-3)
+    code, _, err = sensors(three, (FORCE, x, y), "--mass-kg", "1,2", *options)
+    assert code == 0, err
+    (check,) = folder.contents().mass_checks
+    assert (check.mass_kg, check.passed) == (MASS, True)
+    assert check.chain.acceleration_v_per_m_s2 == pytest.approx(used)
+
+
+@pytest.mark.parametrize("mass", ["0", "nan", "inf", "1000", "0.01", "heavy"])
+def test_a_mass_that_nobody_hangs_is_refused_before_the_hits(
+    sensors: Sensors, folder: MachineFolder, mass: str
+) -> None:
+    code, out, err = sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", mass)
+    assert (code, out) == (2, "")
+    assert "HIT" not in err
+    assert folder.contents().mass_checks == ()

@@ -208,13 +208,23 @@ def find_limit_at_speed(samples: ProgramSamples, depth: float) -> float:
     limit = float(samples.limits[0])
     if samples.drop.is_zero:
         return limit
-    near = samples.with_lowest_cuts(WIDER_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS) if np.isfinite(limit) else samples
-    median, most = near[np.zeros(1, dtype=np.intp)].over_drops(), min(limit, MAX_PROGRAM_DEPTH_RATIO * depth)
+    median, most = samples[np.zeros(1, dtype=np.intp)].over_drops(), min(limit, MAX_PROGRAM_DEPTH_RATIO * depth)
+    near = median.with_lowest_cuts(WIDER_FEED_LIMIT * limit, MAX_SIMILAR_FEEDS) if np.isfinite(limit) else median
+    found = _find_median_limit(near, most)
+    lower = np.any(median.growth_by_cut(found)[..., 0] >= 0, axis=1)
+    lower[: len(near.cuts)] = False
+    if np.any(lower):
+        found = min(found, _find_median_limit(median.with_cuts(lower), found))
+    return limit if found == most else min(found, limit)
+
+
+def _find_median_limit(median: ProgramSamples, most: float) -> float:
+    """Find the deepest depth (m) up to `most` at which the median is stable at all drops."""
     found, tried = find_deepest_stable(median, most), most
     while found == 0 and tried > MIN_LIMIT:
         tried *= SHALLOWER_SHARE
         found = find_deepest_stable(median, tried)
-    return limit if found == most else find_deepest_stable(median, REFINED_LIMIT_SHARE * found)
+    return most if found == most else find_deepest_stable(median, REFINED_LIMIT_SHARE * found)
 
 
 def find_chattering_at_speed(samples: ProgramSamples, depth: float) -> Flags:
@@ -225,8 +235,8 @@ def find_chattering_at_speed(samples: ProgramSamples, depth: float) -> Flags:
     """
     if samples.drop.is_zero:
         return np.zeros(len(samples.rows), dtype=np.bool_)
-    most = samples.drop.largest
-    near = samples.with_cuts(samples.median_growth_near(SKIPPED_CUT_MARGIN * depth / (1 - most) ** 2, most) >= 0)
+    deep = SKIPPED_CUT_MARGIN * depth / (1 - samples.drop.largest) ** 2
+    near = samples.with_cuts(samples.median_growth_near(deep, samples.drop.ends) >= 0)
     turning = near.at_speed()
     grown = turning.critical_growth(depth)
     chatters = grown >= 0

@@ -150,7 +150,14 @@ class ProgramCase:
 
     def drop_at(self, speed_rpm: float) -> SpeedDrop:
         """Find the frequency drop at a speed (rpm); none where test cuts have shown the spindle at speed."""
-        return NO_DROP if self.at_speed.n_cuts else find_speed_drop(self.assembly, self.machine, speed_rpm)
+        if self.at_speed.n_cuts:
+            return NO_DROP
+        low, high = self.machine.speed.drop_range(speed_rpm)
+        return replace(self._highest_drop, low=low, high=high)
+
+    @cached_property
+    def _highest_drop(self) -> SpeedDrop:
+        return find_speed_drop(self.assembly, self.machine, self.machine.speed.high_rpm)
 
     def with_changes(self, **fields: object) -> "ProgramCase":
         """Return the case of the program with other fields of its table."""

@@ -106,6 +106,10 @@ class ProgramSamples:
     def __getitem__(self, places: Indices) -> "ProgramSamples":
         return replace(self, rows=self.rows[places])
 
+    def join(self, other: "ProgramSamples") -> "ProgramSamples":
+        """Append the samples of another state of the same program."""
+        return replace(self, rows=lobes.join_rows(self.rows, other.rows))
+
     def with_lowest_cuts(self, below: float, most: int | None = None) -> "ProgramSamples":
         """Select the cuts with a limit up to a depth (m), at most `most`; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
@@ -116,21 +120,24 @@ class ProgramSamples:
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
 
-    def median_growth_near(self, depth: float, drop: float = 0.0, apart: float = 1.0) -> Floats:
+    def median_growth_near(self, depth: float, drops: tuple[float, float] = (0.0, 0.0), apart: float = 1.0) -> Floats:
         """Return the largest median growth of each cut at a depth (m) within the uncertainty of speed and frequency.
 
-        drop: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
-        slower and faster, that counts too. Shape (cuts,).
+        drops: smallest and largest of the frequency; a drop moves a cut as a faster speed does. apart: factor of the
+        speed, slower and faster, that counts too. Shape (cuts,).
         """
         margin = self.uncertainty.speed + FREQUENCY_MARGIN
-        rise = max(-self.drop.low, 0.0) if drop else 0.0
-        ends = (1 - margin) / apart / (1 + rise), (1 + margin) * apart / (1 - drop)
-        number = N_MARGIN_SPEEDS + round((drop + rise) / MARGIN_DROP_STEP)
+        low, high = drops
+        ends = (1 - margin) / apart / (1 - low), (1 + margin) * apart / (1 - high)
+        number = N_MARGIN_SPEEDS + round((high - low) / MARGIN_DROP_STEP)
         median = self[np.zeros(1, dtype=np.intp)].sweep(np.linspace(*ends, number))
         return np.asarray(np.max(median.growth_by_cut(depth)[..., 0], axis=1))
 
     def at_speed(self) -> "ProgramSamples":
-        """Lower the frequencies of each sample by its own drop at speed; the median has the largest drop."""
+        """Lower the frequencies of each sample by its own drop at speed; the median has the largest drop.
+
+        The drop belongs to the place of a sample, so select samples after this.
+        """
         if self.drop.is_zero:
             return self
         return replace(self, rows=self.drop.apply(self.rows, self.drop.spread(len(self.rows))))

@@ -92,9 +92,9 @@ def select_critical_samples(
     """
     likely = draw_likely_samples(case, program)
     resting = likely.rows
-    total = 1 - (1 - likely.drop.largest) * (1 - drop)
-    order = np.argsort(-likely.median_growth_near(program.depth, total, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
-    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order]).at_speed()
+    drops = likely.drop.age(drop)
+    order = np.argsort(-likely.median_growth_near(program.depth, drops, ROBUST_SPEED_FACTOR))[:N_CRITICAL_FEEDS]
+    likely = replace(likely, cuts=tuple(case.cuts[place] for place in order), limits=likely.limits[order])
     aged = robustness.sweep_extremes(likely, drop, stiffness_at)
     grown = aged.with_lowest_cuts(0.0).growth(program.depth)[:, 0]
     force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
@@ -173,21 +173,30 @@ def estimate_likely_depths(case: ProgramCase, reach: CutRange, drop: float) -> L
     deepest, safe = reach.depth_limits(speeds), max(uncertainty.tangential.high, 1 + robustness.MIN_DEPTH_MARGIN)
     by_cut = np.minimum(by_cut, MAX_DEPTH_FACTOR * safe * deepest)
     margin = uncertainty.speed + FREQUENCY_MARGIN + math.log(ROBUST_SPEED_FACTOR)
-    most = case.drop_at(reach.high_rpm).largest
-    safe_at_speed, drop = safe / (1 - most) ** 2, drop + most
-    steps, ahead = math.ceil((margin + drop / 2) / LIKELY_SPEED_STEP), round(drop / 2 / LIKELY_SPEED_STEP)
+    drops = [case.drop_at(speed) for speed in speeds.tolist()]
+    softer = np.array([1 - each.largest for each in drops]) ** 2
+    moved = -np.log1p(-np.array([each.age(drop) for each in drops])) + [-margin, margin]
+    steps = np.ceil(np.abs(moved) / LIKELY_SPEED_STEP).astype(np.intp)
 
     def around(limits: Floats) -> Floats:
-        lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")
-        return np.asarray(np.minimum(lowest / safe_at_speed, deepest))
+        return np.asarray(np.minimum(_lowest_around(limits, *steps.T) * softer / safe, deepest))
 
     limit = np.min(by_cut, axis=0)
     if not all(map(is_force_constant, cuts)):
         best = np.max(speeds * around(limit))
         rates = speeds * np.minimum(deepest, TRIED_ZERO_ORDER_SHARES[-1] * limit / safe)
-        wanted = scipy.ndimage.maximum_filter1d(rates >= MIN_REMOVAL_SHARE * best, 4 * steps + 1)
+        wanted = scipy.ndimage.maximum_filter1d(rates >= MIN_REMOVAL_SHARE * best, 4 * int(np.max(steps)) + 1)
         limit = _limits_by_multipliers(case, speeds, by_cut, MAX_DEPTH_FACTOR * safe * deepest, wanted)
     return LikelyDepths(speeds, around(limit))
+
+
+def _lowest_around(limits: Floats, below: Indices, above: Indices) -> Floats:
+    """Return the lowest limit within some steps below and above each place, each shape (n,)."""
+    moves = np.arange(-np.max(below), np.max(above) + 1)
+    places = np.arange(limits.size)[:, np.newaxis] + moves
+    around = limits[np.clip(places, 0, limits.size - 1)]
+    is_outside = (moves < -below[:, np.newaxis]) | (moves > above[:, np.newaxis])
+    return np.asarray(np.min(np.where(is_outside, np.inf, around), axis=1))
 
 
 def _limits_by_multipliers(case: ProgramCase, speeds: Floats, by_cut: Floats, deepest: Floats, wanted: Flags) -> Floats:

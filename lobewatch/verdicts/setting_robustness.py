@@ -177,10 +177,15 @@ class Setting:
     """Chatter risk with the spindle rotating (0 to 1)."""
 
 
-WINDOW_SPEED_STEP, MAX_WINDOW_STEPS, N_WINDOW_PARTS = 0.005, 10, 2
-"""Relative step of a speed window, largest number of steps on each side, and parts in which they are checked."""
-ROBUST_SPEED_FACTOR = (1 + WINDOW_SPEED_STEP) ** 2
-"""Speed factor in both directions within which a setting must be safe; chosen."""
+ROBUST_SPEED_FACTOR, N_ROBUST_STEPS = 1 / 0.99, 2
+"""Speed factor in both directions within which a setting must be safe, chosen; and number of steps of a speed window
+to it."""
+WINDOW_SPEED_STEP = ROBUST_SPEED_FACTOR ** (1 / N_ROBUST_STEPS) - 1
+"""Relative step of a speed window."""
+MAX_WINDOW_STEPS, N_WINDOW_PARTS = 10, 2
+"""Largest number of steps on each side, and parts in which they are checked."""
+ROBUST_SPEEDS = np.array([1 / ROBUST_SPEED_FACTOR, ROBUST_SPEED_FACTOR])
+"""Slowest and fastest relative speed of that range."""
 ROBUST_DEPTH_FACTOR = 1.05
 """Depth factor up to which a setting must be safe, as a factor on the force; chosen."""
 MIN_DEPTH_MARGIN = 0.20
@@ -192,27 +197,35 @@ CHECKED_DROPS = np.arange(0, 0.1001, 0.01)
 
 
 def sweep_extremes(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over the extremes, one at a time: slower, the frequency drop by age, and more depth."""
-    drops, speeds = np.array([0, drop, 0]), np.array([1 / ROBUST_SPEED_FACTOR, 1, 1])
-    return apply_drops(samples, drops, stiffness_at, speeds, np.array([1, 1, ROBUST_DEPTH_FACTOR]))
+    """Sweep all samples over the extremes, one at a time: slower at the smallest drop, the drop by age, more depth.
+
+    The last two are at speed. samples: as drawn, not rotating.
+    """
+    least = np.full(len(samples.rows), min(samples.drop.low, 0.0))
+    slower = replace(samples, rows=samples.drop.apply(samples.rows, least)).sweep(1 / ROBUST_SPEED_FACTOR)
+    forces = np.array([1, ROBUST_DEPTH_FACTOR])
+    return slower.join(apply_drops(samples.at_speed(), np.array([drop, 0]), stiffness_at, force=forces))
 
 
 def sweep_neighborhood(samples: ProgramSamples, drop: float, stiffness_at: StiffnessAt) -> ProgramSamples:
-    """Sweep all samples over both speeds, the frequency drop by age, half of it, and more depth, one at a time."""
-    speeds = np.array([1 / ROBUST_SPEED_FACTOR, 1, 1, ROBUST_SPEED_FACTOR, 1])
-    deeper = np.array([1, 1, 1, 1, ROBUST_DEPTH_FACTOR])
-    return apply_drops(samples, np.array([0, drop, drop / 2, 0, 0]), stiffness_at, speeds, deeper)
+    """Sweep all samples over the frequency drop by age, half of it, and more depth, one at a time, at speed.
+
+    samples: as drawn, not rotating.
+    """
+    drops, forces = np.array([drop, drop / 2, 0]), np.array([1, 1, ROBUST_DEPTH_FACTOR])
+    return apply_drops(samples.at_speed(), drops, stiffness_at, force=forces)
 
 
 def find_speed_window(
-    near: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
+    samples: ProgramSamples, hardest: ProgramSamples, speed: float, depth: float, reach: CutRange
 ) -> tuple[float, float]:
     """Find the slowest and fastest speed (rpm) at which a depth (m) is stable, not rotating and at speed.
 
-    hardest: some samples at speed, which are checked first.
+    hardest: some samples, not rotating and at speed, which are checked first. The setting is known to be stable
+    `N_ROBUST_STEPS` slower and faster.
     """
     ratios = (np.power(1 + WINDOW_SPEED_STEP, sign * np.arange(MAX_WINDOW_STEPS + 1.0)) for sign in (-1, 1))
-    slow, fast = (_last_stable_ratio(near, hardest, ratio, depth) for ratio in ratios)
+    slow, fast = (_last_stable_ratio(samples, hardest, ratio, depth) for ratio in ratios)
     slowest = math.ceil(max(speed * slow, reach.low_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
     fastest = math.floor(min(speed * fast, reach.high_rpm) / SPEED_STEP_RPM) * SPEED_STEP_RPM
     return min(slowest, speed), max(fastest, speed)
@@ -224,7 +237,7 @@ def find_drop_margin(hardest: ProgramSamples, depth: float, stiffness_at: Stiffn
     return float(CHECKED_DROPS[_last_stable_row(grown.reshape(CHECKED_DROPS.size, -1))])
 
 
-def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Floats, depth: float) -> float:
+def _last_stable_ratio(samples: ProgramSamples, hardest: ProgramSamples, ratio: Floats, depth: float) -> float:
     """Return the last relative speed up to which all samples are stable."""
     last = 0
     for steps in np.array_split(np.arange(1, ratio.size), N_WINDOW_PARTS):
@@ -232,9 +245,11 @@ def _last_stable_ratio(near: ProgramSamples, hardest: ProgramSamples, ratio: Flo
         last += _last_stable_row(np.vstack((np.full(len(hardest.rows), -np.inf), grown)))
         if last < steps[-1]:
             break
-    while last > 0 and _has_chatter(near.sweep(ratio[last : last + 1]), depth):
-        last //= 2
-    return float(ratio[last])
+    good, bad, tried = N_ROBUST_STEPS if last >= N_ROBUST_STEPS else 0, last + 1, last
+    while bad - good > 1:
+        good, bad = (good, tried) if _has_chatter(samples.sweep(ratio[tried]), depth) else (tried, bad)
+        tried = (good + bad) // 2
+    return float(ratio[good])
 
 
 def _has_chatter(samples: ProgramSamples, depth: float) -> bool:

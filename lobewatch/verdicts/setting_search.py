@@ -252,27 +252,39 @@ class SettingSearch:
         limit, samples = worst.limit.limit, draw_samples(case, worst)
         if limit < depth * (1 + robustness.MIN_DEPTH_MARGIN):
             return 1e3 * limit / (1 + robustness.MIN_DEPTH_MARGIN)
-        drop = 1 - (1 - samples.drop.largest) * (1 - self.needed_drop)
+        drops = samples.drop.age(self.needed_drop)
         grown = samples.median_growth_near(
-            SKIPPED_CUT_MARGIN * deep / (1 - samples.drop.largest) ** 2, drop, robustness.ROBUST_SPEED_FACTOR
+            SKIPPED_CUT_MARGIN * deep / (1 - samples.drop.largest) ** 2, drops, robustness.ROBUST_SPEED_FACTOR
         )
         near = samples.with_cuts(grown >= 0)
-        around = robustness.sweep_neighborhood(near.at_speed(), self.needed_drop, self.stiffness_at)
+        around = robustness.sweep_neighborhood(near, self.needed_drop, self.stiffness_at)
         grown = around.critical_growth(depth)
         if np.any(grown >= 0):
             return self._reduced_depth(around, grown, depth_mm)
-        turning = find_chattering_at_speed(samples, depth)
-        if np.any(turning):
-            return self._depth_below(samples.over_drops(), turning, depth_mm)
-        result = evaluate_samples(depth, worst, samples, turning)
+        if (less := self._depth_beside(samples, depth_mm)) is not None:
+            return less
+        result = evaluate_samples(depth, worst, samples, np.zeros(len(samples.rows), dtype=np.bool_))
         if not result.is_stable_throughout:
             return min(self._depth_below(samples, np.append(False, result.chatters), depth_mm), 1e3 * result.lowest)
-        hardest = near.at_speed()[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]]
-        window = robustness.find_speed_window(near, hardest, speed, depth, self.cut_range)
+        few = np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-N_WINDOW_SAMPLES:]
+        hardest = near.at_speed()[few]
+        window = robustness.find_speed_window(samples, near[few].join(hardest), speed, depth, self.cut_range)
         left = robustness.find_drop_margin(hardest, depth, self.stiffness_at)
         self.results[speed, depth_mm] = result
         risk = estimate_chatter_risk(result, depth, self.case.at_speed.n_cuts)
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MAX_DEPTH_MARGIN), left, risk)
+
+    def _depth_beside(self, samples: ProgramSamples, depth_mm: float) -> float | None:
+        """Return a smaller depth (mm) if samples chatter at speed, slower or faster, or slower or faster at rest."""
+        for speed in (1.0, *robustness.ROBUST_SPEEDS):
+            beside = samples.sweep(speed)
+            turning = find_chattering_at_speed(beside, depth_mm / 1e3)
+            if np.any(turning):
+                return self._depth_below(beside.over_drops(), turning, depth_mm)
+            resting = beside.critical_growth(depth_mm / 1e3) if speed != 1.0 else np.empty(0)
+            if np.any(resting >= 0):
+                return self._reduced_depth(beside, resting, depth_mm)
+        return None
 
     def _depth_below(self, samples: ProgramSamples, chatters: Flags, depth_mm: float) -> float:
         """Return a smaller depth (mm) at which the samples that chatter may be stable, with all their drops."""

@@ -51,9 +51,20 @@ class SpeedDrop:
         return self.low == self.high == 0
 
     @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest drop of any mode; 0, not rotating, is included."""
+        drops = np.multiply.outer((self.low, self.high), self.shares)
+        return float(np.min(drops, initial=0.0)), float(np.max(drops, initial=0.0))
+
+    @property
     def largest(self) -> float:
-        """Largest drop of any mode."""
-        return self.high * float(np.max(self.shares, initial=0.0))
+        """Largest drop of any mode, at least 0."""
+        return self.ends[1]
+
+    def age(self, drop: float) -> tuple[float, float]:
+        """Return these ends with a frequency drop by age on top of the largest."""
+        low, high = self.ends
+        return low, 1 - (1 - high) * (1 - drop)
 
     @property
     def steps(self) -> Floats:

@@ -144,8 +144,10 @@ def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
         return False
     drawn = draw_samples(at, worst).with_lowest_cuts(np.inf, 2)
     force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
-    hardest = drawn.at_speed()[np.argsort(-np.max(force, axis=1))[:HARDEST]]
-    return not np.any(sweep_extremes(hardest, search.needed_drop, search.stiffness_at).growth(at.depth) >= 0)
+    swept = sweep_extremes(drawn, search.needed_drop, search.stiffness_at)
+    hardest = np.argsort(-np.max(force, axis=1))[:HARDEST]
+    few = np.add.outer(np.arange(0, len(swept.rows), len(drawn.rows)), hardest).ravel()
+    return not np.any(swept[few].growth(at.depth) >= 0)
 
 
 def _at(table: ProgramTable, speed: float, depth_mm: float) -> ProgramTable:

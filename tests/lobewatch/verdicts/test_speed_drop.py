@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import UTC, datetime
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -14,11 +15,17 @@ from lobes import program_limit
 from lobewatch.machine import Machine, ProgramTable, SpeedTable
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.monte_carlo import MonteCarloResult, run_monte_carlo
+from lobewatch.verdicts.monte_carlo import MonteCarloResult, find_chattering_at_speed, run_monte_carlo
 from lobewatch.verdicts.program_case import ProgramCase, SpindleAtSpeed, build_program
-from lobewatch.verdicts.program_samples import draw_rotating_samples
+from lobewatch.verdicts.program_samples import draw_rotating_samples, find_worst_limit
 from lobewatch.verdicts.recommendation import recommend
-from lobewatch.verdicts.setting_robustness import find_critical_drop
+from lobewatch.verdicts.setting_robustness import (
+    ROBUST_DEPTH_FACTOR,
+    find_critical_drop,
+    find_speed_window,
+    sweep_neighborhood,
+)
+from lobewatch.verdicts.setting_search import SettingSearch
 from lobewatch.verdicts.speed_drop import SpeedDrop, find_drop_shares
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode
@@ -164,3 +171,96 @@ def test_a_recommended_setting_is_stable_over_the_drop_and_ageing() -> None:
     free = recommend(cut(), tool(*modes), machine("drop_percent = [0, 0]"), SpindleAtSpeed()).setting
     assert free is not None
     assert free.speed_rpm * free.depth_mm > setting.speed_rpm * setting.depth_mm
+
+
+def test_each_mode_drops_by_its_share_and_no_drop_is_always_among_the_ends() -> None:
+    samples = run_monte_carlo(ProgramCase(cut(9000.0, 0.2), tool(MODE, Mode(1500.0, 0.04, 6e7)), machine())).samples
+    shares = np.array([1.0, 2.0, 1.0, 2.0])
+    turning = SpeedDrop(-0.01, 0.04, shares).apply(samples.rows, np.full(len(samples.rows), 0.04))
+    assert turning.frequency / samples.rows.frequency == pytest.approx(np.tile([0.96, 0.92, 0.96, 0.92], (301, 1)))
+    ends = [SpeedDrop(low, high, shares).ends for low, high in ((-0.01, 0.04), (-0.05, -0.02), (0.01, 0.02))]
+    assert np.array(ends) == pytest.approx(np.array([(-0.02, 0.08), (-0.1, 0.0), (0.0, 0.04)]))
+    assert SpeedDrop(-0.01, 0.04, shares).age(0.5) == pytest.approx((-0.02, 0.54))
+
+
+def test_a_rise_counts_as_a_slower_speed_where_the_largest_drop_is_none() -> None:
+    """Closed form: f times 1.05 at constant mass is the speed over 1.05."""
+    samples = result(11000.0, 0.2, "drop_percent = [-5, 0]").samples
+    slower = samples[np.zeros(1, dtype=np.intp)].sweep(np.linspace(1 / 1.05, 1.0, 21))
+    largest = float(np.max(slower.growth(1e-3)))
+    assert samples.median_growth_near(1e-3, samples.drop.ends)[0] >= largest - 1e-3
+    assert samples.median_growth_near(1e-3)[0] < largest - 0.03
+
+
+def test_a_neighborhood_is_aged_and_deeper_at_speed() -> None:
+    samples = result(9000.0, 0.2, "drop_percent = [2, 4]").samples
+    swept = sweep_neighborhood(samples, 0.1, lambda drop: 1 - drop).rows
+    blocks = slice(None), np.arange(301)
+    speed, frequency, stiffness, force = (
+        (values.reshape(3, 301, -1) / known.reshape(301, -1))[blocks][..., 0]
+        for values, known in (
+            (swept.speed_rpm, samples.rows.speed_rpm),
+            (swept.frequency, samples.rows.frequency),
+            (swept.stiffness, samples.rows.stiffness),
+            (swept.tangential, samples.rows.tangential),
+        )
+    )
+    lower = 1 - samples.drop.spread(301)
+    assert np.all(speed == 1)
+    assert frequency == pytest.approx(np.array([0.9 * lower, 0.95 * lower, lower]))
+    assert stiffness == pytest.approx(np.array([0.9, 0.95, 1])[:, np.newaxis] * lower**2)
+    assert force == pytest.approx(np.tile([[1], [1], [ROBUST_DEPTH_FACTOR]], 301))
+
+
+THIN_CUT = {"radial_depth_mm": 2, "feed": "both", "speed_rpm": 11000, "depth_mm": 6}
+"""Another feed direction than that with the lowest limit not rotating is the first to chatter at speed."""
+THIN_X, THIN_Y = [Mode(700.0, 0.03, 2e7), Mode(1500.0, 0.03, 4e7)], [Mode(900.0, 0.03, 2.5e7), Mode(1250.0, 0.04, 5e7)]
+
+
+def thin_case(drop: str, share: float = 0.0) -> ProgramCase:
+    """Thin cut of a spindle with all frequencies lower by a share."""
+    x, y = (
+        [Mode(m.frequency * (1 - share), m.damping_ratio, m.stiffness * (1 - share) ** 2) for m in modes]
+        for modes in (THIN_X, THIN_Y)
+    )
+    table = msgspec.structs.replace(cut(), **THIN_CUT)
+    return ProgramCase(table, replace(tool(), x=x, y=y), machine(f"drop_percent = {drop}"))
+
+
+def test_another_feed_direction_may_chatter_first_at_speed() -> None:
+    found = run_monte_carlo(thin_case("[0, 15]"))
+    few = found.samples[np.arange(24)]
+    grown = few.at_speed().growth_by_cut(6e-3)[..., 0]
+    assert np.all(grown[0] < 0)
+    assert np.any(grown >= 0)
+    assert np.array_equal(find_chattering_at_speed(few, 6e-3), np.any(grown >= 0, axis=0))
+    lowest = min(find_worst_limit(thin_case("[0, 0]", share)).limit.limit for share in np.linspace(0, 0.15, 31))
+    assert found.limit_at_speed == pytest.approx(lowest, rel=0.01)
+    assert found.limit_at_speed < 0.9 * found.median.limit
+
+
+@pytest.mark.parametrize("drop", ["[0, 5]", "[-5, -5]", "[-5, 20]", "[20, 20]", "[0, 0]"])
+def test_a_recommended_setting_has_a_speed_margin_of_1_percent(drop: str) -> None:
+    mill, spindle = machine(f"drop_percent = {drop}"), tool(MODE, Mode(1500.0, 0.04, 6e7))
+    setting = recommend(cut(), spindle, mill, SpindleAtSpeed()).setting
+    assert setting is not None
+    for speed in (0.99 * setting.speed_rpm, 1.01 * setting.speed_rpm, *setting.window_rpm):
+        beside = evaluate_program(cut(min(speed, 20000.0), setting.depth_mm), spindle, mill)
+        assert (speed, beside.stability) == (speed, Stability.STABLE)
+
+
+def test_the_end_of_a_window_is_found_at_speed_to_a_step() -> None:
+    """Samples without force bound nothing, so that all others decide."""
+    mill = machine()
+    search = SettingSearch(ProgramCase(cut(), tool(), mill))
+    best = search.best
+    assert best is not None
+    near = search.results[best.speed_rpm, best.depth_mm].samples
+    calm = near[np.arange(2)].sweep(1.0, force=1e-3)
+    slow, fast = find_speed_window(near, calm, best.speed_rpm, best.depth_mm / 1e3, search.cut_range)
+    still = replace(near, drop=SpeedDrop())
+    assert fast <= find_speed_window(still, calm, best.speed_rpm, best.depth_mm / 1e3, search.cut_range)[1]
+    assert slow <= 0.99 * best.speed_rpm + 10
+    for speed, is_stable in ((slow, True), (fast, True), (slow / 1.011, False), (fast * 1.011, False)):
+        found = evaluate_program(cut(speed, best.depth_mm), tool(), mill)
+        assert (speed, found.stability is Stability.STABLE) == (speed, is_stable)

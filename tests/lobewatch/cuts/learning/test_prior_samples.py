@@ -11,6 +11,7 @@ from scipy.special import ndtr
 from lobes import build_milling_system, rows_at_speeds
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
+from lobewatch.verdicts.speed_drop import SpeedDrop
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
@@ -39,6 +40,11 @@ def test_the_middle_of_the_prior_is_a_slower_softer_damped_spindle_and_a_harder_
             "tangential": 1.1, "ratio": pytest.approx(0.85, abs=0.001),
         }
     )  # fmt: skip
+
+
+def test_the_middle_of_each_mode_drops_by_its_share() -> None:
+    middle = replace(draws({}), drop=SpeedDrop(0.01, 0.03, np.array([1.0, 2.0]))).ratios()
+    assert (middle["frequency_x"][0], middle["frequency_y"][0]) == pytest.approx((0.98, 0.96))
 
 
 @pytest.mark.parametrize(("side", "first"), [("x", 2), ("y", 4)])

@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
+import msgspec
 import pytest
 
 from lobewatch.cuts.learning.posterior import Contradiction
@@ -71,3 +72,14 @@ def test_a_power_that_is_not_believed_is_reported_and_the_verdict_of_its_cut_cou
     without = learn_program(table, tool, machine, [*cuts[:2], replace(cuts[2], power=None)])
     assert without.inconsistent_cuts == ()
     assert without.posterior.intervals == lesson.posterior.intervals
+
+
+def test_learning_starts_from_the_drop_of_the_machine(shop: Shop) -> None:
+    shop.tap_both()
+    machine = shop.folder.machine
+    speed = msgspec.structs.replace(machine.speed, drop_percent=(12.0, 12.0))
+    machine = msgspec.structs.replace(machine, speed=speed)
+    table = next(program for program in machine.program if program.name == "A")
+    lesson = learn_program(table, shop.logbook.assembly(table.tool), machine, [])
+    drop = lesson.prior.samples.drop
+    assert (drop.low, drop.high) == pytest.approx((0.12, 0.12))

@@ -211,7 +211,7 @@ def _history_entries(logbook: Logbook) -> list[JsonObject]:
         shown = {"kind": "excluded" if cut["excluded"] else "cut", "reason": cut["excluded"], "conditions": {}}
         entries.append(shown | {"name": cut["id"], **{name: cut[name] for name in ("id", "time", "tool", "text")}})
     for check in logbook.files.contents.mass_checks:
-        shown = {"kind": "excluded" if check.excluded else "mass-check", "reason": check.excluded, "conditions": {}}
+        shown = {"kind": "excluded" if check.excluded else "check", "reason": check.excluded, "conditions": {}}
         named = {"id": check.id, "name": check.id, "time": _utc_text(check.date)}
         entries.append(shown | named | {"text": f"{check.id}: {mass_check_result_text(check)}"})
     for ack in logbook.files.contents.acknowledgements:

@@ -157,7 +157,7 @@ def _chatter_items(program: ProgramAdvice) -> Iterator[str]:
     word = "Period-two chatter" if verdict.kind == "flip" else "Chatter"
     place = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
     yield f"{word}{place}{worst_feed_text(verdict)}"
-    if program.first_verdict and program.first_verdict.is_stable:
+    if program.first_verdict and program.first_verdict.stability is Stability.STABLE:
         yield "Stable at the first tap tests"
 
 

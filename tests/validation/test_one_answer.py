@@ -68,11 +68,12 @@ def test_a_setting_is_found_where_samples_chatter_below_a_depth_at_which_they_ar
     assert nearest is None or search.best.speed_rpm * search.best.depth_mm >= nearest.speed_rpm * nearest.depth_mm
 
 
-def test_one_look_at_a_depth_above_an_island_says_how_deep_is_safe() -> None:
+def test_one_look_at_a_depth_that_chatters_says_how_deep_is_safe() -> None:
+    """Of the 300 samples, the first chatters from 1.595 mm on."""
     search = search_of(234)
-    less = search.verify(24000.0, 1.45)
+    less = search.verify(24000.0, 2.0)
     assert isinstance(less, float)
-    assert less < 1.3
+    assert less < 1.595
     assert isinstance(search.verify(24000.0, search.cut_range.round_down_depth(less)), Setting)
 
 

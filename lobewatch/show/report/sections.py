@@ -101,14 +101,8 @@ def make_programs(data: ReportData) -> list[Section]:
         return []
     dates = {} if data.no_dates else {name: texts for name, *texts in trends.forecast_date_rows(data.outlook)}
     heads = ["program", "verdict", *(DATE_HEADS if dates else ()), "run instead", "speed (rpm)", "ap (mm)"]
-    heads += [
-        "limit, 98 % interval (mm)",
-        "limit at speed (mm)",
-        "ap margin",
-        "chatter risk",
-        "f1 margin",
-        "first verdict",
-    ]
+    heads += ["limit, 98 % interval (mm)", "limit at speed (mm)", "ap margin"]
+    heads += ["chatter risk", "f1 margin", "first verdict"]
     table = DataTable(heads, [_program_row(program, dates) for program in data.programs], "words")
     checked = [program.verdict for program in data.programs if program.verdict.stability is not Stability.UNKNOWN]
     remarks = [remark for program in data.programs for remark in program.verdict.remarks]

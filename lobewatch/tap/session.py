@@ -204,7 +204,9 @@ class TapSession:
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
         answered = self.questions.asked
-        commit = partial(logbook.commit, now=now, answered=answered)
+        commit = partial(logbook.commit, now=now)
+        if answered:
+            commit = partial(commit, answered=answered)
         commit(tap)
         self.across = commit_cross_tap(in_progress, commit)
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]

@@ -17,7 +17,7 @@ def test_the_drop_of_the_truth_keeps_modal_mass_and_damping() -> None:
 
 
 def test_a_few_settings_and_programs_hold_at_speed() -> None:
-    counts = study(range(4), seed=1, most_modes=1, n_programs=1)
+    counts = study(range(2), seed=1, most_modes=1, n_programs=1)
     assert counts.settings
     assert counts.count(counts.settings) == [0, 0, 0, 0]
 

@@ -20,8 +20,9 @@ from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
+from lobewatch.measurement.series_questions import MAX_DAY
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
-from lobewatch.tool.assembly import MAX_DIRECTION_AGE, Assembly, assemble, predict_assembly
+from lobewatch.tool.assembly import Assembly, assemble, predict_assembly
 from lobewatch.tool.tap_series import FollowedMode, TapOrder, TapPlace, iterate_earlier
 
 EARLIEST_TIME = datetime.min.replace(tzinfo=UTC)
@@ -219,7 +220,7 @@ class _RowArchive:
         if place.other_direction is None:
             return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry
-        if place.entry.created - other.created <= MAX_DIRECTION_AGE:
+        if place.entry.created - other.created <= MAX_DAY:
             return other.id, cross, last, remarks, ()
         points = self._followed.before(place, self.rows)[place.entry.direction]
         behind = bisect_right(points, other.created, key=lambda point: point.time)
@@ -329,15 +330,12 @@ class TapMeasurements:
         return assemble(newest, other, series, cross)
 
     def assembly_of(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
-        """Return the tool as known after the newest of these tap tests, or its prediction.
-
-        Raises NotTappedError if it cannot be predicted.
-        """
+        """Return the tool as known after the newest of these tap tests, or its prediction; NotTappedError without."""
         newest = next((place for place in reversed(places) if place.entry.tool == tool), None)
         return self._prediction(tool, places, rows) if newest is None else self.assembly_after(newest, rows)
 
     def _prediction(self, tool: str, places: Sequence[TapPlace], rows: Sequence[HistoryRow]) -> Assembly:
-        newest: dict[str, Measurement] = {}
+        newest = dict[str, Measurement]()
         calibrated = [place for place in reversed(places) if rows[place.number].bearing_stiffness.is_known]
         for place in calibrated:
             row = rows[place.number]
@@ -372,10 +370,8 @@ class TapMeasurements:
         try:
             assembly = self.assembly_after(place, rows)
             return make_row(self.measurement(place, rows), assembly, place)
-        except DamagedTapError:
-            raise
         except (ArithmeticError, LookupError, ValueError) as error:
-            if place.entry.id not in older_rows:
+            if isinstance(error, DamagedTapError) or place.entry.id not in older_rows:
                 raise
             return keep_older_row(older_rows[place.entry.id], place, error)
 

@@ -1,8 +1,10 @@
 """Analyze the usable tap tests of one machine, and cache each result."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from lobewatch.cuts.learning.program_learning import evaluate_at_speed
 from lobewatch.history.chain_checks import ChainChecks
@@ -22,6 +24,21 @@ from lobewatch.verdicts.verdict import apply_checks
 
 MAX_CACHED_VERDICT_SETS = 8
 """Number of tap tests whose verdicts stay in memory, most recently used last."""
+
+
+P = ParamSpec("P")
+Answer = TypeVar("Answer")
+
+
+def answered_by(question: Callable[Concatenate["Analysis", P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
+    """Make a method of the logbook that queries its analysis."""
+
+    @wraps(question)
+    def answer(logbook: Any, /, *arguments: P.args, **options: P.kwargs) -> Answer:
+        found: Answer = logbook.query(question, *arguments, **options)
+        return found
+
+    return answer
 
 
 class Analysis:

@@ -6,9 +6,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from functools import wraps
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, Self
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, Description, HitDecision, Remark, TapTest
 from acquisition.hit_quality.decide_hits import add_decisions, decide_hits
@@ -16,7 +15,7 @@ from lobewatch.history.history import History, find_older_version_remarks
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements, UsableTaps
 from lobewatch.logbook import recordings
-from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook.analysis import Analysis, Answer, P, answered_by
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
 from lobewatch.machine.folder_updates import store_hit_decisions, store_mode_edits
 from lobewatch.machine.journal.entries import CutEntry
@@ -27,18 +26,6 @@ from modal import ModeEdits
 
 ROW_SAVING_PAUSE = 10
 """Time from one writing of the rows during a replay to the next, in times of the first; chosen."""
-P = ParamSpec("P")
-Answer = TypeVar("Answer")
-
-
-def _answered_by(question: Callable[Concatenate[Analysis, P], Answer]) -> Callable[Concatenate[Logbook, P], Answer]:
-    """Make a method of the logbook that queries its analysis."""
-
-    @wraps(question)
-    def answer(logbook: Logbook, /, *arguments: P.args, **options: P.kwargs) -> Answer:
-        return logbook.query(question, *arguments, **options)
-
-    return answer
 
 
 class Logbook:
@@ -217,15 +204,15 @@ class Logbook:
         """Newest measurement with calibrated bearings, or None."""
         return self.query(lambda analysis: analysis.calibrated_measurement)
 
-    assembly = _answered_by(Analysis.assembly)
-    first_assembly = _answered_by(Analysis.first_assembly)
-    verdicts = _answered_by(Analysis.verdicts)
-    verdict_for = _answered_by(Analysis.verdict_for)
-    stored_verdicts = _answered_by(Analysis.stored_verdicts)
-    initial_verdict = _answered_by(Analysis.initial_verdict)
-    advice = _answered_by(Analysis.advice)
-    status = _answered_by(Analysis.status)
-    chain_check = _answered_by(Analysis.chain_check)
+    assembly = answered_by(Analysis.assembly)
+    first_assembly = answered_by(Analysis.first_assembly)
+    verdicts = answered_by(Analysis.verdicts)
+    verdict_for = answered_by(Analysis.verdict_for)
+    stored_verdicts = answered_by(Analysis.stored_verdicts)
+    initial_verdict = answered_by(Analysis.initial_verdict)
+    advice = answered_by(Analysis.advice)
+    status = answered_by(Analysis.status)
+    chain_check = answered_by(Analysis.chain_check)
 
     def commit(self, tap: TapTest, now: datetime | None = None, answered: Sequence[str] = ()) -> None:
         """Store a tap test permanently.

@@ -22,7 +22,7 @@ class PointFrf:
     row: PointRow
     """Line of the table."""
     role: str
-    """What was at the point."""
+    """Role of the point."""
     number: int | None
     """Number of the FRF in its file; None if there is only one."""
     sign: float

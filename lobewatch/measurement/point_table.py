@@ -22,7 +22,7 @@ DIRECTIONS = "x", "-x", "y", "-y", "z", "-z"
 MIN_POINTS = 3
 """Fewest points of a mode shape."""
 ROLES = "response", "hit"
-"""What was at a point: the sensor, with the hammer at the tip, or the hammer, with the sensor at the tip."""
+"""Roles of a point: sensor there and hammer at the tip, or hammer there and sensor at the tip."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class PointRow:
     file: Path
     """Recorded file."""
     role: str = "response"
-    """What was at the point, one of ROLES; unused at the tip, and with a node."""
+    """Role of the point, one of ROLES; unused at the tip, and with a node."""
     direction: str = ""
     """Direction at the point; empty for that of the tip."""
     number: int | None = None

@@ -61,7 +61,7 @@ STIFFNESS_JUMP = RecordingQuestion(
     "stiffness K {now} N/um is {ratio:.3g} times the {expected} N/um expected from {count} earlier test{s} "
     "(limit {limit:.0f} %): gain, range, sensitivity, hit point or tool changed?",
 )
-"""Limit: smallest relative difference from the expected stiffness that is asked about (`series_questions`); chosen.
+"""Limit: smallest relative difference from the expected stiffness that raises the question; chosen.
 
 A larger scatter of the series raises it."""
 STIFFNESS_DRIFT = RecordingQuestion(
@@ -77,7 +77,7 @@ FREQUENCY_RISE = RecordingQuestion(
     "frequency {now:.1f} Hz is {percent:.0f} % above the {before:.1f} Hz of the last {count} test{s}: "
     "which tool is in the spindle?",
 )
-"""Limit: smallest relative rise that is asked about; chosen: warmth raises by up to 3 %, wear never."""
+"""Limit: smallest relative rise that raises the question; chosen: warmth raises by up to 3 %, wear never."""
 DIRECTION_STIFFNESS = RecordingQuestion(
     "direction-stiffness",
     2.0,

@@ -43,15 +43,15 @@ MAX_EXPONENT_DIFFERENCE = 1.9
 N_FIRST_TESTS, N_NEWEST_TESTS = 3, 3
 """Largest numbers of tests at the two ends of a level whose medians of K are compared; chosen."""
 FREQUENCY_STD = 0.003
-"""The same of the frequency, by reclamping; chosen."""
+"""Relative standard deviation of f from test to test by reclamping, before a series shows its own; chosen."""
 N_STD_ASKED = 4.0
-"""Number of standard deviations beyond which a value is asked about; chosen."""
+"""Number of standard deviations beyond which a value raises a question; chosen."""
 N_RECENT_TESTS = 5
 """Largest number of tests whose median frequency a rise is compared with, so that slow wear hides none; chosen."""
 STD_PER_MEDIAN = 1.4826
 """Standard deviation of a normal distribution over the median of its absolute values."""
 MAX_DAY = timedelta(hours=24)
-"""Time between x and y that counts as one day."""
+"""Time between x and y that counts as one day; the older of them is shifted beyond it; chosen."""
 ALIKE_FREQUENCY_CHANGE = 0.05
 """Relative difference of the frequencies of x and y within which their stiffness is compared; chosen."""
 DIRECTION_DIFFERENCE = 0.05
@@ -116,7 +116,7 @@ class ExpectedValue(NamedTuple):
     value: float
     """Expected value in SI units."""
     limit: float
-    """Largest difference of the natural logarithms that is not asked about."""
+    """Largest difference of the natural logarithms without a question."""
 
     def is_beyond(self, value: float) -> bool:
         """Tell whether a value is farther away than the limit."""
@@ -170,7 +170,7 @@ def _check_level_stiffness(now: Mode, reference: SeriesReference) -> Remark | No
 def _check_drift(now: Mode, reference: SeriesReference) -> Remark | None:
     """Return the question about the newest tests of a level far from its first ones, or None.
 
-    Steps that are too small to be asked about one by one move the median of a series along, but not its first tests.
+    Small steps, each without a question, move the median of a series along, but not its first tests.
     """
     earlier = [(test.frequency, test.stiffness) for test in reference.level if math.isfinite(test.stiffness)]
     tests = np.log([*earlier, (now.frequency, now.stiffness)])

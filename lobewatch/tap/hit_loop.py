@@ -177,7 +177,7 @@ class TapPhases:
     def _record_rest(self, connection: DeviceConnection) -> Hit:
         """Record the signals at rest, after a person has confirmed that the spindle is stopped.
 
-        Nobody is asked about a recording or an emulated device that is faster than real time.
+        Recordings, and emulated devices faster than real time, raise no question.
         """
 
         def record(duration: float = SELF_CHECK_DURATION) -> Hit:

@@ -21,10 +21,11 @@ from lobewatch.measurement.coverage import describe_uncovered, label_direction, 
 from lobewatch.measurement.hit_choice import HIT_DECISION_CODES
 from lobewatch.measurement.recording_questions import find_open_questions, label_question
 from lobewatch.measurement.sensor_effects import NO_FORCE_CODE
+from lobewatch.measurement.series_questions import MAX_DAY
 from lobewatch.measurement.spindle_model import build_model_state
 from lobewatch.measurement.tap_measurement import Measurement
 from lobewatch.tool import principal_directions as principal
-from lobewatch.tool.hidden_residues import find_hidden_residues
+from lobewatch.tool.hidden_residues import compare_directions
 from lobewatch.tool.principal_directions import PrincipalDirections, TipModes
 from lobewatch.tool.tap_series import FollowedMode, Scatter, compute_scatter, interpolate_frequency
 from modal import Mode, UnexplainedPeak
@@ -109,8 +110,6 @@ UNUSABLE_TAP_REASONS = {
 """Reason and remedy of a tap test without modes at the tip, by the code of its remark."""
 NO_MODE_REASON = ("no mode in the band", "Tap direction {} again")
 """Reason and remedy without such a remark."""
-MAX_DIRECTION_AGE = timedelta(hours=24)
-"""Age difference of x and y above which the older one is shifted; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +221,7 @@ def assemble(
     points = series.get(newest.direction, ())
     then = None if across is None else interpolate_frequency(points, across.time)
     moved = None if then is None else points[-1].frequency / then
-    if across is not None and moved is not None and newest.time - across.time > MAX_DIRECTION_AGE:
+    if across is not None and moved is not None and newest.time - across.time > MAX_DAY:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
     signed, about_cross, uncovered_cross = _check_cross_tap(modes.get("x"), modes.get("y"), cross)
     calibration = next((tap.calibration for tap in taps if tap.calibration is not None), None)
@@ -235,7 +234,7 @@ def assemble(
         predicted=False,
         remarks=(*newest.remarks, *_direction_remarks(newest, across, assembly.directions, moved), *about_cross),
         cross=signed,
-        hidden_residues=_find_hidden_residues(direct),
+        hidden_residues=compare_directions(direct.get("x"), direct.get("y")),
         series={direction: points for direction, points in series.items() if direction != CROSS_TAP},
         unusable={direction: _unusable_reason(tap) for direction, tap in direct.items() if not tap.at_tip},
         without_stiffness={direction: mode for direction, mode in followed.items() if not mode.has_stiffness},
@@ -248,20 +247,6 @@ def assemble(
             if own.code in HIT_DECISION_CODES
         ),
     )
-
-
-def _find_hidden_residues(taps: Mapping[str, Measurement]) -> Floats | None:
-    """Return the largest residues of the modes of x, then y, in the other FRF; None unless both are recent at the tip.
-
-    The modes at the tip are those of the FRF only if it was tapped there.
-    """
-    x, y = taps.get("x"), taps.get("y")
-    if x is None or y is None or x.frf is None or y.frf is None or abs(x.time - y.time) > MAX_DIRECTION_AGE:
-        return None
-    if not all(tap.at_tip and set(tap.used) <= set(tap.at_tip) for tap in (x, y)):
-        return None
-    in_y, in_x = find_hidden_residues(x.at_tip, y.at_tip, y.frf), find_hidden_residues(y.at_tip, x.at_tip, x.frf)
-    return np.concatenate((in_y, in_x))
 
 
 def _make_assembly(
@@ -294,7 +279,7 @@ def _direction_remarks(
     if len(directions) == 1:
         useless = [tap for tap in (newest, across) if tap is not None and not tap.at_tip]
         return (_untapped_remark(newest.tool, directions[0], _unusable_reason(useless[0]) if useless else None),)
-    if across is None or newest.time - across.time <= MAX_DIRECTION_AGE:
+    if across is None or newest.time - across.time <= MAX_DAY:
         return ()
     days = round((newest.time - across.time) / timedelta(days=1))
     text = f"direction {across.direction} is from {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"

@@ -6,6 +6,8 @@ import numpy as np
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
+from lobewatch.measurement.series_questions import MAX_DAY
+from lobewatch.measurement.tap_measurement import Measurement
 from modal import Mode
 
 MIN_BAND_SHARE, BAND_WIDTHS = 0.05, 8.0
@@ -20,6 +22,19 @@ COVERAGE_FACTOR = 2.0
 """Number of standard errors added to the fitted residue (95 %)."""
 NOISE_FLAT_POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """Power of the frequency that makes the noise of a receptance flat, by the measured quantity."""
+
+
+def compare_directions(x: Measurement | None, y: Measurement | None) -> Floats | None:
+    """Return the largest residues of the modes of x, then y, in the other FRF; None unless both are recent at the tip.
+
+    The modes at the tip are those of the FRF only if it was tapped there.
+    """
+    if x is None or y is None or x.frf is None or y.frf is None or abs(x.time - y.time) > MAX_DAY:
+        return None
+    if not all(tap.at_tip and set(tap.used) <= set(tap.at_tip) for tap in (x, y)):
+        return None
+    in_y, in_x = find_hidden_residues(x.at_tip, y.at_tip, y.frf), find_hidden_residues(y.at_tip, x.at_tip, x.frf)
+    return np.concatenate((in_y, in_x))
 
 
 def find_hidden_residues(modes: Sequence[Mode], others: Sequence[Mode], frf: Frf) -> Floats:

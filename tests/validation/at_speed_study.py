@@ -53,7 +53,7 @@ class Outcome:
 
 @dataclass
 class Study:
-    """What was called stable of some machines."""
+    """Outcomes of a study: programs called stable, and settings recommended."""
 
     programs: list[Outcome] = field(default_factory=list)
     settings: list[Outcome] = field(default_factory=list)

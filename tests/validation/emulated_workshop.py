@@ -174,7 +174,7 @@ class Tapped(NamedTuple):
 
 @dataclass(frozen=True)
 class Wrong:
-    """What is wrong in a tap test. By default nothing."""
+    """Faults of a tap test, none by default."""
 
     structure: Structure | None = None
     """Structure that is really hit, None for that of the direction."""
@@ -191,7 +191,7 @@ class Wrong:
     created: datetime | None = None
     """Time of the computer, None for the true one."""
     guided: bool = False
-    """Whether the clock of the computer is compared."""
+    """True if the clock of the computer is compared."""
 
 
 RIGHT = Wrong()
@@ -423,7 +423,7 @@ def run_session(session: TapSession, path: Path) -> Tapped:
 
 
 class Said(NamedTuple):
-    """What the program says of a machine."""
+    """Outputs of the program on a machine."""
 
     check: frozenset[str]
     """Codes of the remarks on its programs."""

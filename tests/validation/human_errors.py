@@ -40,12 +40,12 @@ Rng = np.random.Generator
 
 
 class Seen(NamedTuple):
-    """What one error on one machine led to."""
+    """Outcome of one error on one machine."""
 
     tap: Codes
     """Codes of the tap tests with the error, or why they were refused."""
     said: Said
-    """What `check` and `status` say then."""
+    """Outputs of `check` and `status` after it."""
 
     @property
     def codes(self) -> Codes:
@@ -69,7 +69,7 @@ class HumanError:
     earlier: int = N_EARLIER
     """Months with honest tests before it, 0 for an error in the first tests."""
     asks_programs: bool = False
-    """Whether only the verdict on a program can show it."""
+    """True if only the verdict on a program can show it."""
 
 
 @dataclass

@@ -69,7 +69,7 @@ def test_a_setting_is_found_where_samples_chatter_below_a_depth_at_which_they_ar
 
 
 def test_one_look_at_a_depth_that_chatters_says_how_deep_is_safe() -> None:
-    """Of the 300 samples, the first chatters from 1.595 mm on."""
+    """One of 300 samples chatters from 1.595 mm on, the others deeper."""
     search = search_of(234)
     less = search.verify(24000.0, 2.0)
     assert isinstance(less, float)

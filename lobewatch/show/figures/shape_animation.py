@@ -42,7 +42,7 @@ def save_shape_animation(found: FolderShapes, path: Path) -> None:
 
 
 def draw_shape_animation(found: FolderShapes) -> str:
-    """Return an <svg> element with a moving panel for each mode, and its shares beside it."""
+    """Return an <svg> element with a moving panel for each mode, next to its shares."""
     strongest = sorted(found.accepted, key=lambda i: -found.shapes[i].mode.peak)[:MAX_DRAWN_MODES]
     drawn = sorted(strongest, key=lambda i: found.shapes[i].mode.frequency)
     height = HEADER + PANEL * len(drawn) + 24

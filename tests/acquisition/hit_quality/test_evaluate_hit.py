@@ -100,7 +100,7 @@ def test_touches_of_nearly_one_size_cancel_first_at_half_a_turn(delay: float) ->
 
 @pytest.mark.parametrize("delay", [20e-3, 150e-3])
 def test_holes_of_touches_far_apart_begin_where_the_pulse_is_low_enough(delay: float) -> None:
-    """Of sizes 1 and 0.7 where the spectrum P of the pulse is (1.7 / 0.3) / 10 of its largest value."""
+    """Two touches of sizes 1 and 0.7: the spectrum P of the pulse is (1.7 / 0.3) / 10 of its largest value there."""
     pulse = np.sin(np.pi * np.arange(0, 0.6e-3, 1e-6) / 0.6e-3) ** 4
     size = np.abs(np.fft.rfft(pulse, 1_000_000)) / np.sum(pulse)  # one line per Hz
     begin = int(np.argmax(size < 0.17 / 0.3))

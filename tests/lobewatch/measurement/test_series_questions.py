@@ -197,7 +197,7 @@ def test_units_change_no_question(hertz: float, newton: float, ratios: list[floa
 
 
 def same_direction(change: float, own: list[float], *others: float, error: float = 3e-5) -> bool:
-    """Return whether y is asked about; own: relative differences of y and x on earlier days; others: weaker modes."""
+    """Return whether y raises the question; own: differences of y and x on earlier days; others: weaker modes."""
     covariance = np.diag([error * F, 1e-4, 1e5]) ** 2
     now = Mode(F * (1 + change), 0.03, K, covariance=covariance)
     weaker = [

@@ -21,7 +21,7 @@ MACHINE: Machine = parse_machine_file('[machine]\nname = "m"\n[speed]\nlow_rpm =
 AT_REST: Machine = parse_machine_file(
     '[machine]\nname = "m"\n[speed]\nlow_rpm = 5000\nhigh_rpm = 15000\ndrop_percent = [0, 0]\n'
 )
-"""The same with frequencies that do not drop at speed: the likely depth is then farther from the deepest setting."""
+"""Machine whose frequencies do not drop at speed: its likely depth is farther from the deepest setting."""
 
 
 def tool(apart: float = 1.06) -> Assembly:

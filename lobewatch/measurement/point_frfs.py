@@ -64,7 +64,7 @@ def _read_points(rows: Sequence[PointRow], description: Description) -> Iterator
 
 
 def _find_measurements(row: PointRow, tip: PointRow) -> list[tuple[int | None, str]]:
-    """Return the number of each FRF in the file of a line, and what was at the point."""
+    """Return the number of each FRF in the file of a line, and the role of the point."""
     if tip.direction and row.direction and tip.direction[-1] != row.direction[-1]:
         finding = f"direction {row.direction}, but {tip.direction} at the tip"
         raise DataError(f"{row.where}: {finding}. Put the points of each direction into a folder of its own.")

@@ -54,10 +54,10 @@ def add_loose_sensor(verdict: HitVerdict, hit: Hit, others: Sequence[Hit]) -> Hi
     return HitVerdict.from_findings({HitFlags.INCONSISTENT: finding})
 
 
-def evaluate_safely(judge: Callable[[], HitVerdict]) -> HitVerdict:
-    """Call `evaluate`. If it fails, reject the hit as NOT_JUDGED with the reason: one hit must not end a test."""
+def evaluate_safely(evaluate: Callable[[], HitVerdict]) -> HitVerdict:
+    """Evaluate a hit. If this fails, reject the hit as NOT_EVALUATED with the reason: one hit must not end a test."""
     try:
-        return judge()
+        return evaluate()
     except Exception as error:  # noqa: BLE001 - whatever it is, the next hit can be good
         failure = HIT_FAULTS[HitFlags.NOT_EVALUATED].state(reason=f"{type(error).__name__}: {error}")
         return HitVerdict.from_findings({HitFlags.NOT_EVALUATED: failure})

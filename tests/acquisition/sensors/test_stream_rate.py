@@ -51,6 +51,13 @@ def test_an_even_stream_has_its_rate() -> None:
     assert found.rate == pytest.approx(7600.0, rel=1e-9)
 
 
+@pytest.mark.parametrize(("share", "is_off"), [(1.0025, True), (1.0015, False), (0.9985, False), (0.9975, True)])
+def test_a_minute_shows_a_rate_more_than_0_2_percent_off(share: float, is_off: bool) -> None:
+    read = stream(due(60.0, share * RATE))
+    assert read.is_verified
+    assert (read.find_deviation() is not None) is is_off
+
+
 @pytest.mark.parametrize("seconds", [4.0, 7.0, 20.0])
 def test_a_busy_computer_refuses_no_honest_rate_and_hides_no_wrong_one(seconds: float) -> None:
     random = np.random.default_rng(1)

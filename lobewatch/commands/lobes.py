@@ -80,7 +80,7 @@ def lobes(
     from lobewatch.show.cuts.recorded_cuts import speed_pockets_json, speed_pockets_texts
     from lobewatch.tool import DynamicsSource, LobeMethod
 
-    stated = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
+    stated: dict[str, Any] = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
     stated |= {"direction": direction, "speed": speed, "depth": depth, "mode-y": mode_y, "speeds": speeds}
     if mode:
         _reject_options({"tool": tool, "radial": radial, "waterfall": waterfall, "MACHINE": machine}, "with --mode")

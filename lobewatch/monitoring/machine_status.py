@@ -52,7 +52,7 @@ def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Ite
     if trend.open_drop is not None:
         texts = _describe_change(trend.open_drop.change) | {"run_in": RUN_IN_TEXT if trend.is_run_in else ""}
         yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, event=event, folder=folder, **texts)
-    elif trend.detection.needs_repeat:
+    elif trend.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         rise = trend.detection.rise

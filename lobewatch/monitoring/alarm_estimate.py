@@ -51,11 +51,11 @@ class DropFamily(NamedTuple):
 DROP_FAMILIES = (
     DropFamily("step", 1.0, ("level",)),
     DropFamily("slope", 1.0, ("rate",)),
-    DropFamily("mixed", 0.2, ("both",)),
+    DropFamily("mixed", 0.3, ("both",)),
     DropFamily("mixed", 0.1, ("level", "rate")),
     DropFamily("mixed", 0.1, ("rate", "level")),
     DropFamily("dropped", 0.1, ("level", "level")),
-    DropFamily("dropped", 0.1, ("rate", "rate")),
+    DropFamily("dropped", 0.3, ("rate", "rate")),
     DropFamily("dropped", 0.1, ("rate", "both")),
 )
 """All families of shapes: drops with one date, and with two."""
@@ -119,7 +119,7 @@ def _fit_family(base: LevelModel, days: Floats, family: int) -> _ShapeFits:
     fits = base.fit_columns(columns)
     sizes, errors = fits.rate(-columns[:, :, -1])
     many = np.log(len(places) / odds) + columns.shape[1] / 2 * np.log(days.size)
-    log_weight = -fits.freedom / 2 * np.log(fits.rss) - many
+    log_weight = -days.size / 2 * np.log(fits.rss) - many
     freedom, families = np.full(len(places), float(fits.freedom)), np.full(len(places), family)
     accelerates = (fits.size < 0).all(axis=1) & (set(parts) == {"rate"})
     return _ShapeFits(log_weight, sizes, errors, freedom, families, places[:, 0], accelerates)

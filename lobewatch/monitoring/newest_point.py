@@ -5,7 +5,7 @@ import numpy as np
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, PastFit, fit_past
-from lobewatch.monitoring.level_model import build_level_model
+from lobewatch.monitoring.level_model import MIN_POINT_VARIANCE, build_level_model
 from lobewatch.monitoring.series_points import (
     CONFIRMED_DISTANCE_SHARE,
     MAD_TO_STD,
@@ -41,7 +41,7 @@ def measure_newest_distance(y: Floats) -> float:
     scatter = MAD_TO_STD / np.sqrt(2) * float(np.median(np.abs(np.diff(y[:-1]))))
     if not away or before / away >= CONFIRMED_DISTANCE_SHARE:
         return 0.0
-    return float(away / max(scatter, np.finfo(float).tiny))
+    return away / max(scatter, MIN_POINT_VARIANCE**0.5)
 
 
 def fit_confirmed_past(days: Floats, readings: Readings) -> PastFit | None:

@@ -26,7 +26,7 @@ class SeriesChange(NamedTuple):
     kind: ChangeKind
     """Kind of the change; "dropped" where no other kind fits."""
     point: int
-    """Index of the first point after the step, or of the last one before the slope."""
+    """Index of the first point after the step, or of the last one before the slope, at least 1."""
     size: float
     """Drop from before the change to the last fitted point, in the unit of the series."""
     half_width: float
@@ -108,7 +108,7 @@ def estimate_drop(readings: Readings) -> SeriesChange:
     low, high = (mixture_quantile(weight, fit.size, fit.error, fit.freedom, p) for p in SIZE_QUANTILES)
     first = np.array_split(number, days.size)[fit.point[best]][0]
     kind: ChangeKind = "slope" if fit.accelerates[best] else DROP_FAMILIES[family].kind
-    return SeriesChange(kind, int(first), (low + high) / 2, (high - low) / 2)
+    return SeriesChange(kind, max(int(first), 1), (low + high) / 2, (high - low) / 2)
 
 
 def _fit_family(base: LevelModel, days: Floats, family: int) -> _ShapeFits:

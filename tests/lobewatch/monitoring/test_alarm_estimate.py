@@ -28,7 +28,7 @@ def late(points: int, count: int = 40) -> Floats:
 DROPS: dict[str, tuple[Floats, str, int, float]] = {
     "step": (1.0 * (late(20) >= 0), "step", 20, 1.0),
     "slope": (0.1 * np.maximum(late(20), 0), "slope", 20, 1.9),
-    "line": (0.1 * late(0), "slope", 0, 3.9),
+    "line": (0.1 * late(0), "slope", 1, 3.9),
     "faster and faster": (np.maximum(late(12), 0) ** 2 / 100, "slope", 12, 7.29),
     "crash, then slope": ((late(20) >= 0) * (2 + 0.1 * late(20)), "mixed", 20, 3.9),
     "step, later slope": (2.0 * (late(10) >= 0) + 0.2 * np.maximum(late(25), 0), "mixed", 10, 4.8),
@@ -45,7 +45,7 @@ def test_kind_beginning_and_size_of_a_clear_drop(name: str) -> None:
     drop, kind, point, size = DROPS[name]
     found = estimate_drop(Readings(SCATTER - drop))
     assert found.kind == kind
-    assert abs(found.point - point) <= (5 if name == "faster and faster" else 2)
+    assert abs(found.point - point) <= {"line": 0, "faster and faster": 5}.get(name, 2)
     assert found.size == pytest.approx(size, abs=found.half_width)
     assert 0.04 < found.half_width < 0.25
 

@@ -1,5 +1,7 @@
 """Newest point of a series: whether the one before it confirms it, and the fit of the past without it if not."""
 
+import math
+
 import numpy as np
 
 from lobewatch.arrays import Floats
@@ -41,7 +43,7 @@ def measure_newest_distance(y: Floats) -> float:
     scatter = MAD_TO_STD / np.sqrt(2) * float(np.median(np.abs(np.diff(y[:-1]))))
     if not away or before / away >= CONFIRMED_DISTANCE_SHARE:
         return 0.0
-    return away / max(scatter, MIN_POINT_VARIANCE**0.5)
+    return away / max(scatter, math.sqrt(MIN_POINT_VARIANCE))
 
 
 def fit_confirmed_past(days: Floats, readings: Readings) -> PastFit | None:

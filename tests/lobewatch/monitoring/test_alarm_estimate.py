@@ -118,7 +118,7 @@ COURSES: dict[str, Callable[[Floats], Floats]] = {
     "slope": lambda i: i / 12,
     "crash, then slope": lambda i: 0.6 + i / 24,
     "slope, then held": lambda i: np.asarray(1.5 * np.minimum(i / 6, 1)),
-    "two steps": lambda i: 1 + 0.8 * (i > 5),
+    "two steps": lambda i: np.where(i > 5, 1.8, 1.0),
     "slope, then repaired": lambda i: np.where(i <= 10, i / 6, 0.5),
 }
 """Drop at the points after the last healthy one, as a share of its size."""

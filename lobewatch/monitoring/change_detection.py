@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Flags, Floats, Indices
+from lobewatch.monitoring.alarm_estimate import SeriesChange, estimate_drop
 from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
@@ -28,27 +29,22 @@ MIN_POINTS_WITH_PRIOR = 5
 """Smallest number of points for an evaluation if a scatter prior is known; chosen."""
 SURE_CHANGE_SCORE = 3.3
 """Score from which a change is certain; chance of 1 in 2000 if only the last point is checked."""
+SURE_FIRST_STEP_SCORE = 2.6
+"""Score from which a step after the first point is certain; chosen.
+
+It is one comparison for the whole series and not one more with each point, so that its probability has a larger
+weight (Genovese, Roeder & Wasserman 2006, "False discovery control with p-value weighting", Biometrika 93(3))."""
+MIN_FIRST_STEP_POINTS = 36
+"""Smallest number of points for that score, so that the comparison changes little with each further point; chosen."""
 MIN_SHARED_CHANGE = 0.5
 """Smallest share of the change of a mean of two series that one of them must show; chosen."""
 SCORE_BLOCK_ROWS = 64
 """Number of points evaluated at once, which limits memory."""
 
-ChangeKind = Literal["step", "slope"]
-MIN_POINTS_AROUND_CHANGE: dict[ChangeKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
+MonitoredKind = Literal["step", "slope"]
+"""Kind of a change that the monitor looks for."""
+MIN_POINTS_AROUND_CHANGE: dict[MonitoredKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
 """Smallest number of points before and after a change of each kind."""
-
-
-class SeriesChange(NamedTuple):
-    """Change of a series, as fitted to its points."""
-
-    kind: ChangeKind
-    """Kind of the change: a step, or a slope since then."""
-    point: int
-    """Index of the first point after the step, or of the last one before the slope."""
-    size: float
-    """Drop from there to the last fitted point, in the unit of the series."""
-    half_width: float
-    """Half the width of the 95 % interval of the size."""
 
 
 class LikeliestChange(NamedTuple):
@@ -125,6 +121,7 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
     common = build_level_model(readings.mean_of_directions)
     pairs = zip(_score_points(base), _score_points(common), strict=True)
     drops, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
+    drops, rises = _add_first_step(base, drops, 1), _add_first_step(base, rises, -1)
     return ChangeMonitor(base, drops, 1), ChangeMonitor(base, rises, -1)
 
 
@@ -167,6 +164,24 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
     return drop, rise
 
 
+def _add_first_step(base: LevelModel, change: LikeliestChange, sign: int) -> LikeliestChange:
+    """Add the step after the first point where it is certain."""
+    n = np.arange(MIN_FIRST_STEP_POINTS, base.y.size + 1)
+    if not n.size:
+        return change
+    step = _score_leans(base, -sign * base.explained_root("step", n[:, np.newaxis], np.array([1]))[:, 0], n)
+    score = step + SURE_CHANGE_SCORE - SURE_FIRST_STEP_SCORE
+    last = (n - 1)[(step >= SURE_FIRST_STEP_SCORE) & (score > change.score[n - 1])]
+    change.score[last], change.is_step[last], change.point[last] = score[last - n[0] + 1], True, 1
+    return change
+
+
+def _score_leans(base: LevelModel, lean: Floats, n: Indices) -> Floats:
+    """Return Student's t of changes by their signed roots of explained squares in the first n (r,), as a quantile."""
+    t = lean / np.sqrt(base.point_variance(lean**2, n))
+    return np.asarray(-scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -t)))
+
+
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
     """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
@@ -184,15 +199,14 @@ def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats
 
 def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
     """Choose the likelier of a step and a slope in the first n (r,) points."""
-    t = [lean / np.sqrt(base.point_variance(lean**2, n)) for lean in leans]
-    scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
-    fell = t[0] >= t[1]
-    return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
+    step, slope = (_score_leans(base, lean, n) for lean in leans)
+    fell = step >= slope
+    return LikeliestChange(np.maximum(step, slope), fell, np.where(fell, points[0], points[1]))
 
 
 def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:
     """Fit the change up to one of the points to the whole series; at: index of that point."""
-    kind: ChangeKind = "step" if change.is_step[at] else "slope"
+    kind: MonitoredKind = "step" if change.is_step[at] else "slope"
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
@@ -204,15 +218,24 @@ N_CLOSING_POINTS = 4
 """Number of consecutive points without a certain drop that close an alarm; chosen."""
 
 
-class DetectedDrop(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class DetectedDrop:
     """Drop that has triggered an alarm; points by their index in the series."""
 
     triggered_at: int
     """Point that triggered it, the second consecutive certain one."""
     closed_at: int | None
     """Point that closed it; None while it is open."""
-    change: SeriesChange
-    """Kind and beginning when it was triggered, and present size."""
+    begin: int
+    """First point of the monitor that detected it."""
+    readings: Readings
+    """Series from there on."""
+
+    @cached_property
+    def change(self) -> SeriesChange:
+        """Kind, beginning and size of the drop, as all points from there on tell."""
+        change = estimate_drop(self.readings)
+        return change._replace(point=self.begin + change.point)
 
 
 class Detection(NamedTuple):
@@ -246,7 +269,7 @@ def detect_changes(readings: Readings) -> Detection:
         risen = up.first_alarm
         end = count if risen is None else begin + risen + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
-        drops += _find_drops(down, begin, judged, end)
+        drops += _find_drops(down, readings.since(begin), begin, judged, end)
         judged = end
         if risen is not None:
             seen = up.change_at(risen)
@@ -254,14 +277,12 @@ def detect_changes(readings: Readings) -> Detection:
     return Detection(scores, tuple(drops), rise)
 
 
-def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
+def _find_drops(watch: ChangeMonitor, readings: Readings, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
     """Find the drops that a monitor triggers an alarm for between two points."""
     raised = next(watch.alarms_from(first - begin), None)
     while raised is not None and begin + raised < end:
         closed = _find_closing_point(watch, raised)
-        drop = watch.change_at(raised)
-        shifted = drop._replace(point=begin + drop.point)
-        yield DetectedDrop(begin + raised, None if closed is None else begin + closed, shifted)
+        yield DetectedDrop(begin + raised, None if closed is None else begin + closed, begin, readings)
         raised = None if closed is None else next(watch.alarms_from(closed + 1), None)
 
 

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from acquisition import CROSS_TAP, DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
-from lobewatch.history.series_reference import EarlierTestIndex, find_series_questions
+from lobewatch.history.series_reference import EarlierTestIndex, find_row_questions
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
@@ -216,7 +216,7 @@ class _RowArchive:
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
         reference = self._earlier.find_reference(place, self.places, self.rows)
-        remarks = (*place.remarks, *find_series_questions(row, reference))
+        remarks = (*place.remarks, *find_row_questions(row, reference))
         if place.other_direction is None:
             return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry

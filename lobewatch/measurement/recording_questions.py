@@ -93,6 +93,26 @@ SAME_DIRECTION = RecordingQuestion(
     "were hammer and sensor turned?",
 )
 """Limit: likelihood of one direction over that of two (`series_questions`); chosen."""
+MODE_JUMP = RecordingQuestion(
+    "mode-jump",
+    0.05,
+    "mode at {now:.0f} Hz is new, and the mode at {before:.0f} Hz of the last {count} test{s} is gone, although the "
+    "followed mode is the same: wrong machine?",
+)
+"""Limit: smallest relative rise of a mode that makes it another one, as of FREQUENCY_RISE; chosen."""
+EXCHANGED_DIRECTIONS = RecordingQuestion(
+    "exchanged-directions",
+    1000.0,
+    "frequency {now:.2f} Hz differs by {percent:+.2g} % from the other direction, and by {usual:+.2g} % on {days} "
+    "earlier days: were x and y exchanged?",
+)
+"""Limit: likelihood of exchanged over right names (`series_modes`); chosen, about one of 10 000 honest tests."""
+DAMPING_JUMP = RecordingQuestion(
+    "damping-jump",
+    sentence="damping zeta is {percent:.0f} % above the {count} earlier tests, and all modes decay faster by "
+    "{rise:.2g} 1/s, as with an exponential window of {time:.3g} ms: is a window on?",
+)
+"""Asked if the decay rates of all modes rose by one constant (`series_modes`)."""
 STIFFNESS_OFF_MODEL = RecordingQuestion(
     "stiffness-off-model",
     4.0,
@@ -134,6 +154,9 @@ MODE_QUESTIONS = (
     STIFFNESS_OFF_MODEL,
     DIRECTION_STIFFNESS,
     SAME_DIRECTION,
+    MODE_JUMP,
+    EXCHANGED_DIRECTIONS,
+    DAMPING_JUMP,
     TOOL_COMPLIANCE,
     WRONG_QUANTITY,
     WRONG_UNIT,

@@ -84,8 +84,8 @@ def test_swapped_cables_are_named_though_the_hammer_rings_or_hits_twice(delay: i
 def test_a_missing_response_to_a_long_pulse_is_a_soft_tip() -> None:
     noise = np.random.default_rng(1).normal(size=(2, TIME.size))
     long, short = (200 * np.where((TIME >= 0) & (w >= TIME), np.sin(np.pi * TIME / w) ** 2, 0.0) for w in (6e-3, 1e-3))
-    long, short = (check_hit(Hit(force + 0.1 * noise[0], noise[1], RATE, 512)) for force in (long, short))
-    assert (long, short) == (HitFlags.NARROW_BAND, HitFlags.NO_RESPONSE)
+    flags = [check_hit(Hit(force + 0.1 * noise[0], noise[1], RATE, 512)) for force in (long, short)]
+    assert flags == [HitFlags.NARROW_BAND, HitFlags.NO_RESPONSE]
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
 from typing import NamedTuple
@@ -265,7 +265,7 @@ def run_study(count: int, path: Path, results: Path, first: int = 0) -> None:
     """Write a JSON line for each error on each machine, and for an honest series after each second machine."""
     for number in range(first, first + count):
         for name, outcome in measure(ERRORS, 1, path, first=number):
-            write_line(results, kind=name, machine=number, **asdict(outcome))
+            write_line(results, kind=name, machine=number, **vars(outcome))
         if number % 2:
             continue
         std = (0.03, 0.06)[number // 2 % 2]

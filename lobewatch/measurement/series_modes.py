@@ -14,7 +14,6 @@ from lobewatch.measurement.series_questions import (
     N_PRIOR_PAIRS,
     N_RECENT_TESTS,
     N_STD_ASKED,
-    STD_PER_MEDIAN,
     EarlierTest,
     SeriesReference,
     check_same_direction,
@@ -36,7 +35,7 @@ DIRECTION_STD = 0.001
 Both are tapped in one clamping, so it is below FREQUENCY_STD; chosen."""
 MAX_EXCHANGED_STD = 4.0
 """Largest distance from the exchanged directions in standard deviations; chosen. Farther away it is another tool."""
-DAMPING_STD = 0.03
+DAMPING_STD = 0.1
 """Relative standard deviation of a damping ratio from test to test, before a series shows its own; chosen."""
 MIN_DAMPING_TESTS = 3
 """Smallest number of earlier tests that show the damping of a series; chosen."""
@@ -111,8 +110,7 @@ def _is_among(frequency: float, test: Floats) -> bool:
 def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
     """Return the question about x and y of one day that differ the other way round than on earlier days, or None.
 
-    Both directions are tapped in one clamping, so its scatter cancels in their difference. Likelihood of the
-    difference of each strong mode if the names are exchanged over that if they are right.
+    Both directions are tapped in one clamping, so its scatter cancels in their difference.
 
     Parameters
     ----------
@@ -130,17 +128,30 @@ def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference
     changes, now = changes[:, np.all(np.isfinite(changes), axis=0)], now[np.all(np.isfinite(changes), axis=0)]
     if not now.size:
         return None
-    change, then = changes[0], changes[1:]
-    centre = np.median(then, axis=0)
-    own_variance = (STD_PER_MEDIAN * np.median(np.abs(then - centre), axis=0)) ** 2
-    variance = (N_PRIOR_PAIRS * DIRECTION_STD**2 + len(days) * own_variance) / (N_PRIOR_PAIRS + len(days))
-    right, exchanged = (change - centre) ** 2 / variance, (change + centre) ** 2 / variance
-    is_likely = 0.5 * np.sum(right - exchanged) > math.log(EXCHANGED_DIRECTIONS.limit)
-    if not is_likely or np.max(exchanged) > MAX_EXCHANGED_STD**2:
+    likelihood, farthest = _compare_names(changes[0], changes[1:])
+    if likelihood <= math.log(EXCHANGED_DIRECTIONS.limit):
         return None
-    most = int(np.argmax(right))
-    asked = {"now": now[most], "percent": 100 * change[most], "usual": 100 * centre[most], "days": len(days)}
-    return EXCHANGED_DIRECTIONS.ask(f"{now[most]:.0f} Hz", **asked)
+    values = now[farthest], 100 * changes[0, farthest], 100 * float(np.mean(changes[1:, farthest]))
+    asked = dict(zip(("now", "percent", "usual"), values, strict=True))
+    return EXCHANGED_DIRECTIONS.ask(f"{now[farthest]:.0f} Hz", days=len(days), **asked)
+
+
+def _compare_names(change: Floats, earlier: Floats) -> tuple[float, int]:
+    """Return ln of the likelihood of exchanged over right names, and the mode that shows it best.
+
+    Student's distribution of one further value, as the scatter of a few days is uncertain. Reclamping moves all modes
+    together, so only one mode counts. The others can contradict.
+
+    change: ln of the frequencies over those of the other direction, shape (modes,); earlier: shape (days, modes).
+    """
+    centre, freedom = np.mean(earlier, axis=0), len(earlier) - 1 + N_PRIOR_PAIRS
+    squares = np.sum((earlier - centre) ** 2, axis=0) + N_PRIOR_PAIRS * DIRECTION_STD**2
+    variance = squares / freedom * (1 + 1 / len(earlier))
+    right, exchanged = (change - centre) ** 2 / variance, (change + centre) ** 2 / variance
+    farthest = int(np.argmax(centre**2 / variance))
+    likelihood = (freedom + 1) / 2 * np.log((freedom + right) / (freedom + exchanged))
+    is_exchanged = np.max(exchanged) <= MAX_EXCHANGED_STD**2
+    return float(likelihood[farthest]) if is_exchanged else -math.inf, farthest
 
 
 def _level_pairs(reference: SeriesReference) -> list[tuple[EarlierTest, EarlierTest]]:
@@ -170,21 +181,27 @@ def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> R
     now, tests = _select_strong(_tabulate(modes)), reference.level[-MAX_PAIRS:]
     if len(tests) < MIN_DAMPING_TESTS or len(now) < 2:
         return None
-    then = np.array([_find(now[:, 0], _tabulate_test(test)) for test in tests])[:, :, :2]
+    then = _trace(now, tests)
     if not np.all(np.isfinite(then)):
         return None
     usual = np.median(then, axis=0)
     if np.any(np.abs(now[:, 0] / usual[:, 0] - 1) > MAX_WINDOW_FREQUENCY_CHANGE):
         return None
-    spread = [estimate_scatter([rates], DAMPING_STD) for rates in then[:, :, 1].T]
+    both = [*then[:, :, 1].T, *_trace(now, reference.across[-MAX_PAIRS:])[:, :, 1].T]
+    spread = estimate_scatter([rates[np.isfinite(rates)] for rates in both], DAMPING_STD)
     std = usual[:, 1] * spread * math.sqrt(1 + math.pi / 2 / len(tests))
     rise, weight = now[:, 1] - usual[:, 1], std**-2
     common = float(np.sum(rise * weight) / np.sum(weight))
-    is_common = np.all(np.abs(rise - common) <= MAX_WINDOW_DISTANCE * std)
+    is_common = np.all((rise > 0) & (np.abs(rise - common) <= MAX_WINDOW_DISTANCE * std))
     if not is_common or common * math.sqrt(float(np.sum(weight))) <= N_STD_ASKED:
         return None
     asked = {"percent": 100 * rise[0] / usual[0, 1], "rise": common, "time": 1e3 / common, "count": len(tests)}
     return DAMPING_JUMP.ask(f"{now[0, 0]:.0f} Hz", **asked)
+
+
+def _trace(now: Floats, tests: Sequence[EarlierTest]) -> Floats:
+    """Return the rows of the modes of tests that are nearest to those of a table; shape (tests, modes, 3)."""
+    return np.array([_find(now[:, 0], _tabulate_test(test)) for test in tests]).reshape(-1, len(now), 3)
 
 
 def _tabulate(modes: Sequence[Mode]) -> Floats:

@@ -132,7 +132,7 @@ GAIN = codes("stiffness-jump", "wrong-unit", "wrong-quantity", "no-mode-in-band"
 GAIN |= {"hit:too-hard", "hit:overload-response", "check:force sensor", "check:acceleration sensor", "hit:no-response"}
 SETTING = codes("setting-not-plausible", "settings-contradict", "not-checked")
 NO_RESPONSE = codes("hit:no-response", "check:acceleration sensor", "hit:missing-response")
-LOOSE = codes("hit:inconsistent", "stiffness-jump", "tool-compliance")
+LOOSE = codes("hit:inconsistent", "stiffness-jump", "tool-compliance", "mode-differs-over-hits", "no-mode-in-band")
 BAND = codes("other-band", "no-mode-in-band", "no-mode-to-follow", "modes-incomplete", "hit:narrow-band")
 ERRORS = {
     "gain changed at once": HumanError(gain_at_once, codes("stiffness-jump")),
@@ -150,9 +150,7 @@ ERRORS = {
     "strong mains hum": HumanError(mains_hum, TURNING | {"check:hum"}),
     "cable of the accelerometer broken": HumanError(accelerometer_cable, NO_RESPONSE | TURNING),
     "cable of the hammer broken": HumanError(hammer_cable, codes("check:force sensor", "screen:unfelt-hit")),
-    "accelerometer comes loose": HumanError(
-        sensor_falls, NO_RESPONSE | {"hit:inconsistent", "stiffness-jump", "tool-compliance"}
-    ),
+    "accelerometer comes loose": HumanError(sensor_falls, NO_RESPONSE | LOOSE),
     "sensor left in x for y": HumanError(sensor_left, codes("same-direction")),
     "names x and y exchanged": HumanError(directions_exchanged, codes("exchanged-directions")),
     "shorter tool under the old name": HumanError(shorter_tool, TOOL),

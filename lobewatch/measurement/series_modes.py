@@ -64,8 +64,10 @@ def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: Seri
     """
     same = check_same_direction(followed, modes, reference)
     asked = (*check_series(followed, reference), *filter(None, [same]))
-    checks: Sequence[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
-    checks = () if asked else (check_other_modes, check_exchanged_directions, check_common_damping)
+    checks: list[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
+    checks = [] if asked else [check_exchanged_directions, check_common_damping]
+    if checks and reference.level and _has_become(reference.level[-1].frequency, _tabulate([followed])):
+        checks.insert(0, check_other_modes)
     further = filter(None, (check(modes, reference) for check in checks))
     return (*asked, *filter(None, [next(further, None)]))
 

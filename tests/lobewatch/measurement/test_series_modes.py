@@ -66,6 +66,11 @@ def test_a_mode_that_is_only_gone_weak_or_only_new_asks_nothing(now: list[Values
     assert check_other_modes(of(*now), SeriesReference(months_of((TOOL, SPINDLE)))) is None
 
 
+def test_a_fall_of_all_modes_is_that_of_the_followed_one() -> None:
+    now = of(moved(TOOL, 0.87), moved(SPINDLE, 0.87))
+    assert find_series_questions(now[0], now, SeriesReference(months_of((TOOL, SPINDLE)))) == ()
+
+
 def test_a_mode_that_not_all_recent_tests_have_asks_nothing() -> None:
     tests = (*months_of((TOOL,), 1), *months_of((TOOL, SPINDLE), 3))
     assert check_other_modes(of(TOOL, moved(SPINDLE, 1.3)), SeriesReference(tests)) is None

@@ -48,7 +48,9 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
 
 
 SELF_CHECK_DURATION = 1.0
-"""Length of the record at rest before the first and after the last hit (s)."""
+"""Length of the record of the self-check (s)."""
+REST_AFTER_DURATION = 2.0
+"""Length of the record at rest after the last hit (s), chosen: it shows lines of 0.7 times the rms."""
 MAX_RATE_TIME = 20.0
 """Length of the stream up to which it is read on after the last hit to verify its rate (s), chosen.
 
@@ -179,7 +181,7 @@ class TapPhases:
             self.questions.leave_open(RATE_NOT_VERIFIED.code)
         if self._tap.baseline is None or not self._guided or connection.device.identity.is_recording:
             return
-        record = connection.read_on(blocks, SELF_CHECK_DURATION)
+        record = connection.read_on(blocks, REST_AFTER_DURATION)
         if record is not None:
             self.questions.check_after(find_quiet_part(record))
 

@@ -8,7 +8,7 @@ from acquisition.errors import join_sentences
 from lobewatch.measurement.recording_questions import SPINDLE_TURNING
 from lobewatch.tap.self_check import slice_record
 from lobewatch.tap.state import Choice, StatePublisher, TapState, TapStep
-from lobewatch.tap.steady_line import find_steady_line
+from lobewatch.tap.steady_line import find_steady_line, measure_line
 
 START_CHOICE = Choice("start", "Yes, start")
 """Answer that begins a test."""
@@ -76,12 +76,13 @@ class StartQuestions:
 
         The response to the last hit may still decay, so the line must be as strong in the second half of the record.
         """
-        middle = record.acceleration.size // 2
-        halves = slice_record(record, 0, middle), slice_record(record, middle, record.acceleration.size)
-        first, second = map(find_steady_line, halves)
-        if first is None or second is None or not second.is_asked or second.rms < MIN_STEADY_RATIO * first.rms:
+        line, middle = find_steady_line(record), record.acceleration.size // 2
+        if line is None or not line.is_asked:
             return
-        self.leave_open(SPINDLE_TURNING.code)
+        halves = slice_record(record, 0, middle), slice_record(record, middle, record.acceleration.size)
+        first, second = (measure_line(half, line.frequency) for half in halves)
+        if second >= MIN_STEADY_RATIO * first:
+            self.leave_open(SPINDLE_TURNING.code)
 
     def leave_open(self, code: str) -> None:
         """Leave a question open that is not accepted: the finished test asks it."""

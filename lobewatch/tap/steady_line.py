@@ -99,6 +99,12 @@ def find_steady_line(record: Hit) -> SteadyLine | None:
     return None
 
 
+def measure_line(record: Hit, frequency: float) -> float:
+    """Return the rms of the response at a frequency (Hz) and its harmonics (m/s^2)."""
+    lines = compute_power_spectrum(record.acceleration, record.sample_rate)
+    return float(np.sqrt(sum_lines(*lines, *list_harmonics(frequency))))
+
+
 def is_electrical_hum(frequency: Floats, power: Floats, mains: float) -> bool:
     """Return whether lines at a mains frequency (Hz) and its harmonics have the pattern of electrical hum."""
     first, *higher = (sum_lines(frequency, power, line) for line in list_harmonics(mains))

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -64,15 +65,15 @@ def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: Seri
     """
     same = check_same_direction(followed, modes, reference)
     asked = (*check_series(followed, reference), *filter(None, [same]))
-    checks: list[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
-    checks = [] if asked else [check_exchanged_directions, check_common_damping]
-    if checks and reference.level and _has_become(reference.level[-1].frequency, _tabulate([followed])):
-        checks.insert(0, check_other_modes)
+    change = followed.frequency / reference.level[-1].frequency if reference.level else 1.0
+    checks: Sequence[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
+    others = partial(check_other_modes, change=change)
+    checks = () if asked else (others, check_exchanged_directions, check_common_damping)
     further = filter(None, (check(modes, reference) for check in checks))
     return (*asked, *filter(None, [next(further, None)]))
 
 
-def check_other_modes(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
+def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change: float = 1.0) -> Remark | None:
     """Return the question about a strong mode of all recent tests that is elsewhere now, or None.
 
     Wear lowers modes slowly and raises none. So a strong mode that is gone, with a strong one that no recent test has,
@@ -84,29 +85,32 @@ def check_other_modes(modes: Sequence[Mode], reference: SeriesReference) -> Rema
         Modes of the test that count.
     reference
         Earlier tests of the series.
+    change
+        Frequency of the followed mode over that of the newest test. The others may move as far.
     """
     recent = [_tabulate_test(test) for test in reference.level[-N_RECENT_TESTS:]]
     now = _tabulate(modes)
     if not recent:
         return None
-    lost = [f for f in _select_strong(recent[-1])[:, 0] if not _has_become(f, now)]
-    lost = [f for f in lost if all(_is_among(f, test) for test in recent)]
-    new = [f for f in _select_strong(now)[:, 0] if not any(_is_among(f, test) for test in recent)]
+    lost = [f for f in _select_strong(recent[-1])[:, 0] if not _has_become(f, now[:, 0], change)]
+    lost = [f for f in lost if all(_is_among(f, test, 1.0) for test in recent)]
+    new = [f for f in _select_strong(now)[:, 0] if not any(_is_among(f, test, change) for test in recent)]
     if not lost or not new:
         return None
     then = min(lost, key=lambda f: abs(math.log(f / new[0])))
     return MODE_JUMP.ask(f"{new[0]:.0f} Hz", now=new[0], before=then, count=len(recent), s="s" * (len(recent) > 1))
 
 
-def _has_become(before: float, now: Floats) -> bool:
-    """Tell whether an earlier frequency can be any of those of a table now."""
-    ratios = now[:, 0] / before
-    return bool(np.any((ratios <= 1 + MODE_JUMP.limit) & (ratios >= 1 - MAX_MODE_FALL)))
+def _has_become(before: float, now: Floats, change: float) -> bool:
+    """Tell whether an earlier frequency can be any of those now, shape (n,), as another mode changed by a ratio."""
+    ratios = now / before
+    low, high = (1 - MAX_MODE_FALL) * min(change, 1.0), (1 + MODE_JUMP.limit) * max(change, 1.0)
+    return bool(np.any((ratios >= low) & (ratios <= high)))
 
 
-def _is_among(frequency: float, test: Floats) -> bool:
+def _is_among(frequency: float, test: Floats, change: float) -> bool:
     """Tell whether a frequency can be any of those of the table of an earlier test."""
-    return any(_has_become(before, np.array([[frequency]])) for before in test[:, 0])
+    return any(_has_become(before, np.array([frequency]), change) for before in test[:, 0])
 
 
 def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:

@@ -215,11 +215,7 @@ class Logbook:
     chain_check = answered_by(Analysis.chain_check)
 
     def commit(
-        self,
-        tap: TapTest,
-        now: datetime | None = None,
-        asked: Sequence[str] = (),
-        answered: Sequence[str] = (),
+        self, tap: TapTest, now: datetime | None = None, asked: Sequence[str] = (), answered: Sequence[str] = ()
     ) -> None:
         """Store a tap test permanently.
 
@@ -236,10 +232,10 @@ class Logbook:
         """
         if not self.is_current:
             self._invalidate()
-        codes = find_clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
+        newest = (place.entry for place in self.files.places[-1:])
+        codes = *find_clock_questions(tap.circumstances.created, now, newest), *asked
         codes += find_device_questions(self.folder, tap.circumstances)
-        entry, analysis = self.folder.commit(tap, (*codes, *asked), answered), self._current_analysis
-        is_newest = self.files.add(entry)
+        analysis, is_newest = self._current_analysis, self.files.add(self.folder.commit(tap, codes, answered))
         self._current_analysis = self._make_analysis(analysis.measurements) if is_newest and analysis else None
         self._mark = self.folder.change_mark
 

@@ -222,7 +222,16 @@ STATUS_RULES = (
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),
-    *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "spindle-turning", "tap-in-future", TOO_OLD_CODE),
+    *_rules_of("mode-jump", "exchanged-directions", "damping-jump"),
+    *_rules_of(
+        *CLOCK_QUESTIONS,
+        "emulated-device",
+        "one-hit",
+        "spindle-turning",
+        "rate-not-verified",
+        "tap-in-future",
+        TOO_OLD_CODE,
+    ),
     *_rules_of("chain-not-checked"),
     *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
 )

@@ -3,7 +3,7 @@
 import contextlib
 import itertools
 from collections.abc import Mapping, Sequence
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +19,18 @@ from lobewatch.commands.shared_options import (
     add_file_options,
     rpm,
 )
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
+from lobewatch.show.terminal.output import (
+    Json,
+    JsonObject,
+    Listen,
+    Texts,
+    Token,
+    WatchToken,
+    emit,
+    notes,
+    print_remarks,
+    show_address,
+)
 
 if TYPE_CHECKING:
     from acquisition import Description
@@ -27,6 +38,7 @@ if TYPE_CHECKING:
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
     from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
 
@@ -117,7 +129,10 @@ def listen(
 
             save_cut_spectrum(comparisons, out)
         if dry_run:
-            emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
+            now = datetime.now(UTC)
+            cuts = [*logbook.cuts, *(comparison.to_recorded_cut(now) for comparison in comparisons)]
+            payload, texts = _suggest_untapped(logbook, comparisons, cuts)
+            emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
 
@@ -151,6 +166,22 @@ def _listen_to_file(
     emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
 
 
+def _suggest_untapped(
+    logbook: "Logbook", comparisons: "Sequence[CutComparison]", cuts: "Sequence[CutEntry]"
+) -> tuple[JsonObject, Texts]:
+    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was."""
+    from acquisition import DataError
+    from lobewatch.logbook import Analysis
+    from lobewatch.logbook.heard_cuts import suggest_by_sound
+    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+
+    setting = comparisons[-1].setting
+    if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
+        return {}, []
+    found = suggest_by_sound(logbook, setting, cuts)
+    return next_speeds_json(found), next_speeds_texts(found)
+
+
 def _store(
     logbook: "Logbook",
     comparisons: "Sequence[CutComparison]",
@@ -171,5 +202,7 @@ def _store(
         remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
         codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
         rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
-        emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
+        payload, texts = _suggest_untapped(logbook, comparisons, [*earlier, *stored])
+        saved = recording_texts(comparisons, [cut.id for cut in stored])
+        emit(recording_json(comparisons, rows) | payload, as_json, *saved, *texts)
     print_remarks(itertools.chain.from_iterable(remarks))

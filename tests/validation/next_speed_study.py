@@ -52,7 +52,7 @@ class HiddenSpindle:
         self.next: tuple[float, float] | None = (float(self.speeds[first]), depth)
 
     def _draw(self, draw: np.random.Generator) -> bool:
-        """Draw a spindle and a cut; False if every speed would do, or lobes are too close to matter."""
+        """Draw a spindle and a cut; False if every speed would do, lobes are too close to matter, or no limit is known."""
         f, k = _between(draw, 400, 3000), _between(draw, 5e6, 5e7)
         more = [(f * _between(draw, 0.4, 2.5), k * _between(draw, 1, 6)) for _ in range(draw.integers(0, 3))]
         x = [(frequency, draw.uniform(0.01, 0.05), stiffness) for frequency, stiffness in [(f, k), *more]]
@@ -69,7 +69,11 @@ class HiddenSpindle:
         self.runout = tuple(draw.uniform(0, 1e-5, self.cut.teeth).tolist())
         if max(mode.frequency for mode in self.x) * 60 / (self.cut.teeth * self.speeds[0]) > MAX_CYCLES:
             return False
-        self.limits = np.minimum(stability_boundary(self.x, self.y, self.cut, self.speeds, DEEPEST).depth, DEEPEST)
+        try:
+            limits = stability_boundary(self.x, self.y, self.cut, self.speeds, DEEPEST).depth
+        except ArithmeticError:  # not converged at some speed
+            return False
+        self.limits = np.minimum(limits, DEEPEST)
         self.best = min(float(np.max(self.limits)), MAX_CONTRAST * float(np.min(self.limits)))
         return bool(np.min(self.limits) < MIN_CONTRAST * self.best)
 

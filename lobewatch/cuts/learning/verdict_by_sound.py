@@ -75,7 +75,7 @@ def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:
         return is_near and cut.depth <= depth * (1 + DEPTH_TOLERANCE)
     if min(abs(speed / rpm - 1) for speed in (cut.speed_rpm, cut.commanded_rpm)) > REPEAT_SPEED_TOLERANCE:
         return False
-    is_plain = not program.thin and program.corner_radius_mm is None and program.wear in (None, "new")
+    is_plain = not program.thin and program.corner_radius_mm is None and (program.wear or machine.doubt.wear) == "new"
     return cut.depth >= depth * (1 - DEPTH_TOLERANCE) and (is_plain or cut.program == program.name)
 
 

@@ -15,7 +15,7 @@ from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
 from lobewatch.history.tap_measurements import NotTappedError
-from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
@@ -94,7 +94,7 @@ def hear_file(path: Path, description: Description, request: FileRequest) -> tup
     )
     heard = hear_recording(recording, range_rpm, depth)
     setting = _make_setting(path.name, teeth, speed_rpm, depth)
-    sensor = "microphone" if signal.sensor == MICROPHONE_SENSOR else "accelerometer"
+    sensor: CutSensor = "microphone" if signal.sensor == MICROPHONE_SENSOR else "accelerometer"
     comparisons = [CutComparison(setting, found, None, sensor, None) for found in heard.evaluations]
     return comparisons, heard.next_speeds
 
@@ -113,8 +113,8 @@ def _read_without_sensitivity(path: Path, description: Description) -> CutSignal
 def _make_setting(name: str, teeth: int, speed_rpm: float, depth: float) -> CutSetting:
     """Make the setting of a cut whose machine is unknown, named after its file."""
     tangential, radial = ARBITRARY_FORCES
-    forces = {"tangential_n_per_mm2": tangential / 1e6, "radial_n_per_mm2": radial / 1e6}
-    table = CutTable(teeth, ARBITRARY_DIAMETER_MM, ARBITRARY_DIAMETER_MM, "down", **forces)
+    slot = teeth, ARBITRARY_DIAMETER_MM, ARBITRARY_DIAMETER_MM, "down"
+    table = CutTable(*slot, tangential_n_per_mm2=tangential / 1e6, radial_n_per_mm2=radial / 1e6)
     cut = Cut(teeth, UNKNOWN_IMMERSION, "down", tangential, radial)
     return CutSetting(table, "", name, "", cut, "both", speed_rpm, depth)
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from acquisition.files.cut_file import CutSignal
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
-    from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
@@ -94,7 +94,7 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
     from lobewatch.tap import cut_recording as recorder
@@ -103,7 +103,7 @@ def listen(
         others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
         _reject_options(others | {"date": date}, "needs a machine folder")
         description = file_options.description(tacho=tacho, pulses=pulses)
-        _listen_to_file(machine, description, FileRequest(teeth, speed, depth, speeds), out, as_json)
+        _listen_to_file(machine, description, CutFileRequest(teeth, speed, depth, speeds), out, as_json)
         return
     _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
     logbook = Logbook.open(machine)
@@ -129,9 +129,7 @@ def listen(
 
             save_cut_spectrum(comparisons, out)
         if dry_run:
-            now = datetime.now(UTC)
-            cuts = [*logbook.cuts, *(comparison.to_recorded_cut(now) for comparison in comparisons)]
-            payload, texts = _suggest_untapped(logbook, comparisons, cuts)
+            payload, texts = _suggest_untapped(logbook, comparisons)
             emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
@@ -150,7 +148,7 @@ def _reject_options(options: Mapping[str, Any], problem: str) -> None:
 
 
 def _listen_to_file(
-    path: Path, description: "Description", request: "FileRequest", out: Path | None, as_json: bool
+    path: Path, description: "Description", request: "CutFileRequest", out: Path | None, as_json: bool
 ) -> None:
     """Evaluate a recorded cut of an unknown machine, and show the next speeds."""
     from lobewatch.logbook.heard_cuts import hear_file
@@ -167,9 +165,12 @@ def _listen_to_file(
 
 
 def _suggest_untapped(
-    logbook: "Logbook", comparisons: "Sequence[CutComparison]", cuts: "Sequence[CutEntry]"
+    logbook: "Logbook", comparisons: "Sequence[CutComparison]", stored: "Sequence[CutEntry] | None" = None
 ) -> tuple[JsonObject, Texts]:
-    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was."""
+    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was.
+
+    stored: all cuts of the journal. None to add these cuts to those of the logbook.
+    """
     from acquisition import DataError
     from lobewatch.logbook import Analysis
     from lobewatch.logbook.heard_cuts import suggest_by_sound
@@ -178,7 +179,8 @@ def _suggest_untapped(
     setting = comparisons[-1].setting
     if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
         return {}, []
-    found = suggest_by_sound(logbook, setting, cuts)
+    made = [comparison.to_recorded_cut(datetime.now(UTC)) for comparison in comparisons]
+    found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
     return next_speeds_json(found), next_speeds_texts(found)
 
 

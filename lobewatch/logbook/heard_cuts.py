@@ -113,8 +113,8 @@ def _read_without_sensitivity(path: Path, description: Description) -> CutSignal
 def _make_setting(name: str, teeth: int, speed_rpm: float, depth: float) -> CutSetting:
     """Make the setting of a cut whose machine is unknown, named after its file."""
     tangential, radial = ARBITRARY_FORCES
-    slot = teeth, ARBITRARY_DIAMETER_MM, ARBITRARY_DIAMETER_MM, "down"
-    table = CutTable(*slot, tangential_n_per_mm2=tangential / 1e6, radial_n_per_mm2=radial / 1e6)
+    size = ARBITRARY_DIAMETER_MM
+    table = CutTable(teeth, size, size, "down", tangential_n_per_mm2=tangential / 1e6, radial_n_per_mm2=radial / 1e6)
     cut = Cut(teeth, UNKNOWN_IMMERSION, "down", tangential, radial)
     return CutSetting(table, "", name, "", cut, "both", speed_rpm, depth)
 

@@ -15,12 +15,12 @@ def check(
     speed: Annotated[
         float | None, Option(parser=shared.rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
     ] = None,
-    depth: Annotated[float | None, Option(parser=shared.number, help="Axial depth of cut ap (mm).")] = None,
+    depth: Annotated[float | None, Option(parser=shared.length, help="Axial depth of cut ap (mm).")] = None,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: shared.Material = None,
     teeth: shared.Flutes = None,
     diameter: shared.Diameter = None,
-    radial: Annotated[float | None, Option(parser=shared.number, help="Radial depth of cut ae (mm).")] = None,
+    radial: Annotated[float | None, Option(parser=shared.length, help="Radial depth of cut ae (mm).")] = None,
     direction: shared.MillingDirection = None,
     accept: Annotated[
         list[str] | None,

@@ -191,6 +191,10 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
         "crash": f"{went} at once before {since}, also {goes} steadily",
         "wander": f"{goes} irregularly",
         "bend": f"{goes} at a changing rate",
+        "late wander": f"{goes} irregularly since {since}",
+        "late bend": f"{goes} at a changing rate since {since}",
+        "late curve": f"{goes} faster and faster since {since}",
+        "late runaway": f"{goes} faster and faster since {since}",
     }
     return words.get(shape.kind, f"{goes} {'faster and faster' if shape.accelerates else 'more and more slowly'}")
 

@@ -33,7 +33,9 @@ NEGLIGIBLE_PROBABILITY = 1e-12
 RATE_QUANTILES = (0.025, 0.975)
 """Quantiles of the 95 % interval of a rate."""
 QUANTILE_HALVINGS = 40
-"""Number of halvings in the search for a quantile; of its inverse hyperbolic sine for a fan, as curves run far away."""
+"""Number of halvings in the search for a quantile of a rate."""
+FAN_HALVINGS = 30
+"""Number of halvings in the search for the inverse hyperbolic sine of a quantile of a fan, as curves run far away."""
 WINSORIZED_QUANTILES = (0.1, 0.9)
 """Quantiles of the shapes to which the mean line limits them; chosen."""
 FAN_STANDARD_ERRORS = 50
@@ -122,7 +124,7 @@ class Forecast(NamedTuple):
             np.arcsinh((self.mean - reach).min(axis=0) / unit),
             np.arcsinh((self.mean + reach).max(axis=0) / unit),
         )
-        for _ in range(QUANTILE_HALVINGS):
+        for _ in range(FAN_HALVINGS):
             middle = (low + high) / 2
             below = self.probability(unit * np.sinh(middle)) < quantile
             low, high = np.where(below, middle, low), np.where(below, high, middle)

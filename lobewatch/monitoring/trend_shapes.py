@@ -27,7 +27,7 @@ LATE_POWER_EXPONENTS = (2.0, 3.0)
 LATE_RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.2, 1.6, 2.5))
 """Exponents of the runaway curves that begin at a later point, and their ends in times from there to the last point;
 chosen."""
-MIN_LATE_POINTS = 4
+MIN_LATE_POINTS = 5
 """Smallest number of points after the one at which a curve or random walk begins; chosen."""
 N_LATE_WALKS = 12
 """Largest number of points at which random walks begin, for speed; chosen."""
@@ -42,13 +42,14 @@ SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
 
 
 PRIOR_ODDS = {
-    "none": 0.3,
+    "none": 0.5,
     "step": 0.3,
     "slopes": 5.0,
     "breaks": 5.0,
     "crash": 4.0,
     "wander": 0.5,
     "bend": 0.5,
+    "late runaway": 0.5,
     "late wander": 6.0,
     "late bend": 3.0,
 }

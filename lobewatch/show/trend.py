@@ -23,7 +23,7 @@ from lobewatch.show.terminal.status_labels import status_label
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "
-    "One forecast in three or four misses a drop that slows down or grows exponentially."
+    "On public records of engines and a bearing, 18 % of the dates came before the 80 % range and 1 % after it."
 )
 """Note below every table of forecast dates."""
 TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")

@@ -129,7 +129,7 @@ def test_equal_points_stay() -> None:
 
 def late_wear(power: float) -> Floats:
     """Steady for ten months of 24, then faster and faster, with a scatter of 0.01 %."""
-    return -(np.maximum(np.arange(24.0) - 10, 0) ** power) / 13**power + np.tile([0.01, -0.01], 12)
+    return np.asarray(-(np.maximum(np.arange(24.0) - 10, 0) ** power) / 13**power + np.tile([0.01, -0.01], 12))
 
 
 @pytest.mark.parametrize("power", [2.0, 3.0])

@@ -190,5 +190,5 @@ def test_most_ranges_hold_the_date_of_wear_that_begins_late() -> None:
     pasts = []
     for course in LATE_FLOORS:
         r = np.random.default_rng([33, *course.encode()])
-        pasts += [history(course, "24 monthly, 0.3 %", r) for _ in range(16)]
+        pasts += [history(course, "24 monthly, 0.3 %", r) for _ in range(8)]
     assert share_held([(past, foretold(past).crossing_dates(-LEVEL)) for past in pasts]) >= 65

@@ -330,7 +330,7 @@ def fit_random_walks(base: LevelModel, at: Floats) -> list[RandomWalkFits]:
     starts = (
         [late[i] for i in sorted({*np.linspace(0, len(late) - 1, N_LATE_WALKS).astype(int).tolist()})] if late else []
     )
-    kinds = {
+    kinds: dict[ShapeKind, tuple[tuple[float, ...], list[float]]] = {
         "wander": (LEVEL_VARIANCES, [0.0]),
         "bend": (RATE_VARIANCES, [0.0]),
         "late wander": (LATE_LEVEL_VARIANCES, starts),

@@ -55,8 +55,8 @@ def engine_cases(path: str, every: int) -> Iterator[Case]:
 def bearing_cases(path: str, column: int, tests: int) -> Iterator[Case]:
     """Yield forecasts of the bearing, 15 to 90 % of the elapsed time ahead."""
     values = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=[column])
-    dates, y = np.arange(values.size) * 1.0, -100 * np.log(values / values[:20].mean())
-    line = np.asarray(np.minimum.accumulate(median_filter(y, 9)), dtype=np.float64)
+    dates, y = np.arange(values.size, dtype=np.float64), -100 * np.log(values / values[:20].mean())
+    line = np.minimum.accumulate(median_filter(y, 9))
     picked = np.linspace(0, y.size - 1, tests).round().astype(int)
     for level in -np.array(IMS_LEVELS, dtype=float):
         truth = reached(dates, line, level)

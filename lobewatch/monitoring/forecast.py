@@ -33,7 +33,11 @@ NEGLIGIBLE_PROBABILITY = 1e-12
 RATE_QUANTILES = (0.025, 0.975)
 """Quantiles of the 95 % interval of a rate."""
 QUANTILE_HALVINGS = 40
-"""Number of halvings in the search for a quantile."""
+"""Number of halvings in the search for a quantile of a rate."""
+FAN_HALVINGS = 30
+"""Number of halvings in the search for the inverse hyperbolic sine of a quantile of a fan, as curves run far away."""
+WINSORIZED_QUANTILES = (0.1, 0.9)
+"""Quantiles of the shapes to which the mean line limits them; chosen."""
 FAN_STANDARD_ERRORS = 50
 """Standard errors around the means within which all quantiles are searched."""
 
@@ -82,8 +86,12 @@ class Forecast(NamedTuple):
 
     @property
     def mean_line(self) -> Floats:
-        """Mean of the mixture at the dates, shape (d,)."""
-        return np.asarray(self.weight @ self.mean)
+        """Winsorized mean of the shapes at the dates, shape (d,); curves that run away do not carry it off."""
+        order = np.argsort(self.mean, axis=0)
+        ordered, share = np.take_along_axis(self.mean, order, 0), np.cumsum(self.weight[order], axis=0)
+        places = [(share < quantile).sum(axis=0)[np.newaxis] for quantile in WINSORIZED_QUANTILES]
+        low, high = (np.take_along_axis(ordered, place, 0) for place in places)
+        return np.asarray(self.weight @ np.clip(self.mean, low, high))
 
     @property
     def likeliest(self) -> TrendShape:
@@ -111,13 +119,16 @@ class Forecast(NamedTuple):
 
     def quantile_line(self, quantile: float) -> Floats:
         """Return the quantile of the series at the dates, shape (d,)."""
-        reach = FAN_STANDARD_ERRORS * self.error
-        low, high = (self.mean - reach).min(axis=0), (self.mean + reach).max(axis=0)
-        for _ in range(QUANTILE_HALVINGS):
+        unit, reach = self.error.min(axis=0), FAN_STANDARD_ERRORS * self.error
+        low, high = (
+            np.arcsinh((self.mean - reach).min(axis=0) / unit),
+            np.arcsinh((self.mean + reach).max(axis=0) / unit),
+        )
+        for _ in range(FAN_HALVINGS):
             middle = (low + high) / 2
-            below = self.probability(middle) < quantile
+            below = self.probability(unit * np.sinh(middle)) < quantile
             low, high = np.where(below, middle, low), np.where(below, high, middle)
-        return np.asarray((low + high) / 2)
+        return np.asarray(unit * np.sinh((low + high) / 2))
 
 
 def forecast_series(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
@@ -176,8 +187,7 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
     places = average_neighbors(at)
     base = build_level_model(average_readings(readings))
     families = trend_shapes.fit_shapes(base, places)
-    walks = [trend_shapes.fit_random_walks(base, places, kind) for kind in ("wander", "bend")]
-    kept, weight = _select_heaviest([*families, *walks])
+    kept, weight = _select_heaviest([*families, *trend_shapes.fit_random_walks(base, places)])
     first = average_neighbors(y)[0]
     fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
     return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))

@@ -20,12 +20,43 @@ RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.1, 1.2
 MIN_RUNAWAY_DISTANCE = 1e-6
 """Smallest remaining share of the time to that end at which such a curve is evaluated."""
 
-ShapeKind = Literal["none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend"]
+LATE_EXPONENTIAL_RATES = (2.0, 4.0)
+"""Rates of the exponential curves that begin at a later point, per time from there to the last point; chosen."""
+LATE_POWER_EXPONENTS = (2.0, 3.0)
+"""Exponents of the power curves that begin at a later point; chosen."""
+LATE_RUNAWAY_SHAPES = tuple((power, end) for power in (0.5, 1.0) for end in (1.2, 1.6, 2.5))
+"""Exponents of the runaway curves that begin at a later point, and their ends in times from there to the last point;
+chosen."""
+MIN_LATE_POINTS = 5
+"""Smallest number of points after the one at which a curve or random walk begins; chosen."""
+N_LATE_WALKS = 12
+"""Largest number of points at which random walks begin, for speed; chosen."""
+MAX_EXPONENT = 50.0
+"""Exponent at which an exponential curve is far beyond any level."""
+
+ShapeKind = Literal[
+    "none", "line", "slope", "step", "curve", "runaway", "slopes", "breaks", "crash", "wander", "bend",
+    "late curve", "late runaway", "late wander", "late bend",
+]  # fmt: skip
 SHAPE_KINDS: tuple[ShapeKind, ...] = get_args(ShapeKind)
 
 
-PRIOR_ODDS = {"none": 0.3, "step": 0.3, "slopes": 5.0, "breaks": 5.0, "crash": 4.0, "wander": 0.5, "bend": 0.5}
-"""Prior odds of the kinds, all others 1, chosen so that forecast ranges of many trends hold their dates."""
+PRIOR_ODDS = {
+    "none": 0.5,
+    "step": 0.3,
+    "slopes": 5.0,
+    "breaks": 5.0,
+    "crash": 4.0,
+    "wander": 0.5,
+    "bend": 0.5,
+    "late runaway": 0.5,
+    "late wander": 6.0,
+    "late bend": 3.0,
+}
+"""Prior odds of the kinds, all others 1, chosen so that forecast ranges of many trends hold their dates.
+
+Within a kind, each beginning has the same prior weight, and so has each form of a curve and each size of a random walk.
+"""
 
 
 class TrendShape(NamedTuple):
@@ -34,17 +65,19 @@ class TrendShape(NamedTuple):
     kind: ShapeKind
     """Kind: "none", steady; "slope", a line from a point on; "step", dropped once; "curve", accelerating or slowing;
     "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
-    "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
+    "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does;
+    "late" curves and random walks, steady up to a point and accelerating or wandering from there on."""
     start: float
     """Date of the beginning of the drop, or of the step; the later date of two slopes; the step of a crash."""
     accelerates: bool = False
     """True if a curve accelerates; False if it slows down."""
     rate: float = 0.0
-    """Rate of an exponential curve per span, or size of a random walk; else 0."""
+    """Rate of an exponential curve per time from its start to the last point, or size of a random walk; else 0."""
     power: float = 0.0
     """Exponent of a power or runaway curve; else 0."""
     end: float = 0.0
-    """End of a runaway curve in spans; the earlier date of two slopes; the start of the line of a crash."""
+    """End of a runaway curve in times from its start to the last point; the earlier date of two slopes; the start of
+    the line of a crash."""
 
 
 def list_single_shapes(at: Floats) -> list[TrendShape]:
@@ -57,7 +90,27 @@ def list_single_shapes(at: Floats) -> list[TrendShape]:
         *(TrendShape("curve", 0.0, rate > 0, rate=rate) for rate in EXPONENTIAL_RATES),
         *(TrendShape("curve", 0.0, True, power=power) for power in POWER_EXPONENTS),
         *(TrendShape("runaway", 0.0, True, power=power, end=end) for power, end in RUNAWAY_SHAPES),
+        *_list_late_curves(at),
     ]
+
+
+def _list_late_curves(at: Floats) -> list[TrendShape]:
+    """List the accelerating curves that begin at each later point."""
+    begins = _late_starts(at)
+    return [
+        *(TrendShape("late curve", start, True, rate=rate) for start in begins for rate in LATE_EXPONENTIAL_RATES),
+        *(TrendShape("late curve", start, True, power=power) for start in begins for power in LATE_POWER_EXPONENTS),
+        *(
+            TrendShape("late runaway", start, True, power=power, end=end)
+            for start in begins
+            for power, end in LATE_RUNAWAY_SHAPES
+        ),
+    ]
+
+
+def _late_starts(at: Floats) -> list[float]:
+    """List the dates at which a curve or random walk may begin, apart from the first."""
+    return [start for start in at[1:-MIN_LATE_POINTS].tolist() if start < at[-1]]
 
 
 def list_pair_shapes(at: Floats) -> list[TrendShape]:
@@ -82,15 +135,22 @@ def build_columns(shapes: Sequence[TrendShape], at: Floats, span: float) -> Floa
         block, part = columns[begin:end], shapes[begin:end]
         if kind == "step":
             block[:] = at >= starts[begin:end]
-        elif kind == "curve":
-            share = at / span
-            block[:] = [np.expm1(shape.rate * at / span) if shape.rate else share**shape.power for shape in part]
-        elif kind == "runaway":
-            ways = [np.maximum(1 - at / (shape.end * span), MIN_RUNAWAY_DISTANCE) for shape in part]
-            block[:] = [way**-shape.power - 1 for way, shape in zip(ways, part, strict=True)]
+        elif kind.endswith(("curve", "runaway")):
+            block[:] = _build_curves(part, np.maximum(at - starts[begin:end], 0.0) / (span - starts[begin:end]))
         else:
             np.maximum(np.subtract(at, starts[begin:end], out=block), 0.0, out=block)
     return np.asarray(columns[:, np.newaxis])
+
+
+def _build_curves(shapes: Sequence[TrendShape], share: Floats) -> Floats:
+    """Build curves over the share of the time from the start of each to the last point, shape (j, d)."""
+    rate, power, end = np.array([(shape.rate, shape.power, shape.end) for shape in shapes]).T[..., np.newaxis]
+    if end.any():
+        return np.asarray(np.maximum(1 - share / end, MIN_RUNAWAY_DISTANCE) ** -power - 1)
+    grows = rate[:, 0] != 0
+    curves = share**power
+    curves[grows] = np.expm1(np.minimum(rate[grows] * share[grows], MAX_EXPONENT))
+    return np.asarray(curves)
 
 
 def build_pair_columns(shapes: Sequence[TrendShape], at: Floats) -> Floats:
@@ -172,6 +232,10 @@ LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances of a level random walk over the span, relative to that of a point; chosen."""
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
 """Variances of a rate random walk (levels per span) over the span, relative to that of a point; chosen."""
+LATE_LEVEL_VARIANCES = (100.0, 1e3, 1e4, 1e5)
+"""The same for a level that is steady up to a later point: what happens from there on is larger; chosen."""
+LATE_RATE_VARIANCES = (1e4, 1e5, 1e6, 1e7)
+"""The same for a rate that begins at a later point; chosen."""
 
 
 class RandomWalkFits(NamedTuple):
@@ -195,17 +259,17 @@ class RandomWalkFits(NamedTuple):
 
     def predict(self, at: Floats) -> tuple[Floats, Floats]:
         """Predict mean and standard error of each at dates from the first point on, shape (j, d) each."""
-        ahead = at / self.points.span
-        is_bend = self.points.kind == "bend"
-        variance = ahead**3 / 3 if is_bend else ahead
-        return self._predict(_walk_covariance(is_bend, self.points.share, ahead), variance, ahead, 1.0)
+        points = self.points
+        ahead = np.maximum(at / points.span - points.start, 0.0)
+        variance = ahead**3 / 3 if points.is_bend else ahead
+        return self._predict(_walk_covariance(points.is_bend, points.share, ahead), variance, ahead, 1.0)
 
     def rate(self) -> tuple[Floats, Floats]:
         """Return the rate of change of each at the last point and its standard error, shape (j,) each."""
-        is_bend, span = self.points.kind == "bend", self.points.span
-        crossed = is_bend * self.points.share[:, np.newaxis] ** 2 / 2
-        rate, error = self._predict(crossed, np.array([float(is_bend)]), np.ones(1), 0.0)
-        return rate[:, 0] / span, error[:, 0] / span
+        points = self.points
+        crossed = points.is_bend * points.share[:, np.newaxis] ** 2 / 2
+        rate, error = self._predict(crossed, points.is_bend * points.share[-1:], np.ones(1), 0.0)
+        return rate[:, 0] / points.span, error[:, 0] / points.span
 
     def _predict(self, crossed: Floats, variance: Floats, slope: Floats, level: float) -> tuple[Floats, Floats]:
         """Best linear predictions of level + slope (d,) of the line and what wanders, shape (j, d) each.
@@ -230,10 +294,12 @@ class RandomWalkFits(NamedTuple):
 class _RotatedPoints(NamedTuple):
     """Series rotated into the directions in which the random walk is independent."""
 
-    kind: ShapeKind
-    """Kind: "wander" or "bend"."""
+    is_bend: bool
+    """True if the rate is the random walk; False if the level is."""
+    start: float
+    """Start of the line and of the random walk, as a share of the span."""
     share: Floats
-    """Elapsed share of the span at each point, shape (n,)."""
+    """Share of the span from there to each point, shape (n,)."""
     span: float
     """Span of the series."""
     values: Floats
@@ -248,40 +314,60 @@ class _RotatedPoints(NamedTuple):
     """Prior precision of the coefficients, shape (p, p)."""
 
     def solve(self, weight: Floats) -> tuple[Floats, Floats, Floats]:
-        """Inverse of the normal matrix (p, p), coefficients (p,) and the sum of squares left, with weights (n,)."""
-        weighted = self.columns.T * weight
+        """Inverse of the normal matrix, coefficients and the sum of squares left, with weights (..., n).
+
+        Shapes (..., p, p), (..., p) and (...).
+        """
+        weighted = self.columns.T * weight[..., np.newaxis, :]
         gram: Floats = np.asarray(np.linalg.inv(weighted @ self.columns + self.precision), dtype=np.float64)
-        line = gram @ weighted @ self.y
-        return gram, line, np.asarray(self.y * weight @ (self.y - self.columns @ line))
+        line = (gram @ (weighted @ self.y)[..., np.newaxis])[..., 0]
+        return gram, line, np.asarray((self.y * weight * (self.y - line @ self.columns.T)).sum(axis=-1))
 
 
-def fit_random_walks(base: LevelModel, at: Floats, kind: ShapeKind) -> RandomWalkFits:
-    """Fit lines whose level ("wander") or rate ("bend") is a random walk; at: dates, shape (n,)."""
-    points = _rotate_points(base, at, kind)
-    amounts = RATE_VARIANCES if kind == "bend" else LEVEL_VARIANCES
-    still, _, _ = points.solve(np.ones(at.size))
-    (evidence, variance), freedom = np.empty((2, len(amounts))), float(at.size - 2)
-    for j, amount in enumerate(amounts):
-        weight = 1 / (1 + amount * points.values)
-        gram, _, left = points.solve(weight)
-        tiny = np.finfo(float).tiny
-        rss = max(float(left), MIN_RESIDUAL_SHARE * base.residual_squares + tiny)
-        unsure = (np.log(weight).sum() + np.linalg.slogdet(gram)[1] - np.linalg.slogdet(still)[1]) / 2
-        evidence[j] = unsure - freedom / 2 * np.log(rss / (base.residual_squares + tiny))
-        variance[j] = rss / freedom
-    evidence += np.log(PRIOR_ODDS[kind]) - np.log(len(amounts)) - np.log(at.size) / 2
-    shapes = tuple(TrendShape(kind, 0.0, rate=amount) for amount in amounts)
-    return RandomWalkFits(shapes, evidence, variance, points, freedom)
+def fit_random_walks(base: LevelModel, at: Floats) -> list[RandomWalkFits]:
+    """Fit lines whose level or rate is a random walk, from the first point on and from later ones; at: dates (n,)."""
+    late = _late_starts(at)
+    starts = (
+        [late[i] for i in sorted({*np.linspace(0, len(late) - 1, N_LATE_WALKS).astype(int).tolist()})] if late else []
+    )
+    kinds: dict[ShapeKind, tuple[tuple[float, ...], list[float]]] = {
+        "wander": (LEVEL_VARIANCES, [0.0]),
+        "bend": (RATE_VARIANCES, [0.0]),
+        "late wander": (LATE_LEVEL_VARIANCES, starts),
+        "late bend": (LATE_RATE_VARIANCES, starts),
+    }
+    return [
+        _fit_random_walk(base, at, [TrendShape(kind, start, rate=amount) for amount in amounts], len(begins))
+        for kind, (amounts, begins) in kinds.items()
+        for start in begins
+    ]
 
 
-def _rotate_points(base: LevelModel, at: Floats, kind: ShapeKind) -> _RotatedPoints:
-    share, p = at / at[-1], base.columns.shape[1]
-    values, axes = np.linalg.eigh(_walk_covariance(kind == "bend", share, share))
+def _fit_random_walk(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], n_starts: int) -> RandomWalkFits:
+    """Fit random walks of one kind and one of its starts."""
+    points, freedom, tiny = _rotate_points(base, at, shapes[0]), float(at.size - 2), np.finfo(float).tiny
+    amounts = np.array([[shape.rate] for shape in shapes])
+    weight = 1 / (1 + np.concatenate([[[0.0]], amounts]) * points.values)
+    gram, _, left = points.solve(weight)
+    rss = np.maximum(left[1:], MIN_RESIDUAL_SHARE * base.residual_squares + tiny)
+    known = np.log(weight).sum(axis=1) + np.linalg.slogdet(gram)[1]
+    evidence = (known[1:] - known[0]) / 2 - freedom / 2 * np.log(rss / (base.residual_squares + tiny))
+    evidence += np.log(PRIOR_ODDS[shapes[0].kind] / (len(shapes) * n_starts)) - np.log(at.size) / 2
+    return RandomWalkFits(tuple(shapes), evidence, rss / freedom, points, freedom)
+
+
+def _rotate_points(base: LevelModel, at: Floats, shape: TrendShape) -> _RotatedPoints:
+    """Rotate the points after the start of a shape; those before stay as they are."""
+    span, p, is_bend = float(at[-1]), base.columns.shape[1], shape.kind.endswith("bend")
+    share = np.maximum((at - shape.start) / span, 0.0)
+    later = np.flatnonzero(share)
+    variances, axes = np.zeros(at.size), np.eye(at.size)
+    values, axes[np.ix_(later, later)] = np.linalg.eigh(_walk_covariance(is_bend, share[later], share[later]))
+    variances[later] = np.maximum(values, 0.0)
     prior = np.zeros((p + 1, p + 1))
     prior[:p, :p] = base.precision(np.array([at.size]))[0]
     columns = axes.T @ np.column_stack([base.columns, share])
-    variances, y, span = np.maximum(values, 0.0), axes.T @ base.y, float(at[-1])
-    return _RotatedPoints(kind, share, span, variances, axes, columns, y, prior)
+    return _RotatedPoints(is_bend, shape.start / span, share, span, variances, axes, columns, axes.T @ base.y, prior)
 
 
 def _walk_covariance(is_bend: bool, share: Floats, ahead: Floats) -> Floats:

@@ -23,7 +23,7 @@ from lobewatch.show.terminal.status_labels import status_label
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "
-    "One forecast in three or four misses a drop that slows down or grows exponentially."
+    "On public records of engines and a bearing, 18 % of the dates came before the 80 % range and 1 % after it."
 )
 """Note below every table of forecast dates."""
 TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")
@@ -192,6 +192,10 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
         "crash": f"{went} at once before {since}, also {goes} steadily",
         "wander": f"{goes} irregularly",
         "bend": f"{goes} at a changing rate",
+        "late wander": f"{goes} irregularly since {since}",
+        "late bend": f"{goes} at a changing rate since {since}",
+        "late curve": f"{goes} faster and faster since {since}",
+        "late runaway": f"{goes} faster and faster since {since}",
     }
     return words.get(shape.kind, f"{goes} {'faster and faster' if shape.accelerates else 'more and more slowly'}")
 

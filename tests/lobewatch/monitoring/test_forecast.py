@@ -30,7 +30,7 @@ def test_the_reference_series_reaches_3_percent_when_it_is_printed_to() -> None:
     )
     assert alone == pytest.approx(0.9997, abs=1e-4)
     assert (found.likeliest.kind, found.likeliest.start) == ("slope", 10.0)
-    np.testing.assert_allclose(np.array(found.crossing_dates(-3.0)) - 19, [6.85, 7.7, 8.4], atol=0.05)
+    np.testing.assert_allclose(np.array(found.crossing_dates(-3.0)) - 19, [6.66, 7.66, 8.5], atol=0.05)
 
 
 def test_dates_count_from_anywhere() -> None:
@@ -125,6 +125,90 @@ def test_equal_points_stay() -> None:
     assert found.crossing_dates(-1.5) == DateRange(np.inf, np.inf, np.inf)
     assert found.mean_line == pytest.approx(-1.0)
     assert found.likeliest.kind == "none"
+
+
+def late_wear(power: float) -> Floats:
+    """Steady for ten months of 24, then faster and faster, with a scatter of 0.01 %."""
+    return np.asarray(-(np.maximum(np.arange(24.0) - 10, 0) ** power) / 13**power + np.tile([0.01, -0.01], 12))
+
+
+@pytest.mark.parametrize("power", [2.0, 3.0])
+def test_wear_that_begins_late_and_accelerates_is_foretold_from_its_beginning(power: float) -> None:
+    found = forecast_series(np.arange(24.0), late_wear(power), 60.0)
+    curves = np.array([shape.kind in ("late curve", "late runaway") for shape in found.shapes])
+    heaviest = found.shapes[int(np.argmax(np.where(curves, found.weight, 0.0)))]
+    assert heaviest.accelerates
+    assert (heaviest.start, heaviest.power) == (10.0, power)
+    earliest, probable, latest = found.crossing_dates(-4.0)
+    truth = 10 + 13 * 4 ** (1 / power)
+    assert earliest < truth < latest
+    assert probable == pytest.approx(truth, abs=0.3)
+
+
+def test_a_late_curve_is_steady_before_its_start_and_has_its_power_after_it() -> None:
+    found = forecast_series(np.arange(24.0), late_wear(3.0), 60.0)
+    kinds = [(shape.kind, shape.start, shape.power) for shape in found.shapes]
+    one = kinds.index(("late curve", 10.0, 3.0))
+    column = np.maximum(np.arange(24.0) - 10, 0) ** 3
+    size, level = np.polyfit(column, late_wear(3.0), 1)
+    np.testing.assert_allclose(found.mean[one], level + size * (found.dates - 10) ** 3, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["late wander", "late bend"])
+def test_a_random_walk_from_a_point_on_is_predicted_by_generalized_least_squares(kind: str) -> None:
+    random = np.random.default_rng(8)
+    dates, start = np.arange(24.0), 12
+    y = random.normal(0, 0.1, 24)
+    y[start:] -= np.cumsum(np.abs(random.normal(0.5, 0.8, 12)))
+    found = forecast_series(dates, y, 60.0)
+    one = max((j for j, shape in enumerate(found.shapes) if shape.kind == kind), key=lambda j: found.weight[j])
+    shape = found.shapes[one]
+    share, ahead = (np.maximum(at - shape.start, 0) / 23 for at in (dates, found.dates))
+
+    def covariance(first: Floats, second: Floats) -> Floats:
+        low, high = np.minimum.outer(first, second), np.maximum.outer(first, second)
+        return low if kind == "late wander" else low**2 * (3 * high - low) / 6
+
+    spread = np.eye(24) + shape.rate * covariance(share, share)
+    design, wanted = np.column_stack([np.ones(24), share]), np.column_stack([np.ones(ahead.size), ahead])
+    gram = np.linalg.inv(design.T @ np.linalg.solve(spread, design))
+    line = gram @ design.T @ np.linalg.solve(spread, y)
+    lever = np.linalg.solve(spread, shape.rate * covariance(share, ahead)).T
+    variance = (y - design @ line) @ np.linalg.solve(spread, y - design @ line) / 22
+    away = wanted - lever @ design
+    own = shape.rate * np.diag(covariance(ahead, ahead)) - shape.rate * np.sum(lever * covariance(ahead, share), axis=1)
+    np.testing.assert_allclose(found.mean[one], wanted @ line + lever @ (y - design @ line), rtol=1e-6)
+    error = np.sqrt(variance * (own + np.sum(away @ gram * away, axis=1)))
+    np.testing.assert_allclose(found.error[one], error, rtol=1e-6)
+
+
+def test_what_is_quiet_and_then_erratic_has_a_wide_range() -> None:
+    random = np.random.default_rng(3)
+    y = random.normal(0, 0.05, 40)
+    y[25:] += np.cumsum(random.normal(-0.5, 1.0, 15))
+    found = forecast_series(np.arange(40.0), y, 100.0)
+    walks = np.array([shape.kind in ("late wander", "late bend") for shape in found.shapes])
+    assert found.weight[walks].sum() > 0.8
+    starts = np.array([shape.start for shape in found.shapes])
+    assert starts[walks] @ found.weight[walks] / found.weight[walks].sum() == pytest.approx(24.0, abs=3.0)
+    low, high = (found.quantile_line(quantile)[-1] for quantile in (0.1, 0.9))
+    assert high - low > 2 * np.ptp(y)
+
+
+def test_curves_that_run_far_away_leave_the_fan_its_quantiles_and_the_line_in_it() -> None:
+    y = np.array([0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, -0.2, -0.5, -0.9, -1.6])
+    found = forecast_series(np.arange(12.0), y, 60.0)
+    assert np.abs(found.mean).max() > 1e4
+    low, high = (found.quantile_line(quantile) for quantile in (0.1, 0.9))
+    for line, quantile in ((low, 0.1), (high, 0.9)):
+        assert found.probability(line) == pytest.approx(quantile, abs=1e-6)
+    assert np.all((low < found.mean_line) & (found.mean_line < high))
+
+
+def test_many_tests_on_the_last_date_are_forecast() -> None:
+    dates = np.concatenate([np.arange(12.0), np.full(6, 12.0)])
+    found = forecast_series(dates, -0.1 * dates + np.tile([0.02, -0.02], 9), 30.0)
+    assert found.crossing_dates(-2.0).probable == pytest.approx(20.0, abs=1.5)
 
 
 class Told(NamedTuple):

@@ -35,6 +35,8 @@ FLOORS = {
     "saturating": 0,
 }
 """Least share (%) over the three designs together."""
+LATE_FLOORS = {"late power": 65, "late exponential": 50, "late run-away": 75}
+"""The same for wear that begins late and accelerates."""
 STEADY = ("none", "step", "settled")
 TODAY = ("none", "line", "slope", "step", "curve")
 """Shapes without changes of rate, crashes, wandering and run-away."""
@@ -62,6 +64,15 @@ def fall_of(course: str, r: Random, span: float, end: float) -> Callable[[Floats
     def scaled(curve: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
         return lambda t: np.asarray(LEVEL * curve(t) / curve(np.array([end]))[0])
 
+    other = r.spawn(1)[0]  # leaves the histories of the other courses as they are
+    onset, late_power, growth = (other.uniform(*limits) for limits in ((0.2, 0.75), (1.5, 4.0), (1.0, 4.0)))
+
+    def elapsed(t: Floats) -> Floats:
+        """Time since the onset over that from there to the last test."""
+        return np.asarray(np.maximum(t / span - onset, 0) / (1 - onset))
+
+    failure = float(elapsed(np.array([end]))[0]) * last / end
+
     courses: dict[str, Callable[[Floats], Floats]] = {
         "line": scaled(lambda t: t),
         "broken line": scaled(lambda t: np.maximum(t - bend, 0)),
@@ -71,6 +82,9 @@ def fall_of(course: str, r: Random, span: float, end: float) -> Callable[[Floats
         "run-away": scaled(lambda t: (1 - t / last) ** -power - 1),
         "exponential": scaled(lambda t: np.asarray(np.expm1(rate * t))),
         "saturating": scaled(lambda t: np.asarray(-np.expm1(-rate * t))),
+        "late power": scaled(lambda t: elapsed(t) ** late_power),
+        "late exponential": scaled(lambda t: np.asarray(np.expm1(growth * elapsed(t)))),
+        "late run-away": scaled(lambda t: (1 - elapsed(t) / failure) ** -power - 1),
         "none": lambda t: 0 * t,
         "step": lambda t: (t > bend).astype(np.float64),
         "settled": lambda t: np.asarray(-0.5 * np.expm1(-t / 3)),
@@ -131,12 +145,12 @@ def share_held(pairs: list[tuple[History, DateRange]]) -> float:
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("course", FLOORS)
+@pytest.mark.parametrize("course", [*FLOORS, *LATE_FLOORS])
 def test_80_percent_ranges_hold_the_date_of_a_trend(course: str) -> None:
     pairs = study(course, 300)
     designs = [share_held(pairs[300 * n : 300 * (n + 1)]) for n in range(3)]
     print(course, *(f"{share:.0f}" for share in designs))  # noqa: T201
-    assert share_held(pairs) >= FLOORS[course]
+    assert share_held(pairs) >= (FLOORS | LATE_FLOORS)[course]
 
 
 @pytest.mark.long
@@ -170,3 +184,11 @@ def test_the_range_of_a_straight_line_is_at_most_1_6_times_as_wide(design: str) 
 def test_most_ranges_hold_the_date_whatever_the_trend() -> None:
     pairs = [pair for course in FLOORS for pair in study(course, 3)]
     assert share_held(pairs) >= 60
+
+
+def test_most_ranges_hold_the_date_of_wear_that_begins_late() -> None:
+    pasts = []
+    for course in LATE_FLOORS:
+        r = np.random.default_rng([33, *course.encode()])
+        pasts += [history(course, "24 monthly, 0.3 %", r) for _ in range(8)]
+    assert share_held([(past, foretold(past).crossing_dates(-LEVEL)) for past in pasts]) >= 65

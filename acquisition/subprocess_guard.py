@@ -15,7 +15,7 @@ SUBPROCESS_TIMEOUT = 60.0
 
 
 def run_in_subprocess(
-    module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT, content: bytes | None = None
+    module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT, content: bytes | bytearray | None = None
 ) -> bytes:
     """Run a module in a subprocess with the same import path and `content` as input, and return its standard output.
 

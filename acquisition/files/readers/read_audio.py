@@ -69,7 +69,8 @@ def decode_audio(content: bytes, name: str, max_seconds: float = math.inf) -> tu
     except (DataError, MemoryError):
         raise
     except Exception as error:
-        raise DataError(f"{name}: damaged, truncated or unsupported audio file ({error}). Export WAV.") from error
+        fault = getattr(error, "error_string", error)  # that of soundfile has no address of its input
+        raise DataError(f"{name}: damaged, truncated or unsupported audio file ({fault}). Export WAV.") from error
 
 
 def _decode_wav(content: bytes) -> tuple[float, Floats]:

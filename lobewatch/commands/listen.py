@@ -2,27 +2,47 @@
 
 import contextlib
 import itertools
+import time
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Never, Unpack
 
 from typer import Option
 
-from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options, rpm
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
+from lobewatch.commands.shared_options import (
+    CutDate,
+    CutDepth,
+    CutPower,
+    FileOptions,
+    FolderArgument,
+    add_file_options,
+    rpm,
+)
+from lobewatch.show.terminal.output import (
+    HttpPort,
+    Json,
+    Listen,
+    Token,
+    WatchToken,
+    emit,
+    notes,
+    print_remarks,
+    show_address,
+)
 
 if TYPE_CHECKING:
     from acquisition.files.cut_file import CutSignal
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
+    from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
 
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
-    machine: Machine,
+    machine: Annotated[Path | None, FolderArgument(help="Machine folder. Not with --page.")] = None,
     program: Annotated[str, Option(help="Program name.")] = "",
     cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
     speed: Annotated[
@@ -42,7 +62,9 @@ def listen(
     dry_run: Annotated[bool, Option("--dry-run", help="Show the result without storing it.")] = False,
     out: Annotated[Path | None, Option(help="Spectrum figure (.svg, .png, .pdf).")] = None,
     screen: Annotated[bool, Option("--screen", help="Show the result in a browser too.")] = False,
+    page: Annotated[bool, Option("--page", help="Serve a page that takes recordings of a phone.")] = False,
     listen: Listen = "127.0.0.1",
+    http_port: HttpPort = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     *,
@@ -62,7 +84,12 @@ def listen(
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
       lobewatch listen mill-3 --program A --file cut.flac --sensor microphone
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
+      lobewatch listen --page --listen 0.0.0.0 --http-port 8080
     """
+    if page:
+        _serve_page(machine, as_json, listen=listen, port=http_port, token=token, watch_token=watch_token)
+    if machine is None:
+        raise ValueError("no machine folder. Name a machine folder, or use --page.")
     from lobewatch.logbook import Logbook
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
@@ -94,6 +121,18 @@ def listen(
             emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
+
+
+def _serve_page(machine: Path | None, as_json: bool, **options: "Unpack[ServerOptions]") -> Never:
+    """Serve the page that takes recordings of a phone, until Ctrl-C."""
+    if machine is not None:
+        raise ValueError(f"--page evaluates without a machine folder. Leave out {machine}.")
+    from lobewatch.screen import PhoneServer  # imports aiohttp
+
+    with PhoneServer(**options) as server:
+        show_address(server.url, server.watch_url, as_json)
+        while True:
+            time.sleep(1)
 
 
 def _store(

@@ -62,10 +62,9 @@ def decode_audio(content: bytes, name: str, max_seconds: float = math.inf) -> tu
     try:
         if _is_wav(content[:12]) and _wav_sample_tag(content) in WAV_SAMPLE_TAGS:
             return _decode_wav(content)
-        demuxer = _find_demuxer(content[:12])
-        if demuxer:
-            return _decode_by_av(content, demuxer, name, max_seconds)
-        return _decode_by_soundfile(content, name, max_seconds)
+        decode = _decode_by_av if _find_demuxer(content[:12]) else _decode_by_soundfile
+        rate, columns = decode(content, name, max_seconds)
+        return rate, np.clip(columns, -1.0, 1.0)  # lossy coding overshoots the rails of a clipped recording
     except (DataError, MemoryError):
         raise
     except Exception as error:
@@ -98,14 +97,14 @@ def _decode_by_soundfile(content: bytes, name: str, max_seconds: float) -> tuple
         return float(file.samplerate), file.read(count, dtype="float64", always_2d=True).T
 
 
-def _decode_by_av(content: bytes, demuxer: str, name: str, max_seconds: float) -> tuple[float, Floats]:
+def _decode_by_av(content: bytes, name: str, max_seconds: float) -> tuple[float, Floats]:
     try:
         import av
     except ImportError as error:
         cure = 'Export WAV, or install the package with pip install "lobewatch[phone]".'
         raise MissingDecoderError(f"{name}: M4A and WebM need the package av. {cure}") from error
     pieces, count = list[Floats](), 0
-    with av.open(io.BytesIO(content), format=demuxer) as container:
+    with av.open(io.BytesIO(content), format=_find_demuxer(content[:12])) as container:
         if not container.streams.audio:
             raise DataError(f"{name}: no sound track. Choose a recording with sound.")
         stream, resampler = container.streams.audio[0], av.AudioResampler(format="fltp")

@@ -97,7 +97,8 @@ def evaluate_upload(content: bytes | bytearray, cut: UploadedCut) -> JsonObject:
     """
     try:
         entered = msgspec.json.encode(cut).decode()
-        output = run_in_subprocess(__name__, entered, patience=MAX_WAIT_SECONDS, content=content)
+        limits = str(MAX_CPU_SECONDS), str(MAX_MEMORY)
+        output = run_in_subprocess(__name__, entered, *limits, patience=MAX_WAIT_SECONDS, content=content)
     except subprocess.TimeoutExpired:
         return _too_slow()
     except subprocess.CalledProcessError as error:
@@ -125,7 +126,7 @@ def main() -> None:
     """Write the result of the recording on standard input to standard output as JSON."""
     cut = msgspec.json.decode(sys.argv[1], type=UploadedCut)
     content = sys.stdin.buffer.read()
-    limit_resources(MAX_CPU_SECONDS, MAX_MEMORY)
+    limit_resources(*map(float, sys.argv[2:]))
     sys.stdout.write(json.dumps(with_option_names_inside(_evaluate(content, cut))))
 
 

@@ -13,10 +13,11 @@ from lobewatch.cuts.chatter_detection import peak_classification as classificati
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
-from lobewatch.machine.journal.entries import CutVerdict
+from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
@@ -67,6 +68,10 @@ class CutEvaluation(NamedTuple):
     """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
     """Tachometer speed in the cut (rpm), NaN without pulses there; None without a tachometer."""
+    part_verdicts: tuple[PartVerdict, ...] = ()
+    """Verdicts on the parts of the cut in turn, from the beginning of the recording; empty without a cut."""
+    ripple: Ripple | None = None
+    """Ripple of loudness or speed; None if the cut is steady."""
 
     @property
     def speed_rpm(self) -> float:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
+from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
 from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -25,6 +25,8 @@ MIN_SINGLE_PEAK_ENERGY = 1e-2
 """Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
 MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
+MIN_CHATTER_OVER_RIPPLE = 1.5
+"""Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
@@ -116,7 +118,8 @@ def evaluate_cut(
     speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
-    axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
+    cut, spectra, quiet, speed = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
     sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
@@ -126,11 +129,28 @@ def evaluate_cut(
     return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
 
 
+def _even_speed(
+    cut: Floats, spectra: Spectra, quiet: Spectra, speed: SpindleSpeed
+) -> tuple[Floats, Spectra, Spectra, SpindleSpeed]:
+    """Sample a cut at equal angles if its speed ripples."""
+    envelopes = load_ripple.follow_multiples(cut, spectra, speed.frequency)
+    ahead = load_ripple.find_deviation(envelopes)
+    if not ahead.size:
+        return cut, spectra, quiet, speed
+    rate, times = spectra[0].sample_rate, np.arange(ahead.size) / envelopes.rate
+    deviation = rate * np.interp(np.arange(cut.shape[1]) / rate, times, ahead)
+    even = load_ripple.sample_evenly(cut, deviation)
+    spectra = spectral.compute_spectra(even, rate)
+    peaks = classification.find_cut_peaks(spectra, quiet).loudest(MAX_COMB_PEAKS)
+    refined = refine_comb(speed.frequency, peaks, spectra[0].bin_width)
+    return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed
+
+
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
+    peaks = spectral.find_separate_peaks(spectrum)
     unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
 
     def evaluate(quiet: Spectrum) -> CutEvaluation:
@@ -191,6 +211,11 @@ def _evaluate_peaks(
     peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
+    left = peaks.unexplained
+    if len(left) and len(peaks.comb):
+        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
+        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
+        peaks = peaks._replace(unexplained=left[~is_ripple])
     sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:

@@ -4,15 +4,18 @@ The thresholds of this folder were chosen on simulated cuts, with other random n
 (docs/studies/cuts.md, How often it is right).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
+from lobewatch.cuts.chatter_detection import cut_windows as windowing
 from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
@@ -27,6 +30,8 @@ MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
+MIN_STABLE_SHARE = 0.5
+"""Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
@@ -89,17 +94,18 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
+    known: SpindleSpeed | None = None,
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
-    ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
-    of the axis with the loudest chatter, else of that with the loudest cut. Reasons without a verdict:
-    "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
-    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
-    "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
-    recorded, folded ones too).
+    ("tacho-contradicts"); None without one; known: speed in another part of the cut, which is tried first. All axes
+    have one speed, and the verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that
+    with the loudest cut. Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there
+    in air make a speed, which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked
+    to the spindle), "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three
+    harmonics of tooth passing are recorded, folded ones too).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
@@ -115,7 +121,9 @@ def evaluate_cut(
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
     quiet = spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    speed = None if known is None or is_measured else spindle_speed.follow_speed(spectra, quiet, known)
+    if speed is None:
+        speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
     cut, spectra, quiet, speed = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
@@ -289,10 +297,74 @@ def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     Reasons without a verdict are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
     cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
-    return [_evaluate_parts(recording, parts) for parts in cuts]
+    return [_evaluate_windows(recording, parts) for parts in cuts]
 
 
-def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+MAX_SPEED_SEARCHES = 3
+"""Number of windows of a cut in which its speed is searched from the set speed; chosen."""
+
+
+def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+    """Evaluate all windows of a cut, the last one first, as its speed is known then; the worst one decides."""
+    last = _evaluate_window(recording, parts, None)
+    if parts.reason in ("too-short", "no-air") or last.reason == "lost-scans":
+        return last
+    rate, known, n_searches = recording.sample_rate, last.spindle_speed, 1
+    places = windowing.place_windows(parts, rate)
+    heard = [last]
+    for place in reversed(places[:-1]):
+        if known is None and n_searches == MAX_SPEED_SEARCHES:
+            break
+        n_searches += known is None
+        sound = _evaluate_window(recording, parts._replace(cut=place, reason=""), known)
+        known = sound.spindle_speed or known
+        heard.insert(0, sound)
+    heard = _settle_contradictions(recording, parts, heard)
+    axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
+    return _worst_window(heard)._replace(part_verdicts=joined)
+
+
+def _summarize(sound: CutEvaluation) -> HeardWindow:
+    """Return what the parts of a cut need to know about a window."""
+    chatter = sound.chatter
+    if chatter is None:
+        return HeardWindow(sound.parts.cut, sound.verdict)
+    return HeardWindow(sound.parts.cut, sound.verdict, chatter.frequency, chatter.peaks.energy**0.5, sound.axis)
+
+
+def _settle_contradictions(
+    recording: CutRecording, parts: CutParts, heard: Sequence[CutEvaluation]
+) -> list[CutEvaluation]:
+    """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
+
+    Chatter counts if one of the two has it, too, else they replace it.
+    """
+    chatters = [sound.chatter is not None for sound in heard]
+    settled = list(heard)
+    for i, sound in enumerate(heard):
+        beside = chatters[max(i - 1, 0) : i] + chatters[i + 1 : i + 2]
+        if not beside or chatters[i] in beside or sound.verdict == "cannot tell":
+            continue
+        shifts = (-windowing.WINDOW_STEP / 2, windowing.WINDOW_STEP / 2)
+        places = [windowing.shift_window(sound.parts.cut, parts, recording.sample_rate, shift) for shift in shifts]
+        again = [_evaluate_window(recording, sound.parts._replace(cut=at), sound.spindle_speed) for at in places]
+        if not any((other.chatter is not None) == chatters[i] for other in again):
+            settled[i] = again[0]._replace(parts=sound.parts)
+    return settled
+
+
+def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
+    """Return the window that decides: the loudest chatter, else the last one, if it is as most of them are."""
+    worst = max(heard, key=_rank_evidence)
+    if worst.chatter is not None:
+        return worst
+    stable = [sound for sound in heard if sound.verdict == "stable"]
+    return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
+
+
+def _evaluate_window(recording: CutRecording, parts: CutParts, known: SpindleSpeed | None) -> CutEvaluation:
+    """Evaluate the samples `cut` of parts; known: speed in another window."""
     reason = _find_signal_fault(recording, parts)
     if reason and reason != "no-air":
         return CutEvaluation("cannot tell", reason, parts)
@@ -300,7 +372,7 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     air = axes[:, slice(0, 0) if reason else parts.air]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
-    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
+    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured, known)
     return sound._replace(parts=parts, measured_rpm=measured)
 
 

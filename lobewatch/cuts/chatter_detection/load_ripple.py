@@ -88,7 +88,7 @@ MIN_AGREEING_CARRIERS = 3
 MIN_DEVIATION = 2e-6
 """Smallest standard deviation of the turning of the spindle from an even one (s): 4 degrees at 5 kHz; chosen."""
 MAX_SPEED_RIPPLE = 5e-3
-"""Largest relative change of the speed of a spindle in a cut, beyond which the phases are not those of a comb; chosen."""
+"""Largest relative change of the speed of a spindle in a cut, beyond which the phases are of no comb; chosen."""
 N_DEVIATION_STEPS = 3
 """Number of steps in which the common turning is found; chosen."""
 EDGE_BANDS = 1.5

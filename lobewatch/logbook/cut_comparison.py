@@ -74,8 +74,8 @@ class CutComparison:
         tapped = () if self.assembly is None else (*(self.assembly.x or ()), *(self.assembly.y or ()))
         return min((mode.frequency for mode in tapped), key=lambda mode: abs(mode - frequency), default=None)
 
-    def to_recorded_cut(self, at: datetime) -> CutEntry:
-        """Make the journal entry of a cut made at a time (UTC)."""
+    def to_recorded_cut(self, at: datetime, begin: float = 0.0) -> CutEntry:
+        """Make the journal entry of a cut made at a time (UTC); begin: of its part of the recording (s)."""
         chatter = self.detected.chatter
         return CutEntry(
             "",
@@ -87,6 +87,7 @@ class CutComparison:
             by=self.sensor,
             software=lobewatch_version(),
             reason=self.detected.reason,
+            parts=tuple(part.shift(-begin) for part in self.detected.part_verdicts),
         )
 
 
@@ -113,6 +114,6 @@ def store_recorded_cuts(
     parts = [comparison.detected.parts for comparison in comparisons]
     begins, ends = [0.0, *(part.end for part in parts[:-1])], [*(part.begin for part in parts[1:]), signal.duration]
     return [
-        store_cut(folder, comparison.to_recorded_cut(time), signal.slice_time(begin, end))
+        store_cut(folder, comparison.to_recorded_cut(time, begin), signal.slice_time(begin, end))
         for comparison, begin, end in zip(comparisons, begins, ends, strict=True)
     ]

@@ -4,19 +4,23 @@ The thresholds of this folder were chosen on simulated cuts, with other random n
 (docs/studies/cuts.md, How often it is right).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
+from lobewatch.cuts.chatter_detection import cut_windows as windowing
+from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection import spindle_speed
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
-from lobewatch.machine.journal.entries import CutVerdict
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
+from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
@@ -24,6 +28,10 @@ MIN_SINGLE_PEAK_ENERGY = 1e-2
 """Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
 MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
+MIN_CHATTER_OVER_RIPPLE = 1.5
+"""Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
+MIN_STABLE_SHARE = 0.5
+"""Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
@@ -67,6 +75,10 @@ class CutEvaluation(NamedTuple):
     """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
     """Tachometer speed in the cut (rpm), NaN without pulses there; None without a tachometer."""
+    part_verdicts: tuple[PartVerdict, ...] = ()
+    """Verdicts on the parts of the cut in turn, from the beginning of the recording; empty without a cut."""
+    ripple: Ripple | None = None
+    """Ripple of loudness or speed; None if the cut is steady."""
 
     @property
     def speed_rpm(self) -> float:
@@ -82,17 +94,18 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
+    known: SpindleSpeed | None = None,
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
-    ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
-    of the axis with the loudest chatter, else of that with the loudest cut. Reasons without a verdict:
-    "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
-    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
-    "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
-    recorded, folded ones too).
+    ("tacho-contradicts"); None without one; known: speed in another part of the cut, which is tried first. All axes
+    have one speed, and the verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that
+    with the loudest cut. Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there
+    in air make a speed, which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked
+    to the spindle), "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three
+    harmonics of tooth passing are recorded, folded ones too).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
@@ -108,10 +121,13 @@ def evaluate_cut(
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
     quiet = spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    speed = None if known is None or is_measured else spindle_speed.follow_speed(spectra, quiet, known)
+    if speed is None:
+        speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
-    axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
+    cut, spectra, quiet, speed = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
     sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
@@ -121,11 +137,28 @@ def evaluate_cut(
     return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
 
 
+def _even_speed(
+    cut: Floats, spectra: Spectra, quiet: Spectra, speed: SpindleSpeed
+) -> tuple[Floats, Spectra, Spectra, SpindleSpeed]:
+    """Sample a cut at equal angles if its speed ripples."""
+    envelopes = load_ripple.follow_multiples(cut, spectra, speed.frequency)
+    ahead = load_ripple.find_deviation(envelopes)
+    if not ahead.size:
+        return cut, spectra, quiet, speed
+    rate, times = spectra[0].sample_rate, np.arange(ahead.size) / envelopes.rate
+    deviation = rate * np.interp(np.arange(cut.shape[1]) / rate, times, ahead)
+    even = load_ripple.sample_evenly(cut, deviation)
+    spectra = spectral.compute_spectra(even, rate)
+    peaks = classification.find_cut_peaks(spectra, quiet).loudest(MAX_COMB_PEAKS)
+    refined = refine_comb(speed.frequency, peaks, spectra[0].bin_width)
+    return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed
+
+
 def _evaluate_axis(
     cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
+    peaks = spectral.find_separate_peaks(spectrum)
     unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
 
     def evaluate(quiet: Spectrum) -> CutEvaluation:
@@ -186,6 +219,11 @@ def _evaluate_peaks(
     peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
 ) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
+    left = peaks.unexplained
+    if len(left) and len(peaks.comb):
+        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
+        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
+        peaks = peaks._replace(unexplained=left[~is_ripple])
     sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
@@ -259,10 +297,74 @@ def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     Reasons without a verdict are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
     """
     cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
-    return [_evaluate_parts(recording, parts) for parts in cuts]
+    return [_evaluate_windows(recording, parts) for parts in cuts]
 
 
-def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+MAX_SPEED_SEARCHES = 3
+"""Number of windows of a cut in which its speed is searched from the set speed; chosen."""
+
+
+def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+    """Evaluate all windows of a cut, the last one first, as its speed is known then; the worst one decides."""
+    last = _evaluate_window(recording, parts, None)
+    if parts.reason in ("too-short", "no-air") or last.reason == "lost-scans":
+        return last
+    rate, known, n_searches = recording.sample_rate, last.spindle_speed, 1
+    places = windowing.place_windows(parts, rate)
+    heard = [last]
+    for place in reversed(places[:-1]):
+        if known is None and n_searches == MAX_SPEED_SEARCHES:
+            break
+        n_searches += known is None
+        sound = _evaluate_window(recording, parts._replace(cut=place, reason=""), known)
+        known = sound.spindle_speed or known
+        heard.insert(0, sound)
+    heard = _settle_contradictions(recording, parts, heard)
+    axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
+    return _worst_window(heard)._replace(part_verdicts=joined)
+
+
+def _summarize(sound: CutEvaluation) -> HeardWindow:
+    """Return what the parts of a cut need to know about a window."""
+    chatter = sound.chatter
+    if chatter is None:
+        return HeardWindow(sound.parts.cut, sound.verdict)
+    return HeardWindow(sound.parts.cut, sound.verdict, chatter.frequency, chatter.peaks.energy**0.5, sound.axis)
+
+
+def _settle_contradictions(
+    recording: CutRecording, parts: CutParts, heard: Sequence[CutEvaluation]
+) -> list[CutEvaluation]:
+    """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
+
+    Chatter counts if one of the two has it, too, else they replace it.
+    """
+    chatters = [sound.chatter is not None for sound in heard]
+    settled = list(heard)
+    for i, sound in enumerate(heard):
+        beside = chatters[max(i - 1, 0) : i] + chatters[i + 1 : i + 2]
+        if not beside or chatters[i] in beside or sound.verdict == "cannot tell":
+            continue
+        shifts = (-windowing.WINDOW_STEP / 2, windowing.WINDOW_STEP / 2)
+        places = [windowing.shift_window(sound.parts.cut, parts, recording.sample_rate, shift) for shift in shifts]
+        again = [_evaluate_window(recording, sound.parts._replace(cut=at), sound.spindle_speed) for at in places]
+        if not any((other.chatter is not None) == chatters[i] for other in again):
+            settled[i] = again[0]._replace(parts=sound.parts)
+    return settled
+
+
+def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
+    """Return the window that decides: the loudest chatter, else the last one, if it is as most of them are."""
+    worst = max(heard, key=_rank_evidence)
+    if worst.chatter is not None:
+        return worst
+    stable = [sound for sound in heard if sound.verdict == "stable"]
+    return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
+
+
+def _evaluate_window(recording: CutRecording, parts: CutParts, known: SpindleSpeed | None) -> CutEvaluation:
+    """Evaluate the samples `cut` of parts; known: speed in another window."""
     reason = _find_signal_fault(recording, parts)
     if reason and reason != "no-air":
         return CutEvaluation("cannot tell", reason, parts)
@@ -270,7 +372,7 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     air = axes[:, slice(0, 0) if reason else parts.air]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
-    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
+    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured, known)
     return sound._replace(parts=parts, measured_rpm=measured)
 
 

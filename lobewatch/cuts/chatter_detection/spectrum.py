@@ -162,3 +162,10 @@ def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPea
     shift = 0.5 * (before - after) / np.where(bend < 0, bend, -1.0)
     amplitude = np.sqrt(np.exp(top - 0.25 * (before - after) * shift))
     return SpectralPeaks((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
+
+
+def find_separate_peaks(spectrum: Spectrum, distance: float = 0.0) -> SpectralPeaks:
+    """Find peaks without those on the skirts of others; distance: from any louder peak, at least (Hz)."""
+    peaks = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
+    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency) < distance
+    return peaks[~np.any(apart & (peaks.amplitude > peaks.amplitude[:, np.newaxis]), axis=1)]

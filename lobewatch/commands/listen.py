@@ -3,10 +3,10 @@
 import contextlib
 import itertools
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Never, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Never, Unpack
 
 from typer import Option
 
@@ -15,6 +15,7 @@ from lobewatch.commands.shared_options import (
     CutDepth,
     CutPower,
     FileOptions,
+    Flutes,
     FolderArgument,
     add_file_options,
     rpm,
@@ -32,9 +33,11 @@ from lobewatch.show.terminal.output import (
 )
 
 if TYPE_CHECKING:
+    from acquisition import Description
     from acquisition.files.cut_file import CutSignal
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
+    from lobewatch.logbook.heard_cuts import FileRequest
     from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
@@ -42,7 +45,9 @@ if TYPE_CHECKING:
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
-    machine: Annotated[Path | None, FolderArgument(help="Machine folder. Not with --page.")] = None,
+    machine: Annotated[
+        Path | None, FolderArgument(help="Machine folder, or a recorded cut of any machine. Not with --page.")
+    ] = None,
     program: Annotated[str, Option(help="Program name.")] = "",
     cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
     speed: Annotated[
@@ -50,6 +55,10 @@ def listen(
     ] = None,
     depth: CutDepth = None,
     power: CutPower = None,
+    teeth: Flutes = None,
+    speeds: Annotated[
+        str, Option(help='Speeds of the machine (rpm): "8000 24000". Default: 0.5 to 1.5 times --speed.')
+    ] = "",
     file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,
     date: CutDate = None,
     sensor: Annotated[str, Option(help="Sensor of --file: accelerometer or microphone (no unit).")] = ("accelerometer"),
@@ -76,8 +85,11 @@ def listen(
     Start with the spindle running in air, then cut for at least one second. The recording and its result are stored.
     lobewatch exclude takes the cut out of all results.
 
+    A recorded cut instead of a machine folder needs --teeth and --speed. The result is not stored.
+
     Examples
     --------
+      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds "8000 24000" --depth 1
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
@@ -89,12 +101,20 @@ def listen(
     if page:
         _serve_page(machine, as_json, listen=listen, port=http_port, token=token, watch_token=watch_token)
     if machine is None:
-        raise ValueError("no machine folder. Name a machine folder, or use --page.")
+        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.heard_cuts import FileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
     from lobewatch.tap import cut_recording as recorder
 
+    if _is_recording(machine):
+        others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
+        _reject_options(others | {"date": date}, "needs a machine folder")
+        description = file_options.description(tacho=tacho, pulses=pulses)
+        _listen_to_file(machine, description, FileRequest(teeth, speed, depth, speeds), out, as_json)
+        return
+    _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
     if not dry_run:
@@ -133,6 +153,35 @@ def _serve_page(machine: Path | None, as_json: bool, **options: "Unpack[ServerOp
         show_address(server.url, server.watch_url, as_json)
         while True:
             time.sleep(1)
+
+
+def _is_recording(path: Path) -> bool:
+    """Return whether the first argument is a recorded cut, or the name of one that does not exist."""
+    return path.is_file() or (bool(path.suffix) and not path.exists())
+
+
+def _reject_options(options: Mapping[str, Any], problem: str) -> None:
+    """Raise ValueError for any option that is given."""
+    for name, value in options.items():
+        if value not in (None, "", False):
+            raise ValueError(f"--{name} {problem}. Leave out this option.")
+
+
+def _listen_to_file(
+    path: Path, description: "Description", request: "FileRequest", out: Path | None, as_json: bool
+) -> None:
+    """Evaluate a recorded cut of an unknown machine, and show the next speeds."""
+    from lobewatch.logbook.heard_cuts import hear_file
+    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+
+    comparisons, found = hear_file(path, description, request)
+    if out is not None:
+        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
+
+        save_cut_spectrum(comparisons, out)
+    payload = recording_json(comparisons) | next_speeds_json(found)
+    emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
 
 
 def _store(

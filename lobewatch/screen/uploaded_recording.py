@@ -1,7 +1,6 @@
 """Evaluate the recording of a cut that a browser sent, in a subprocess with limits on length, time and memory."""
 
 import json
-import math
 import signal
 import subprocess
 import sys
@@ -11,17 +10,18 @@ import msgspec
 import numpy as np
 
 from acquisition import DataError
-from acquisition.errors import join_sentences
 from acquisition.files.cut_file import CutSignal
+from acquisition.files.read_cut import MICROPHONE_SENSOR
 from acquisition.files.readers.read_audio import MissingDecoderError, decode_audio
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 from lobewatch.arrays import Floats
-from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
-from lobewatch.cuts.learning.next_speed import UNKNOWN_IMMERSION, HeardRecording, hear_recording
+from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
+from lobewatch.logbook.heard_cuts import FileRequest, hear_signal
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
-from lobewatch.show.cuts.recorded_cuts import FAULTS
+from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+from lobewatch.show.cuts.recorded_cuts import reason_text, recorded_cut_json, recording_texts
 from lobewatch.show.terminal.option_names import with_option_names_inside
 from lobewatch.show.terminal.output import JsonObject
 
@@ -56,9 +56,15 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Axial depth of cut (mm)."""
 
     @property
-    def range_rpm(self) -> tuple[float, float] | None:
-        """Speed range of the machine (rpm); None unless both ends are known."""
-        return None if self.low_rpm is None or self.high_rpm is None else (self.low_rpm, self.high_rpm)
+    def range_rpm(self) -> tuple[float, float]:
+        """Speed range of the machine (rpm), an unknown end from `ASSUMED_RANGE`."""
+        low, high = (share * self.speed_rpm for share in ASSUMED_RANGE)
+        return low if self.low_rpm is None else self.low_rpm, high if self.high_rpm is None else self.high_rpm
+
+    @property
+    def request(self) -> FileRequest:
+        """The same facts as of a recording on the command line."""
+        return FileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
 
 
 LABELS = {
@@ -85,8 +91,10 @@ def parse_uploaded_cut(query: Mapping[str, str]) -> UploadedCut:
         value = getattr(cut, key)
         if value is not None and not low <= value <= high:
             raise ValueError(f"{LABELS[key]} {value:g} is not from {low:g} to {high:g}. Correct this value.")
-    if cut.range_rpm is not None and not cut.range_rpm[0] < cut.range_rpm[1]:
-        raise ValueError(f"lowest speed {cut.low_rpm:g} is not below the highest speed. Correct one of them.")
+    low, high = cut.range_rpm
+    if not (low <= cut.speed_rpm <= high and low < high):
+        text = f"speed {cut.speed_rpm:g} is not between the lowest speed {low:g} and the highest speed {high:g}"
+        raise ValueError(f"{text}. Correct one of them.")
     return cut
 
 
@@ -159,30 +167,13 @@ def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
 
 def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
     loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
-    clipped = CutSignal(loudest, rate, sensor="microphone").clipped
-    recording = CutRecording(loudest, rate, cut.teeth, UNKNOWN_IMMERSION, cut.speed_rpm, clipped)
-    depth = math.nan if cut.depth_mm is None else cut.depth_mm / 1e3
-    return _describe(hear_recording(recording, cut.range_rpm, depth))
-
-
-def _describe(heard: HeardRecording) -> JsonObject:
-    """Return the verdict on the last cut, the next speeds, and texts for people."""
-    cut = heard.evaluations[-1]
-    fault = FAULTS.get(cut.reason)
-    speeds = [
-        {"speed_rpm": speed.speed_rpm, "text": f"{speed.lobe} waves between two teeth"}
-        for speed in heard.next_speeds.speeds[:5]
-    ]
-    return {
-        "verdict": cut.verdict,
-        "reason": cut.reason,
-        "chatter_frequency_hz": None if cut.chatter is None else cut.chatter.frequency,
-        "finding": "" if fault is None else join_sentences(*fault),
-        "next_reason": heard.next_speeds.reason,
-        "next_text": "",
-        "next_speeds": speeds,
-        "texts": [],
-    }
+    comparisons, found = hear_signal(CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR), "recording", cut.request)
+    newest = comparisons[-1]
+    texts = [text for text in recording_texts(comparisons) if isinstance(text, str)]
+    finding = reason_text(newest) if newest.detected.verdict == "cannot tell" else ""
+    sentence, *_ = [text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)]
+    more = {"finding": finding, "texts": texts, "next_text": sentence}
+    return recorded_cut_json(newest) | next_speeds_json(found) | more
 
 
 if __name__ == "__main__":

@@ -39,11 +39,19 @@ function startClock() {
   return setInterval(tick, 1000);
 }
 
-function speedItem({ speed_rpm: speed, text }) {
+const grouped = (value) => Math.round(value).toLocaleString("en").replaceAll(",", " ");
+
+function expectation({ depth_mm: depth, relative_depth: gain, window_rpm: [low, high] }) {
+  const deeper = `${gain < 10 ? gain.toFixed(1) : "10 or more"} times the stable depth of here`;
+  return `${depth === null ? "" : `${depth} mm deep, `}${deeper}, stable from ${grouped(low)} to ${grouped(high)} rpm`;
+}
+
+function speedItem(next) {
   const button = Object.assign(document.createElement("button"), { type: "button" });
-  button.append(element("b", `${Math.round(speed).toLocaleString("en").replaceAll(",", " ")} rpm`), element("span", text));
+  button.append(element("b", `${grouped(next.speed_rpm)} rpm`), element("span", expectation(next)));
   button.addEventListener("click", () => {
-    at("speed_rpm").value = Math.round(speed);
+    at("speed_rpm").value = Math.round(next.speed_rpm);
+    if (next.depth_mm !== null) at("depth_mm").value = next.depth_mm;
     at("form").scrollIntoView();
   });
   const item = document.createElement("li");
@@ -53,15 +61,14 @@ function speedItem({ speed_rpm: speed, text }) {
 
 function showResult(answer) {
   const hz = answer.chatter_frequency_hz;
-  at("now").dataset.kind = answer.verdict.replace(" ", "-");
-  put("word", WORDS[answer.verdict]);
+  at("now").dataset.kind = answer.word.replace(" ", "-");
+  put("word", WORDS[answer.word]);
   put("figure", hz === null ? "" : `${hz.toFixed(0)} Hz`);
   put("reason", answer.finding);
-  at("next").hidden = !answer.next_speeds.length;
   at("speeds").replaceChildren(...answer.next_speeds.map(speedItem));
-  put("no-next", answer.next_text);
+  put("next-text", answer.next_text);
   at("texts").replaceChildren(...answer.texts.map((text) => element("li", text)));
-  document.title = `${WORDS[answer.verdict]}: lobewatch`;
+  document.title = `${WORDS[answer.word]}: lobewatch`;
   show("result");
 }
 

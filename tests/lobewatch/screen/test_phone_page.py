@@ -80,7 +80,7 @@ def test_chatter_in_an_encoded_recording_names_the_next_speeds(
 ) -> None:
     """Tooth passing at f_c / k: 60 * 1370 / (2 k) rpm, within 8000 to 24 000 rpm."""
     status, told = send(server, encode(sound_of_a_cut(), file_format, subtype))
-    assert (status, told["verdict"], told["reason"]) == (200, "chatter", "")
+    assert (status, told["word"], told["reason"]) == (200, "chatter", "")
     assert told["chatter_frequency_hz"] == pytest.approx(CHATTER, abs=1.0)
     speeds = [speed["speed_rpm"] for speed in told["next_speeds"]]
     assert sorted(speeds) == pytest.approx([60 * CHATTER / (FLUTES * k) for k in (5, 4, 3, 2)], rel=5e-3)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Never, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Never
 
 from typer import Option
 
@@ -98,10 +98,9 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
       lobewatch listen --page --listen 0.0.0.0 --http-port 8080
     """
-    if page:
-        _serve_page(machine, as_json, listen=listen, port=http_port, token=token, watch_token=watch_token)
-    if machine is None:
-        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
+    if page or machine is None:
+        options: ServerOptions = {"listen": listen, "port": http_port, "token": token, "watch_token": watch_token}
+        _serve_page(page, machine, as_json, options)
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.heard_cuts import FileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
@@ -143,8 +142,10 @@ def listen(
             _store(logbook, comparisons, signal, date, publisher, as_json)
 
 
-def _serve_page(machine: Path | None, as_json: bool, **options: "Unpack[ServerOptions]") -> Never:
-    """Serve the page that takes recordings of a phone, until Ctrl-C."""
+def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "ServerOptions") -> Never:
+    """Serve the page that takes recordings of a phone, until Ctrl-C; ValueError if it is not wanted."""
+    if not wanted:
+        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
     if machine is not None:
         raise ValueError(f"--page evaluates without a machine folder. Leave out {machine}.")
     from lobewatch.screen import PhoneServer  # imports aiohttp

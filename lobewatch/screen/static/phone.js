@@ -42,8 +42,8 @@ function startClock() {
 const grouped = (value) => Math.round(value).toLocaleString("en").replaceAll(",", " ");
 
 function expectation({ depth_mm: depth, relative_depth: gain, window_rpm: [low, high] }) {
-  const deeper = `${gain < 10 ? gain.toFixed(1) : "10 or more"} times the stable depth of here`;
-  return `${depth === null ? "" : `${depth} mm deep, `}${deeper}, stable from ${grouped(low)} to ${grouped(high)} rpm`;
+  const deeper = `about ${gain < 10 ? gain.toFixed(1) : "10 or more"} times as deep as at this speed`;
+  return `${depth === null ? "" : `try ${depth} mm, `}${deeper}, best from ${grouped(low)} to ${grouped(high)} rpm`;
 }
 
 function speedItem(next) {

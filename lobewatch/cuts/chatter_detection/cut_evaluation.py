@@ -32,6 +32,10 @@ MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
 MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
+MIN_CHATTER_FREQUENCY = 100.0
+"""Lowest frequency of chatter (Hz): floor, axes and rubber mounts move below it; chosen."""
+MIN_CHATTER_MODE_SHARE = 0.5
+"""Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
@@ -46,6 +50,19 @@ SLOT_IMMERSION = 0.95
 """Immersion above which tooth passing nearly vanishes (-)."""
 END_PEAK_TOLERANCE = 1.0
 """Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
+
+
+class KnownCut(NamedTuple):
+    """What is known of a cut before one of its windows is evaluated."""
+
+    speed: SpindleSpeed | None = None
+    """Spindle speed in another window, which is tried first."""
+    air: Spectra | None = None
+    """Spectra of the air; None to compute them."""
+    lowest: float = MIN_CHATTER_FREQUENCY
+    """Lowest frequency of chatter (Hz)."""
+    is_begun: bool = False
+    """True if the cut has begun before the window, so that no mode rings down from the entry."""
 
 
 class CutEvaluation(NamedTuple):
@@ -94,14 +111,13 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
-    known: SpindleSpeed | None = None,
+    known: KnownCut = KnownCut(),
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
-    ("tacho-contradicts"); None without one; known: speed in another part of the cut, which is tried first. All axes
-    have one speed, and the verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that
+    ("tacho-contradicts"); None without one; known: from other windows of the cut. All axes have one speed, and the verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that
     with the loudest cut. Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there
     in air make a speed, which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked
     to the spindle), "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three
@@ -119,17 +135,19 @@ def evaluate_cut(
     spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
-    quiet = spectral.compute_spectra(air, sample_rate)
+    quiet = known.air or spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    speed = None if known is None or is_measured else spindle_speed.follow_speed(spectra, quiet, known)
+    follows = known.speed is not None and not is_measured
+    speed = spindle_speed.follow_speed(spectra, quiet, known.speed) if follows else None
     if speed is None:
         speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
     cut, spectra, quiet, speed = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
-    sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
-    sound = max(sounds, key=_rank_evidence)
+    about = speed, teeth, immersion, known
+    sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
+    sound = max(_compare_axes(sounds), key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
         return sound
@@ -154,8 +172,32 @@ def _even_speed(
     return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed
 
 
+def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    """Compare chatter with the loudest comb of all axes, as an axis with hardly any cut shows all that is faint."""
+    combs = [0.0 if sound.peaks is None else sound.peaks.comb.energy for sound in sounds]
+    loudest, compared = max(combs), list(sounds)
+    for i, (sound, comb) in enumerate(zip(sounds, combs, strict=True)):
+        if sound.chatter is not None and comb < loudest:
+            ratio = sound.energy_ratio * max(comb, MIN_COMB_ENERGY * loudest) / loudest
+            if ratio < _least_energy(sound.chatter):
+                compared[i] = sound._replace(verdict="cannot tell", reason="faint", chatter=None, energy_ratio=ratio)
+    return compared
+
+
+def _least_energy(chatter: ChatterPeaks) -> float:
+    """Return the smallest energy of unexplained peaks over that of the comb that is chatter."""
+    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
+
+
 def _evaluate_axis(
-    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float
+    cut: Floats,
+    air: Floats,
+    spectrum: Spectrum,
+    quiet: Spectrum,
+    speed: SpindleSpeed,
+    teeth: int,
+    immersion: float,
+    known: KnownCut,
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     peaks = spectral.find_separate_peaks(spectrum)
@@ -163,7 +205,7 @@ def _evaluate_axis(
 
     def evaluate(quiet: Spectrum) -> CutEvaluation:
         by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
-        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion)
+        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion, known)
 
     sound = evaluate(quiet)
     if sound.reason != "unexplained-tone" or sound.peaks is None:
@@ -216,14 +258,16 @@ def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
 
 
 def _evaluate_peaks(
-    peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
+    peaks: PeaksByOrigin,
+    spectrum: Spectrum,
+    speed: SpindleSpeed,
+    signal: Floats,
+    teeth: int,
+    immersion: float,
+    known: KnownCut,
 ) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
-    left = peaks.unexplained
-    if len(left) and len(peaks.comb):
-        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
-        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
-        peaks = peaks._replace(unexplained=left[~is_ripple])
+    peaks = _remove_ripple(peaks, spectrum, speed, known.lowest)
     sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
@@ -232,20 +276,35 @@ def _evaluate_peaks(
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
-    end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
-    end_power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
-    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
-    still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
+    still = 1.0 if known.is_begun else _share_at_end(chatter, signal, spectrum.sample_rate)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = sound._replace(energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_stable(sound, peaks, teeth, immersion)
-    if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
+    if ratio < _least_energy(chatter):
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:
+    """Return the power of chatter in the second half of a window over that in all of it, at most 1."""
+    end = spectral.compute_spectrum(signal[signal.size // 2 :], sample_rate)
+    power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
+    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
+    return min(power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
+
+
+def _remove_ripple(peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, lowest: float) -> PeaksByOrigin:
+    """Remove side bands of ripple, and what is below the lowest frequency of chatter (Hz), from unexplained peaks."""
+    left = peaks.unexplained[peaks.unexplained.frequency >= lowest]
+    if len(left) and len(peaks.comb):
+        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
+        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
+        left = left[~is_ripple]
+    return peaks._replace(unexplained=left)
 
 
 def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
@@ -289,6 +348,8 @@ class CutRecording(NamedTuple):
     """Number of lost scans."""
     measured_rpm: Floats | None = None
     """Tachometer speed at each sample (rpm), NaN without pulses, shape (n,); None without a tachometer."""
+    lowest_mode: float = 0.0
+    """Frequency of the lowest known mode of the tool (Hz); 0 without one."""
 
 
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
@@ -306,21 +367,23 @@ MAX_SPEED_SEARCHES = 3
 
 def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     """Evaluate all windows of a cut, the last one first, as its speed is known then; the worst one decides."""
-    last = _evaluate_window(recording, parts, None)
-    if parts.reason in ("too-short", "no-air") or last.reason == "lost-scans":
-        return last
-    rate, known, n_searches = recording.sample_rate, last.spindle_speed, 1
-    places = windowing.place_windows(parts, rate)
-    heard = [last]
-    for place in reversed(places[:-1]):
-        if known is None and n_searches == MAX_SPEED_SEARCHES:
+    rate, axes = recording.sample_rate, np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    has_fault = parts.reason in ("too-short", "no-cut", "no-air") or bool(recording.lost_scans)
+    places = [parts.cut] if has_fault else windowing.place_windows(parts, rate)
+    air = None if has_fault else spectral.compute_spectra(axes[:, parts.air], rate)
+    known = KnownCut(None, air, max(MIN_CHATTER_FREQUENCY, MIN_CHATTER_MODE_SHARE * recording.lowest_mode))
+    heard, n_searches = list[CutEvaluation](), 0
+    for number, place in reversed(list(enumerate(places))):
+        if known.speed is None and n_searches == MAX_SPEED_SEARCHES:
             break
-        n_searches += known is None
-        sound = _evaluate_window(recording, parts._replace(cut=place, reason=""), known)
-        known = sound.spindle_speed or known
+        n_searches += known.speed is None
+        of_window = parts if place == parts.cut else parts._replace(cut=place, reason="")
+        sound = _evaluate_window(recording, of_window, known._replace(is_begun=number > 0))
+        known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
-    heard = _settle_contradictions(recording, parts, heard)
-    axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    if has_fault:
+        return heard[0]
+    heard = _settle_contradictions(recording, parts, heard, known)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
     return _worst_window(heard)._replace(part_verdicts=joined)
 
@@ -334,7 +397,7 @@ def _summarize(sound: CutEvaluation) -> HeardWindow:
 
 
 def _settle_contradictions(
-    recording: CutRecording, parts: CutParts, heard: Sequence[CutEvaluation]
+    recording: CutRecording, parts: CutParts, heard: Sequence[CutEvaluation], known: KnownCut
 ) -> list[CutEvaluation]:
     """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
 
@@ -348,7 +411,8 @@ def _settle_contradictions(
             continue
         shifts = (-windowing.WINDOW_STEP / 2, windowing.WINDOW_STEP / 2)
         places = [windowing.shift_window(sound.parts.cut, parts, recording.sample_rate, shift) for shift in shifts]
-        again = [_evaluate_window(recording, sound.parts._replace(cut=at), sound.spindle_speed) for at in places]
+        about = known._replace(speed=sound.spindle_speed, is_begun=True)
+        again = [_evaluate_window(recording, sound.parts._replace(cut=place), about) for place in places]
         if not any((other.chatter is not None) == chatters[i] for other in again):
             settled[i] = again[0]._replace(parts=sound.parts)
     return settled
@@ -363,8 +427,8 @@ def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
     return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
 
 
-def _evaluate_window(recording: CutRecording, parts: CutParts, known: SpindleSpeed | None) -> CutEvaluation:
-    """Evaluate the samples `cut` of parts; known: speed in another window."""
+def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:
+    """Evaluate the samples `cut` of parts."""
     reason = _find_signal_fault(recording, parts)
     if reason and reason != "no-air":
         return CutEvaluation("cannot tell", reason, parts)

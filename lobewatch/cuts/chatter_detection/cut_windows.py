@@ -80,7 +80,9 @@ def join_windows(axes: Floats, windows: Sequence[HeardWindow], parts: CutParts, 
             times[number] = begin if number else times[number]
             times[number + 1] = end if number + 1 < len(groups) else times[number + 1]
     return tuple(
-        PartVerdict(round(begin, 3), round(end, 3), windows[group[0]].verdict, _loudest(windows, group).hz)
+        PartVerdict(
+            round(float(begin), 3), round(float(end), 3), windows[group[0]].verdict, _loudest(windows, group).hz
+        )
         for group, (begin, end) in zip(groups, pairwise(times), strict=True)
     )
 

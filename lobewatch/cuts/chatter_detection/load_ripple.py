@@ -160,7 +160,8 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     """Return whether each peak is a side band of ripple: most multiples have it, relative to their amplitudes.
 
     left: peaks that are no multiples of the spindle frequency `turn` (Hz); comb: those that are. A peak fainter than a
-    multiple up to `MAX_LOAD_DISTANCE` away is a slow change of the load. Result of shape (n,).
+    multiple up to `MAX_LOAD_DISTANCE` away is a slow change of the load. Side bands beyond `MAX_RIPPLE_FREQUENCY` are
+    fainter than those within it. Result of shape (n,).
     """
     beyond = left.frequency[:, np.newaxis] - comb.frequency
     ratio = left.amplitude[:, np.newaxis] / comb.amplitude
@@ -168,10 +169,15 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     least, distance = ratio[peak, own] / MAX_SIDEBAND_RATIO, beyond[peak, own]
     usual = _usual_sidebands(comb, own, distance, least, spectrum, turn)
     mirrored = np.sqrt(spectrum.max_power_near(comb.frequency[own] - distance, spectral.PEAK_TOLERANCE))
-    is_pair = (mirrored > MIN_PAIR_RATIO * left.amplitude[peak]) & (np.abs(distance) < MAX_RIPPLE_FREQUENCY)
-    usual = np.where(np.isnan(usual) & is_pair, np.inf, usual)
+    is_near = np.abs(distance) < MAX_RIPPLE_FREQUENCY
+    is_pair = np.isnan(usual) & is_near & (mirrored > MIN_PAIR_RATIO * left.amplitude[peak])
+    near, far = (
+        np.bincount(peak, is_ripple, len(left)) > 0
+        for is_ripple in (is_pair | ((usual > least) & is_near), usual > least)
+    )
     is_load = np.any((np.abs(beyond) < MAX_LOAD_DISTANCE) & (ratio < 1), axis=1)
-    return np.asarray((np.bincount(peak, usual > least, len(left)) > 0) | is_load)
+    is_slow = near | is_load
+    return np.asarray(is_slow | far if left[far & ~is_slow].energy < left[is_slow].energy else is_slow)
 
 
 def _usual_sidebands(

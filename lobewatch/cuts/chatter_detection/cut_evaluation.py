@@ -10,16 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
-from lobewatch.cuts.chatter_detection import cut_windows as windowing
 from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
-from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow
+from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
+from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows, rank_evidence
 from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -30,10 +30,6 @@ MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
-MIN_STABLE_SHARE = 0.5
-"""Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
-MIN_CHATTER_FREQUENCY = 100.0
-"""Lowest frequency of chatter (Hz): floor, axes and rubber mounts move below it; chosen."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
@@ -50,19 +46,6 @@ SLOT_IMMERSION = 0.95
 """Immersion above which tooth passing nearly vanishes (-)."""
 END_PEAK_TOLERANCE = 1.0
 """Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
-
-
-class KnownCut(NamedTuple):
-    """What is known of a cut before one of its windows is evaluated."""
-
-    speed: SpindleSpeed | None = None
-    """Spindle speed in another window, which is tried first."""
-    air: Spectra | None = None
-    """Spectra of the air; None to compute them."""
-    lowest: float = MIN_CHATTER_FREQUENCY
-    """Lowest frequency of chatter (Hz)."""
-    is_begun: bool = False
-    """True if the cut has begun before the window, so that no mode rings down from the entry."""
 
 
 class CutEvaluation(NamedTuple):
@@ -111,17 +94,18 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
-    known: KnownCut = KnownCut(),
+    known: KnownCut = NOTHING_KNOWN,
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
-    ("tacho-contradicts"); None without one; known: from other windows of the cut. All axes have one speed, and the verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that
-    with the loudest cut. Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there
-    in air make a speed, which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked
-    to the spindle), "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three
-    harmonics of tooth passing are recorded, folded ones too).
+    ("tacho-contradicts"); None without one; known: from other windows of the cut. All axes have one speed, and the
+    verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that with the loudest cut.
+    Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there in air make a speed,
+    which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
+    "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing
+    are recorded, folded ones too), "teeth-contradicted" (the harmonics are those of another number of teeth).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
@@ -143,11 +127,12 @@ def evaluate_cut(
         speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
-    cut, spectra, quiet, speed = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    even = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    cut, spectra, quiet, speed, ripple = even
     axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
     about = speed, teeth, immersion, known
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
-    sound = max(_compare_axes(sounds), key=_rank_evidence)
+    sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
         return sound
@@ -157,19 +142,20 @@ def evaluate_cut(
 
 def _even_speed(
     cut: Floats, spectra: Spectra, quiet: Spectra, speed: SpindleSpeed
-) -> tuple[Floats, Spectra, Spectra, SpindleSpeed]:
-    """Sample a cut at equal angles if its speed ripples."""
+) -> tuple[Floats, Spectra, Spectra, SpindleSpeed, Ripple | None]:
+    """Sample a cut at equal angles if its speed ripples, and return its ripple."""
     envelopes = load_ripple.follow_multiples(cut, spectra, speed.frequency)
     ahead = load_ripple.find_deviation(envelopes)
+    ripple = load_ripple.find_ripple(envelopes, ahead)
     if not ahead.size:
-        return cut, spectra, quiet, speed
+        return cut, spectra, quiet, speed, ripple
     rate, times = spectra[0].sample_rate, np.arange(ahead.size) / envelopes.rate
     deviation = rate * np.interp(np.arange(cut.shape[1]) / rate, times, ahead)
     even = load_ripple.sample_evenly(cut, deviation)
     spectra = spectral.compute_spectra(even, rate)
     peaks = classification.find_cut_peaks(spectra, quiet).loudest(MAX_COMB_PEAKS)
     refined = refine_comb(speed.frequency, peaks, spectra[0].bin_width)
-    return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed
+    return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed, ripple
 
 
 def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
@@ -249,12 +235,6 @@ def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> Cut
 def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
     """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: a speed that fits (rpm)."""
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=distant)
-
-
-def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
-    """Rank an axis: chatter first, then by energy."""
-    peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
-    return sound.chatter is not None, peaks.energy if peaks else 0.0
 
 
 def _evaluate_peaks(
@@ -361,70 +341,19 @@ def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     return [_evaluate_windows(recording, parts) for parts in cuts]
 
 
-MAX_SPEED_SEARCHES = 3
-"""Number of windows of a cut in which its speed is searched from the set speed; chosen."""
-
-
 def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation:
-    """Evaluate all windows of a cut, the last one first, as its speed is known then; the worst one decides."""
+    """Evaluate all windows of a cut."""
     rate, axes = recording.sample_rate, np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
-    has_fault = parts.reason in ("too-short", "no-cut", "no-air") or bool(recording.lost_scans)
-    places = [parts.cut] if has_fault else windowing.place_windows(parts, rate)
-    air = None if has_fault else spectral.compute_spectra(axes[:, parts.air], rate)
-    known = KnownCut(None, air, max(MIN_CHATTER_FREQUENCY, MIN_CHATTER_MODE_SHARE * recording.lowest_mode))
-    heard, n_searches = list[CutEvaluation](), 0
-    for number, place in reversed(list(enumerate(places))):
-        if known.speed is None and n_searches == MAX_SPEED_SEARCHES:
-            break
-        n_searches += known.speed is None
+    lowest = max(MIN_CHATTER_FREQUENCY, MIN_CHATTER_MODE_SHARE * recording.lowest_mode)
+    if parts.reason in ("too-short", "no-cut", "no-air") or recording.lost_scans:
+        return _evaluate_window(recording, parts, KnownCut(lowest=lowest))
+
+    def evaluate(place: slice, known: KnownCut) -> CutEvaluation:
         of_window = parts if place == parts.cut else parts._replace(cut=place, reason="")
-        sound = _evaluate_window(recording, of_window, known._replace(is_begun=number > 0))
-        known = known._replace(speed=sound.spindle_speed or known.speed)
-        heard.insert(0, sound)
-    if has_fault:
-        return heard[0]
-    heard = _settle_contradictions(recording, parts, heard, known)
-    joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
-    return _worst_window(heard)._replace(part_verdicts=joined)
+        return _evaluate_window(recording, of_window, known)
 
-
-def _summarize(sound: CutEvaluation) -> HeardWindow:
-    """Return what the parts of a cut need to know about a window."""
-    chatter = sound.chatter
-    if chatter is None:
-        return HeardWindow(sound.parts.cut, sound.verdict)
-    return HeardWindow(sound.parts.cut, sound.verdict, chatter.frequency, chatter.peaks.energy**0.5, sound.axis)
-
-
-def _settle_contradictions(
-    recording: CutRecording, parts: CutParts, heard: Sequence[CutEvaluation], known: KnownCut
-) -> list[CutEvaluation]:
-    """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
-
-    Chatter counts if one of the two has it, too, else they replace it.
-    """
-    chatters = [sound.chatter is not None for sound in heard]
-    settled = list(heard)
-    for i, sound in enumerate(heard):
-        beside = chatters[max(i - 1, 0) : i] + chatters[i + 1 : i + 2]
-        if not beside or chatters[i] in beside or sound.verdict == "cannot tell":
-            continue
-        shifts = (-windowing.WINDOW_STEP / 2, windowing.WINDOW_STEP / 2)
-        places = [windowing.shift_window(sound.parts.cut, parts, recording.sample_rate, shift) for shift in shifts]
-        about = known._replace(speed=sound.spindle_speed, is_begun=True)
-        again = [_evaluate_window(recording, sound.parts._replace(cut=place), about) for place in places]
-        if not any((other.chatter is not None) == chatters[i] for other in again):
-            settled[i] = again[0]._replace(parts=sound.parts)
-    return settled
-
-
-def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
-    """Return the window that decides: the loudest chatter, else the last one, if it is as most of them are."""
-    worst = max(heard, key=_rank_evidence)
-    if worst.chatter is not None:
-        return worst
-    stable = [sound for sound in heard if sound.verdict == "stable"]
-    return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
+    known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest)
+    return evaluate_windows(evaluate, axes, parts, rate, known)
 
 
 def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:

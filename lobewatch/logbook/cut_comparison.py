@@ -95,9 +95,11 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     """Evaluate each cut in a recording and predict its chatter."""
     as_set = setting.cut.repeats_per_turn, setting.cut.immersion, setting.speed_rpm
     found = signal.clipped, signal.lost_scans, signal.speed_rpm
-    recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found)
     tool = logbook.query(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
+    modes = () if assembly is None else (*(assembly.x or ()), *(assembly.y or ()))
+    lowest = min((mode.frequency for mode in modes), default=0.0)
+    recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found, lowest)
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
     evaluated = evaluate_recording(recording)
     comparisons = [CutComparison(setting, detected, assembly, sensor, None) for detected in evaluated]

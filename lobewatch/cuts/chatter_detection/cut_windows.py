@@ -9,6 +9,8 @@ import scipy
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import CUT_SETTLING_TIME, MAX_CUT_TIME, CutParts
+from lobewatch.cuts.chatter_detection.spectrum import Spectra
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 WINDOW_STEP = MAX_CUT_TIME / 2
@@ -21,6 +23,27 @@ CHATTER_EDGE_SHARE = 0.5
 """Amplitude of chatter at its beginning and end over its quantile `CHATTER_QUANTILE`; chosen."""
 CHATTER_QUANTILE = 0.9
 """Quantile of the amplitude of chatter in its windows; chosen."""
+
+
+MIN_CHATTER_FREQUENCY = 100.0
+"""Lowest frequency of chatter (Hz): floor, axes and rubber mounts move below it; chosen."""
+
+
+class KnownCut(NamedTuple):
+    """What is known of a cut before one of its windows is evaluated."""
+
+    speed: SpindleSpeed | None = None
+    """Spindle speed in another window, which is tried first."""
+    air: Spectra | None = None
+    """Spectra of the air; None to compute them."""
+    lowest: float = MIN_CHATTER_FREQUENCY
+    """Lowest frequency of chatter (Hz)."""
+    is_begun: bool = False
+    """True if the cut has begun before the window, so that no mode rings down from the entry."""
+
+
+NOTHING_KNOWN = KnownCut()
+"""For a window without others."""
 
 
 class HeardWindow(NamedTuple):
@@ -53,11 +76,11 @@ def place_windows(parts: CutParts, rate: float) -> list[slice]:
     return [slice(first, first + size), *windows] if has_rest else windows
 
 
-def shift_window(window: slice, parts: CutParts, rate: float, step: float) -> slice:
-    """Move a window by a time (s), within its cut."""
-    first = round((parts.begin + CUT_SETTLING_TIME) * rate)
-    start = min(max(window.start + round(step * rate), first), parts.cut.start)
-    return slice(start, start + window.stop - window.start)
+def shift_window(window: slice, parts: CutParts, rate: float) -> list[slice]:
+    """Return a window half a step earlier and later, within its cut; rate in Hz."""
+    first, step = round((parts.begin + CUT_SETTLING_TIME) * rate), round(WINDOW_STEP / 2 * rate)
+    starts = (min(max(start, first), parts.cut.start) for start in (window.start - step, window.start + step))
+    return [slice(start, start + window.stop - window.start) for start in starts if start != window.start]
 
 
 def join_windows(axes: Floats, windows: Sequence[HeardWindow], parts: CutParts, rate: float) -> tuple[PartVerdict, ...]:
@@ -80,7 +103,9 @@ def join_windows(axes: Floats, windows: Sequence[HeardWindow], parts: CutParts, 
             times[number] = begin if number else times[number]
             times[number + 1] = end if number + 1 < len(groups) else times[number + 1]
     return tuple(
-        PartVerdict(round(begin, 3), round(end, 3), windows[group[0]].verdict, _loudest(windows, group).hz)
+        PartVerdict(
+            round(float(begin), 3), round(float(end), 3), windows[group[0]].verdict, _loudest(windows, group).hz
+        )
         for group, (begin, end) in zip(groups, pairwise(times), strict=True)
     )
 

@@ -130,13 +130,57 @@ def _agreement(changes: Floats) -> float:
     return float(np.mean(np.std(rows - others, axis=1) < 0.5 * np.std(others, axis=1)))
 
 
+MIN_LOUDNESS_RIPPLE, MIN_SPEED_RIPPLE = 0.03, 1e-4
+"""Smallest ripple of loudness and of speed, relative, that is reported; chosen."""
+MIN_RIPPLE_SHARE = 0.5
+"""Smallest share of the changes of a ripple that its frequency explains; corners and entries have none; chosen."""
+
+
+def find_ripple(envelopes: Envelopes, ahead: Floats) -> Ripple | None:
+    """Find the ripple that most multiples share, or None.
+
+    ahead: by how much the spindle is ahead (s), as by `find_deviation`; empty if it turns evenly.
+    """
+    if len(envelopes.frequency) < MIN_AGREEING_CARRIERS:
+        return None
+    inside = _inner_times(envelopes.value.shape[1])
+    level = np.abs(envelopes.value[:, inside])
+    level /= np.mean(level, axis=1, keepdims=True)
+    speed = np.gradient(ahead, 1 / envelopes.rate)[inside] if ahead.size else np.zeros(level.shape[1])
+    loudness = np.median(level, axis=0) if _agreement(level) > MIN_AGREEMENT else np.ones(level.shape[1])
+    loud_hz, loud_size = _main_swing(loudness, envelopes.rate)
+    speed_hz, speed_size = _main_swing(speed, envelopes.rate)
+    loud, fast = loud_size / MIN_LOUDNESS_RIPPLE, speed_size / MIN_SPEED_RIPPLE
+    if max(loud, fast) < 1:
+        return None
+    return Ripple(loud_hz if loud > fast else speed_hz, loud_size if loud > 1 else 0.0, speed_size if fast > 1 else 0.0)
+
+
+def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
+    """Return frequency (Hz) and amplitude of the swing that explains most of the changes of values; 0 if none does."""
+    changes = (values - np.mean(values)) * np.hanning(values.size)
+    power = np.abs(np.fft.rfft(changes, SWING_PADDING * values.size)) ** 2
+    frequency = np.fft.rfftfreq(SWING_PADDING * values.size, 1 / rate)
+    inside = (frequency >= MIN_RIPPLE_FREQUENCY) & (frequency <= MAX_RIPPLE_FREQUENCY)
+    best = int(np.argmax(np.where(inside, power, 0.0)))
+    near = np.abs(frequency - frequency[best]) < 2.5 * rate / values.size
+    total = float(np.sum(power))
+    if not inside[best] or float(np.sum(power[near])) <= MIN_RIPPLE_SHARE * total:
+        return 0.0, 0.0
+    return float(frequency[best]), float(np.sqrt(2) * np.std(values))
+
+
+SWING_PADDING = 4
+"""Zero-padding factor of the search for the frequency of a ripple; chosen."""
+
+
 def sample_evenly(axes: Floats, deviation: Floats) -> Floats:
     """Sample signals again at equal angles of the spindle; axes: shape (axes, n), deviation in samples, shape (n,)."""
     places = np.arange(axes.shape[1]) - deviation
     return np.stack([scipy.ndimage.map_coordinates(axis, [places], order=3, mode="nearest") for axis in axes])
 
 
-MAX_SIDEBAND_RATIO = 3.0
+MAX_SIDEBAND_RATIO = 4.0
 """Largest amplitude of a side band of ripple over the usual one of other multiples, both relative; chosen."""
 MAX_SIDEBAND_AMPLITUDE = 0.4
 """Largest amplitude of a side band of ripple over its multiple: half of a loudness that ripples by 80 %."""
@@ -168,10 +212,10 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     least, distance = ratio[peak, own] / MAX_SIDEBAND_RATIO, beyond[peak, own]
     usual = _usual_sidebands(comb, own, distance, least, spectrum, turn)
     mirrored = np.sqrt(spectrum.max_power_near(comb.frequency[own] - distance, spectral.PEAK_TOLERANCE))
-    is_pair = (mirrored > MIN_PAIR_RATIO * left.amplitude[peak]) & (np.abs(distance) < MAX_RIPPLE_FREQUENCY)
-    usual = np.where(np.isnan(usual) & is_pair, np.inf, usual)
+    is_near = np.abs(distance) < MAX_RIPPLE_FREQUENCY
+    is_pair = np.isnan(usual) & is_near & (mirrored > MIN_PAIR_RATIO * left.amplitude[peak])
     is_load = np.any((np.abs(beyond) < MAX_LOAD_DISTANCE) & (ratio < 1), axis=1)
-    return np.asarray((np.bincount(peak, usual > least, len(left)) > 0) | is_load)
+    return np.asarray((np.bincount(peak, is_pair | (usual > least), len(left)) > 0) | is_load)
 
 
 def _usual_sidebands(

@@ -4,7 +4,7 @@ import contextlib
 import itertools
 import time
 from collections.abc import Mapping, Sequence
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Never
 
@@ -23,7 +23,9 @@ from lobewatch.commands.shared_options import (
 from lobewatch.show.terminal.output import (
     HttpPort,
     Json,
+    JsonObject,
     Listen,
+    Texts,
     Token,
     WatchToken,
     emit,
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
     from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
@@ -137,7 +140,10 @@ def listen(
 
             save_cut_spectrum(comparisons, out)
         if dry_run:
-            emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
+            now = datetime.now(UTC)
+            cuts = [*logbook.cuts, *(comparison.to_recorded_cut(now) for comparison in comparisons)]
+            payload, texts = _suggest_untapped(logbook, comparisons, cuts)
+            emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
 
@@ -185,6 +191,22 @@ def _listen_to_file(
     emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
 
 
+def _suggest_untapped(
+    logbook: "Logbook", comparisons: "Sequence[CutComparison]", cuts: "Sequence[CutEntry]"
+) -> tuple[JsonObject, Texts]:
+    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was."""
+    from acquisition import DataError
+    from lobewatch.logbook import Analysis
+    from lobewatch.logbook.heard_cuts import suggest_by_sound
+    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+
+    setting = comparisons[-1].setting
+    if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
+        return {}, []
+    found = suggest_by_sound(logbook, setting, cuts)
+    return next_speeds_json(found), next_speeds_texts(found)
+
+
 def _store(
     logbook: "Logbook",
     comparisons: "Sequence[CutComparison]",
@@ -205,5 +227,7 @@ def _store(
         remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
         codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
         rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
-        emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
+        payload, texts = _suggest_untapped(logbook, comparisons, [*earlier, *stored])
+        saved = recording_texts(comparisons, [cut.id for cut in stored])
+        emit(recording_json(comparisons, rows) | payload, as_json, *saved, *texts)
     print_remarks(itertools.chain.from_iterable(remarks))

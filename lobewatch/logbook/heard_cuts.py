@@ -14,6 +14,7 @@ from lobes import Cut
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
+from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
@@ -155,8 +156,22 @@ def find_heard_cuts(setting: CutSetting, cuts: Iterable[CutEntry], since: dateti
     ]
 
 
-def suggest_by_sound(logbook: Logbook, setting: CutSetting) -> NextSpeeds:
-    """Suggest the next speeds for a tool that nobody tapped, from all its cuts in the journal.
+def is_untapped(logbook: Logbook) -> bool:
+    """Return whether a machine has no usable tap test since its baseline.
+
+    Parameters
+    ----------
+    logbook
+        Logbook of the machine.
+    """
+    try:
+        return not logbook.newest_tap()
+    except NotTappedError:
+        return True
+
+
+def suggest_by_sound(logbook: Logbook, setting: CutSetting, cuts: Iterable[CutEntry]) -> NextSpeeds:
+    """Suggest the next speeds for a tool that nobody tapped, from its cuts.
 
     Parameters
     ----------
@@ -164,7 +179,11 @@ def suggest_by_sound(logbook: Logbook, setting: CutSetting) -> NextSpeeds:
         Logbook of the machine.
     setting
         Setting of the cut.
+    cuts
+        Cuts of the machine, oldest first.
     """
-    cuts = find_heard_cuts(setting, logbook.cuts, logbook.files.baseline)
+    heard = find_heard_cuts(setting, cuts, logbook.files.baseline)
     reach = CutRange.of(logbook.machine, setting.table)
-    return suggest_speeds(cuts, setting.cut.teeth, (reach.low_rpm, reach.high_rpm))
+    if reach.low_rpm >= reach.high_rpm:
+        return NextSpeeds("no-speed-in-range", (reach.low_rpm, reach.high_rpm))
+    return suggest_speeds(heard, setting.cut.teeth, (reach.low_rpm, reach.high_rpm))

@@ -167,8 +167,8 @@ def _find_reason(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, r
         return "stable"
     if not modes:
         return "no-chatter-frequency"
-    low, high = (60 * frequency / teeth for frequency in (min(modes), max(modes)))
-    has_pocket = any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in (low, high))
+    bases = [60 * frequency / teeth for frequency in modes]
+    has_pocket = any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases)
     return "" if has_pocket else "no-speed-in-range"
 
 

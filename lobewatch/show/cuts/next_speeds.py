@@ -2,8 +2,11 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from lobewatch.cuts.learning.next_speed import NextSpeed, NextSpeeds
+from lobewatch.machine.settings.requested_cut import CutSetting
+from lobewatch.show.cuts.recorded_cuts import observe_text
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.terminal.output import JsonObject, Texts, new_table
 
@@ -53,6 +56,32 @@ def next_speeds_texts(found: NextSpeeds) -> Texts:
         row = format_rpm(speed.speed_rpm), depth, _gain_text(speed.relative_depth), f"{first}..{last}", f"{speed.lobe}"
         table.add_row(*row)
     return [*texts, table]
+
+
+def untapped_json(setting: CutSetting, found: NextSpeeds) -> JsonObject:
+    """Return the next cut of a program whose tool was never tapped, and all next speeds; its own cut comes first."""
+    following = _next_cut(setting, found)
+    suggested = following and {"speed_rpm": following[0], "depth_mm": round(1e3 * following[1], 4)}
+    return {"program": setting.program, "suggested": suggested, **next_speeds_json(found)}
+
+
+def untapped_texts(setting: CutSetting, found: NextSpeeds, folder: Path) -> Texts:
+    """Return the next cut of a program whose tool was never tapped, and how to enter its result."""
+    texts = [
+        f"{setting.program}: tool {setting.tool!r} was never tapped, so only its test cuts count.",
+        *next_speeds_texts(found),
+    ]
+    following = _next_cut(setting, found)
+    if following is not None:
+        texts.append(observe_text(folder, str(setting.program), following[0], f"{1e3 * following[1]:.4g}"))
+    return texts
+
+
+def _next_cut(setting: CutSetting, found: NextSpeeds) -> tuple[float, float] | None:
+    """Return speed (rpm) and depth (m) of the next cut; that of the program before any chatter, or None."""
+    if found.speeds:
+        return found.speeds[0].speed_rpm, found.speeds[0].depth
+    return (setting.speed_rpm, setting.depth) if found.reason == "no-chatter-frequency" else None
 
 
 def _gain_text(gain: float) -> str:

@@ -243,3 +243,37 @@ def test_the_dashboard_serves_the_page_too(tmp_path: Path, monkeypatch: pytest.M
         assert send(server, b"sound", "/phone/recording", headers={"Authorization": ""})[0] == 401
         assert send(server, b"sound", "/phone/recording", teeth=0)[0] == 409
         assert send(server, b"sound", "/phone/recording") == (200, {"size": 5, "teeth": FLUTES})
+
+
+SIZES = ((1280, 657), (820, 1180), (390, 844))
+"""Desktop, tablet and phone (px)."""
+
+
+def test_the_page_shows_chatter_and_enters_the_next_speed(
+    browser: Browser, server: PhoneServer, tmp_path: Path
+) -> None:
+    recording = tmp_path / "cut.ogg"
+    recording.write_bytes(encode(sound_of_a_cut(), "OGG", "VORBIS"))
+    browser.open(server.url, SIZES[-1])
+    assert browser.part("record").get_attribute("capture") is not None
+    assert browser.broken_rules() == []
+    for name, value in (*CUT.items(), ("depth_mm", 1)):
+        browser.part(name).send_keys(str(value))
+    browser.part("send").click()
+    browser.see("error", "No recording yet")
+    browser.part("choose").send_keys(str(recording))
+    browser.part("send").send_keys("\n")
+    browser.wait(lambda: browser.part("result").is_displayed())
+    assert (browser.part("word").text, browser.part("figure").text) == ("CHATTER", "1370 Hz")
+    for size in SIZES:
+        for scheme in ("light", "dark"):
+            browser.prefer(scheme)
+            browser.resize(size)
+            assert browser.ask("document.documentElement.scrollWidth") <= size[0]
+            assert browser.part("word").rect["height"] >= 40
+            assert browser.broken_rules() == [], (size, scheme)
+    best = browser.driver.find_element("css selector", "#speeds button")
+    best.send_keys("\n")
+    shown = "".join(best.text.partition(" rpm")[0].split())
+    assert browser.part("speed_rpm").get_attribute("value") == shown
+    assert browser.requested() == {server.origin}

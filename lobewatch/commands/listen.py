@@ -154,9 +154,9 @@ def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "Ser
         raise ValueError("no machine folder or recording. Name one of them, or use --page.")
     if machine is not None:
         raise ValueError(f"--page evaluates without a machine folder. Leave out {machine}.")
-    from lobewatch.screen import PhoneServer  # imports aiohttp
+    from lobewatch.screen import RecordingServer  # imports aiohttp
 
-    with PhoneServer(**options) as server:
+    with RecordingServer(**options) as server:
         show_address(server.url, server.watch_url, as_json)
         while True:
             time.sleep(1)

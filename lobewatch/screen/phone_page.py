@@ -53,7 +53,7 @@ TOO_LARGE_TEXT = f"the recording is larger than {MAX_UPLOAD_BYTES / 1e6:g} MB. S
 """Answer to a recording that is too large."""
 
 
-class PhoneServer(WebServerThread):
+class RecordingServer(WebServerThread):
     """Server of the page that takes recordings of cuts, in a thread of its own while its context lasts."""
 
     def __init__(self, **options: Unpack[ServerOptions]) -> None:

@@ -84,7 +84,7 @@ def test_what_is_no_usable_cut_gets_no_verdict(kind: str, seeds: Sequence[int]) 
 @pytest.mark.parametrize("chatters", [False, True])
 @pytest.mark.parametrize("seeds", [FEW, pytest.param(MANY, marks=pytest.mark.long)], ids=["few", "many"])
 def test_a_telephone_tells_what_lies_in_its_band(seeds: Sequence[int], chatters: bool) -> None:
-    """Chatter at 400 to 2800 Hz, or three harmonics of tooth passing below 3.4 kHz: right in nine of ten, never wrong."""
+    """Chatter at 400 to 2800 Hz, or three harmonics of tooth passing below 3.4 kHz: nine of ten told, none wrong."""
     told = []
     for seed in seeds:
         cut = draw_cut(np.random.default_rng(seed), chatters)

@@ -20,7 +20,7 @@ from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.readers.read_audio import decode_audio
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.screen import DashboardServer, PhoneServer, phone_page, uploaded_recording
+from lobewatch.screen import DashboardServer, RecordingServer, phone_page, uploaded_recording
 
 RATE, RPM, FLUTES, CHATTER = 16000, 18000.0, 2, 1370.0
 """Sample rate (Hz), speed (rpm), flutes and chatter frequency (Hz) of the recordings."""
@@ -48,7 +48,7 @@ def encode(sound: Any, file_format: str, subtype: str | None = None, rate: int =
 
 
 def send(
-    server: PhoneServer | DashboardServer, content: bytes, path: str = "/recording", **changes: Any
+    server: RecordingServer | DashboardServer, content: bytes, path: str = "/recording", **changes: Any
 ) -> tuple[int, dict[str, Any]]:
     """Send a recording as the page does; changes: other headers, or other values of the cut."""
     headers = {"Origin": server.origin, "Authorization": f"Bearer {server.token}"} | changes.pop("headers", {})
@@ -65,8 +65,8 @@ OTHER_FORMATS = (("WAV", None), ("WAV", "ULAW"), ("FLAC", None), ("OGG", "VORBIS
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[PhoneServer]:
-    with PhoneServer() as running:
+def server() -> Iterator[RecordingServer]:
+    with RecordingServer() as running:
         yield running
 
 
@@ -76,7 +76,7 @@ def server() -> Iterator[PhoneServer]:
     ids=str,
 )
 def test_chatter_in_an_encoded_recording_names_the_next_speeds(
-    server: PhoneServer, file_format: str, subtype: str | None
+    server: RecordingServer, file_format: str, subtype: str | None
 ) -> None:
     """Tooth passing is near f_c / k: within 3 %, as the chatter frequency is a little above that of the mode."""
     status, told = send(server, encode(sound_of_a_cut(), file_format, subtype))
@@ -134,7 +134,7 @@ def test_a_damaged_file_is_refused_without_an_address_in_memory(content: bytes) 
     assert "0x" not in str(refused.value)
 
 
-def test_a_hostile_file_is_refused_in_a_sentence(server: PhoneServer) -> None:
+def test_a_hostile_file_is_refused_in_a_sentence(server: RecordingServer) -> None:
     content = b"OggS" + np.random.default_rng(0).bytes(5000)
     status, told = send(server, content)
     assert (status, told["code"]) == (422, "unreadable")
@@ -142,7 +142,7 @@ def test_a_hostile_file_is_refused_in_a_sentence(server: PhoneServer) -> None:
 
 
 def test_a_program_of_its_own_is_ended_when_it_computes_for_too_long(
-    server: PhoneServer, monkeypatch: pytest.MonkeyPatch
+    server: RecordingServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Four minutes of noise take more than the second that is allowed here."""
     monkeypatch.setattr(uploaded_recording, "MAX_CPU_SECONDS", 0.1)
@@ -165,7 +165,7 @@ TEXTS = {"teeth": "2", "speed_rpm": "18000"}
 """Values as the page sends them."""
 
 
-def test_a_recording_that_unpacks_to_hours_is_too_long(server: PhoneServer) -> None:
+def test_a_recording_that_unpacks_to_hours_is_too_long(server: RecordingServer) -> None:
     """48 KB of FLAC with 11 min of silence; decoding ends after five."""
     content = encode(np.zeros(8000 * 660, np.int16), "FLAC", rate=8000)
     assert len(content) < 100_000
@@ -174,14 +174,14 @@ def test_a_recording_that_unpacks_to_hours_is_too_long(server: PhoneServer) -> N
 
 
 @pytest.mark.long
-def test_a_sample_rate_below_that_of_a_telephone_is_refused(server: PhoneServer) -> None:
+def test_a_sample_rate_below_that_of_a_telephone_is_refused(server: RecordingServer) -> None:
     status, told = send(server, encode(np.zeros(4000), "WAV", rate=4000))
     assert (status, told["code"]) == (422, "sample-rate")
 
 
 @pytest.mark.parametrize("declared", [True, False], ids=["declared", "chunked"])
 def test_a_file_that_is_too_large_is_not_read(
-    server: PhoneServer, monkeypatch: pytest.MonkeyPatch, declared: bool
+    server: RecordingServer, monkeypatch: pytest.MonkeyPatch, declared: bool
 ) -> None:
     monkeypatch.setattr(phone_page, "MAX_UPLOAD_BYTES", 100_000)
     content = bytes(150_000)
@@ -202,13 +202,13 @@ def test_a_file_that_is_too_large_is_not_read(
     ids=str,
 )
 def test_nothing_is_evaluated_without_the_token_or_for_another_page(
-    server: PhoneServer, monkeypatch: pytest.MonkeyPatch, headers: dict[str, str], status: int
+    server: RecordingServer, monkeypatch: pytest.MonkeyPatch, headers: dict[str, str], status: int
 ) -> None:
     monkeypatch.setattr(phone_page, "evaluate_upload", lambda *_: pytest.fail("evaluated"))
     assert send(server, b"sound", headers=headers)[0] == status
 
 
-def test_the_read_only_address_evaluates_nothing(server: PhoneServer) -> None:
+def test_the_read_only_address_evaluates_nothing(server: RecordingServer) -> None:
     assert send(server, b"sound", headers={"Authorization": f"Bearer {server.watch_token}"})[0] == 403
 
 
@@ -228,7 +228,7 @@ def test_the_read_only_address_evaluates_nothing(server: PhoneServer) -> None:
     ids=str,
 )
 def test_an_impossible_value_is_named_before_the_recording_is_read(
-    server: PhoneServer, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any]
+    server: RecordingServer, monkeypatch: pytest.MonkeyPatch, changes: dict[str, Any]
 ) -> None:
     monkeypatch.setattr(phone_page, "evaluate_upload", lambda *_: pytest.fail("evaluated"))
     status, told = send(server, b"sound", **changes)
@@ -250,7 +250,7 @@ SIZES = ((1280, 657), (820, 1180), (390, 844))
 
 
 def test_the_page_shows_chatter_and_enters_the_next_speed(
-    browser: Browser, server: PhoneServer, tmp_path: Path
+    browser: Browser, server: RecordingServer, tmp_path: Path
 ) -> None:
     recording = tmp_path / "cut.ogg"
     recording.write_bytes(encode(sound_of_a_cut(), "OGG", "VORBIS"))

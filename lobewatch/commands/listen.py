@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from acquisition.files.cut_file import CutSignal
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
-    from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
@@ -105,7 +105,7 @@ def listen(
         options: ServerOptions = {"listen": listen, "port": http_port, "token": token, "watch_token": watch_token}
         _serve_page(page, machine, as_json, options)
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.heard_cuts import FileRequest
+    from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
     from lobewatch.tap import cut_recording as recorder
@@ -114,7 +114,7 @@ def listen(
         others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
         _reject_options(others | {"date": date}, "needs a machine folder")
         description = file_options.description(tacho=tacho, pulses=pulses)
-        _listen_to_file(machine, description, FileRequest(teeth, speed, depth, speeds), out, as_json)
+        _listen_to_file(machine, description, CutFileRequest(teeth, speed, depth, speeds), out, as_json)
         return
     _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
     logbook = Logbook.open(machine)
@@ -126,23 +126,14 @@ def listen(
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
-            from lobewatch.screen import CutScreenServer  # imports aiohttp
-
-            server = CutScreenServer(publisher, listen=listen, token=token, watch_token=watch_token)
-            screens.enter_context(server)
-            show_address(server.url, server.watch_url)
+            _start_screen(screens, publisher, {"listen": listen, "token": token, "watch_token": watch_token})
         signal = recorder.acquire_cut(
             logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
         )
         comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
-        if out is not None:
-            from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
-
-            save_cut_spectrum(comparisons, out)
+        _save_figure(comparisons, out)
         if dry_run:
-            now = datetime.now(UTC)
-            cuts = [*logbook.cuts, *(comparison.to_recorded_cut(now) for comparison in comparisons)]
-            payload, texts = _suggest_untapped(logbook, comparisons, cuts)
+            payload, texts = _suggest_untapped(logbook, comparisons)
             emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
@@ -162,6 +153,23 @@ def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "Ser
             time.sleep(1)
 
 
+def _start_screen(
+    screens: contextlib.ExitStack, publisher: "StatePublisher[CutState]", options: "ServerOptions"
+) -> None:
+    from lobewatch.screen import CutScreenServer  # imports aiohttp
+
+    server = CutScreenServer(publisher, **options)
+    screens.enter_context(server)
+    show_address(server.url, server.watch_url)
+
+
+def _save_figure(comparisons: "Sequence[CutComparison]", out: Path | None) -> None:
+    if out is not None:
+        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
+
+        save_cut_spectrum(comparisons, out)
+
+
 def _is_recording(path: Path) -> bool:
     """Return whether the first argument is a recorded cut, or the name of one that does not exist."""
     return path.is_file() or (bool(path.suffix) and not path.exists())
@@ -175,7 +183,7 @@ def _reject_options(options: Mapping[str, Any], problem: str) -> None:
 
 
 def _listen_to_file(
-    path: Path, description: "Description", request: "FileRequest", out: Path | None, as_json: bool
+    path: Path, description: "Description", request: "CutFileRequest", out: Path | None, as_json: bool
 ) -> None:
     """Evaluate a recorded cut of an unknown machine, and show the next speeds."""
     from lobewatch.logbook.heard_cuts import hear_file
@@ -183,18 +191,18 @@ def _listen_to_file(
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
 
     comparisons, found = hear_file(path, description, request)
-    if out is not None:
-        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
-
-        save_cut_spectrum(comparisons, out)
+    _save_figure(comparisons, out)
     payload = recording_json(comparisons) | next_speeds_json(found)
     emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
 
 
 def _suggest_untapped(
-    logbook: "Logbook", comparisons: "Sequence[CutComparison]", cuts: "Sequence[CutEntry]"
+    logbook: "Logbook", comparisons: "Sequence[CutComparison]", stored: "Sequence[CutEntry] | None" = None
 ) -> tuple[JsonObject, Texts]:
-    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was."""
+    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was.
+
+    stored: all cuts of the journal. None to add these cuts to those of the logbook.
+    """
     from acquisition import DataError
     from lobewatch.logbook import Analysis
     from lobewatch.logbook.heard_cuts import suggest_by_sound
@@ -203,7 +211,8 @@ def _suggest_untapped(
     setting = comparisons[-1].setting
     if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
         return {}, []
-    found = suggest_by_sound(logbook, setting, cuts)
+    made = [comparison.to_recorded_cut(datetime.now(UTC)) for comparison in comparisons]
+    found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
     return next_speeds_json(found), next_speeds_texts(found)
 
 

@@ -26,7 +26,7 @@ ARBITRARY_DIAMETER_MM, ARBITRARY_FORCES = 10.0, (1e9, 3e8)
 """Tool diameter (mm), Kt and Kr (Pa) of a cut whose machine is unknown; no result depends on them."""
 
 
-class FileRequest(NamedTuple):
+class CutFileRequest(NamedTuple):
     """Facts about a recorded cut of an unknown machine."""
 
     teeth: int | None
@@ -41,12 +41,12 @@ class FileRequest(NamedTuple):
     def check(self) -> tuple[int, float, float, tuple[float, float]]:
         """Return teeth, speed (rpm), depth (m, NaN if unknown) and speed range (rpm); ValueError for bad values."""
         if self.teeth is None or self.speed_rpm is None:
-            missing = "FileRequest.teeth" if self.teeth is None else "FileRequest.speed_rpm"
+            missing = "CutFileRequest.teeth" if self.teeth is None else "CutFileRequest.speed_rpm"
             raise ValueError(f"{missing} is missing. Give this value, because a recording names no machine.")
         for name in ("teeth", "speed_rpm", "depth_mm"):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
-                raise ValueError(f"FileRequest.{name} {value:g} is not above 0. Give a value above 0.")
+                raise ValueError(f"CutFileRequest.{name} {value:g} is not above 0. Give a value above 0.")
         depth = math.nan if self.depth_mm is None else self.depth_mm / 1e3
         return self.teeth, self.speed_rpm, depth, self._range_rpm(self.speed_rpm)
 
@@ -57,18 +57,18 @@ class FileRequest(NamedTuple):
         try:
             low, high = (float(word) for word in self.speeds.replace(",", " ").split())
         except ValueError:
-            raise ValueError(f"FileRequest.speeds {self.speeds!r} is not two numbers. {example}") from None
+            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not two numbers. {example}") from None
         if not 0 < low < high < math.inf:
-            raise ValueError(f"FileRequest.speeds {self.speeds!r} is not a rising range above 0. {example}")
+            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not a rising range above 0. {example}")
         if not low <= speed_rpm <= high:
             raise ValueError(
-                f"FileRequest.speed_rpm {speed_rpm:g} is outside FileRequest.speeds {low:g}..{high:g}. "
+                f"CutFileRequest.speed_rpm {speed_rpm:g} is outside CutFileRequest.speeds {low:g}..{high:g}. "
                 "Correct one of them."
             )
         return low, high
 
 
-def hear_file(path: Path, description: Description, request: FileRequest) -> tuple[list[CutComparison], NextSpeeds]:
+def hear_file(path: Path, description: Description, request: CutFileRequest) -> tuple[list[CutComparison], NextSpeeds]:
     """Evaluate a recorded cut of an unknown machine, and suggest the next speeds.
 
     Parameters
@@ -84,7 +84,7 @@ def hear_file(path: Path, description: Description, request: FileRequest) -> tup
     return hear_signal(_read_without_sensitivity(path, description), path.name, request)
 
 
-def hear_signal(signal: CutSignal, name: str, request: FileRequest) -> tuple[list[CutComparison], NextSpeeds]:
+def hear_signal(signal: CutSignal, name: str, request: CutFileRequest) -> tuple[list[CutComparison], NextSpeeds]:
     """Evaluate the signal of a cut of an unknown machine, and suggest the next speeds.
 
     Parameters
@@ -128,8 +128,8 @@ def _read_without_sensitivity(path: Path, description: Description) -> CutSignal
 def _make_setting(name: str, teeth: int, speed_rpm: float, depth: float) -> CutSetting:
     """Make the setting of a cut whose machine is unknown, named after its file."""
     tangential, radial = ARBITRARY_FORCES
-    forces = {"tangential_n_per_mm2": tangential / 1e6, "radial_n_per_mm2": radial / 1e6}
-    table = CutTable(teeth, ARBITRARY_DIAMETER_MM, ARBITRARY_DIAMETER_MM, "down", **forces)
+    size = ARBITRARY_DIAMETER_MM
+    table = CutTable(teeth, size, size, "down", tangential_n_per_mm2=tangential / 1e6, radial_n_per_mm2=radial / 1e6)
     cut = Cut(teeth, UNKNOWN_IMMERSION, "down", tangential, radial)
     return CutSetting(table, "", name, "", cut, "both", speed_rpm, depth)
 

@@ -16,7 +16,7 @@ from acquisition.files.readers.read_audio import MissingDecoderError, decode_aud
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
-from lobewatch.logbook.heard_cuts import FileRequest, hear_signal
+from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
@@ -62,9 +62,9 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return low if self.low_rpm is None else self.low_rpm, high if self.high_rpm is None else self.high_rpm
 
     @property
-    def request(self) -> FileRequest:
+    def request(self) -> CutFileRequest:
         """The same facts as of a recording on the command line."""
-        return FileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
+        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
 
 
 LABELS = {

@@ -52,7 +52,7 @@ class HiddenSpindle:
         self.next: tuple[float, float] | None = (float(self.speeds[first]), depth)
 
     def _draw(self, draw: np.random.Generator) -> bool:
-        """Draw a spindle and a cut; False if every speed would do, lobes are too close to matter, or no limit is known."""
+        """Draw a spindle and a cut; False if all speeds would do, lobes are too close, or no limit is known."""
         f, k = _between(draw, 400, 3000), _between(draw, 5e6, 5e7)
         more = [(f * _between(draw, 0.4, 2.5), k * _between(draw, 1, 6)) for _ in range(draw.integers(0, 3))]
         x = [(frequency, draw.uniform(0.01, 0.05), stiffness) for frequency, stiffness in [(f, k), *more]]
@@ -80,15 +80,13 @@ class HiddenSpindle:
     def milling(self) -> MillingCut:
         """Return the next cut as it is."""
         assert self.next is not None
-        sides = (
+        x, y = (
             Structure(*np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in modes]).T)
             for modes in (self.x, self.y)
         )
         cut, (speed, depth) = self.cut, self.next
-        angles = cut.entry_angle, cut.exit_angle
-        return MillingCut(
-            cut.teeth, *angles, cut.tangential, cut.radial, depth, 1e-4, speed, *sides, runout=self.runout
-        )
+        force = cut.entry_angle, cut.exit_angle, cut.tangential, cut.radial
+        return MillingCut(cut.teeth, *force, depth, 1e-4, speed, x, y, runout=self.runout)
 
     def hear(self, frequency: float) -> None:
         """Keep the next cut with its chatter frequency (Hz), NaN if stable, and plan another one."""

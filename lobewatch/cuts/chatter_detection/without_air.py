@@ -6,6 +6,7 @@ whose only peaks are harmonics of the spindle, mostly of tooth passing. All othe
 
 import numpy as np
 
+from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import MAX_CUT_TIME, MIN_CUT_TIME, CutParts
 from lobewatch.cuts.chatter_detection.cut_evaluation import (
     MIN_SIDEBANDS,
@@ -20,6 +21,9 @@ AIR_REASONS = ("no-air", "no-cut")
 """Reasons without a verdict of a recording that may hold nothing but a cut."""
 MIN_TOOTH_SHARE = 0.5
 """Smallest share of tooth passing in the energy of the spindle harmonics of a cut; chosen, as idling shows run-out."""
+
+STEADY_PIECE_LENGTH, MIN_STEADY_POWER = 0.1, 0.1
+"""Length of the pieces (s) of a recording of nothing but a cut, and least power of one over that of the loudest."""
 
 
 def evaluate_with_or_without_air(recording: CutRecording) -> list[CutEvaluation]:
@@ -42,7 +46,7 @@ def _evaluate_whole(recording: CutRecording, found: CutEvaluation) -> CutEvaluat
     rate, count = recording.sample_rate, signal.shape[1]
     first = max(count - round(MAX_CUT_TIME * rate), 0)
     clipped = recording.clipped is not None and bool(np.any(recording.clipped[first:]))
-    if count < MIN_CUT_TIME * rate or clipped or recording.lost_scans or not np.all(np.ptp(signal, axis=1) > 0):
+    if count < MIN_CUT_TIME * rate or clipped or recording.lost_scans or not _is_steady(signal, rate):
         return found
     _, _, teeth, immersion, commanded_rpm, *_ = recording
     silence = np.zeros((signal.shape[0], count - first))
@@ -51,6 +55,14 @@ def _evaluate_whole(recording: CutRecording, found: CutEvaluation) -> CutEvaluat
         return found._replace(reason="no-air") if heard.spindle_speed is not None else found
     whole = CutParts("", slice(0, 0), slice(first, count), 0.0, count / rate, first / rate, count / rate)
     return heard._replace(parts=whole) if _needs_no_air(heard) else found._replace(reason="no-air")
+
+
+def _is_steady(signal: Floats, sample_rate: float) -> bool:
+    """Return whether all axes are about as loud throughout, shape (axes, n)."""
+    size = round(STEADY_PIECE_LENGTH * sample_rate)
+    pieces = signal[:, : signal.shape[1] // size * size].reshape(len(signal), -1, size)
+    power = np.var(pieces, axis=2)
+    return bool(np.all(np.min(power, axis=1) > MIN_STEADY_POWER * np.max(power, axis=1)))
 
 
 def _needs_no_air(heard: CutEvaluation) -> bool:

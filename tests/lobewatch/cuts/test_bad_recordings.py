@@ -9,7 +9,7 @@ import pytest
 
 from acquisition.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation
-from lobewatch.logbook.heard_cuts import FileRequest, hear_signal
+from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
 from tests.lobewatch.cuts.phone_recordings import (
     RATE,
     TELEPHONE_BAND,
@@ -26,7 +26,7 @@ FEW, MANY = (0, 1), range(2, 22)
 
 def hear(sound: Floats, teeth: int, rpm: float, rate: float = RATE) -> CutEvaluation:
     """Return the evaluation of the last cut in a recording, as of a file on the command line."""
-    comparisons, _ = hear_signal(as_signal(sound, rate), "cut.wav", FileRequest(teeth, rpm))
+    comparisons, _ = hear_signal(as_signal(sound, rate), "cut.wav", CutFileRequest(teeth, rpm))
     return comparisons[-1].detected
 
 

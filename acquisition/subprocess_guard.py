@@ -14,14 +14,24 @@ SUBPROCESS_TIMEOUT = 60.0
 """Longest time of a subprocess (s)."""
 
 
-def run_in_subprocess(module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT) -> bytes:
-    """Run a module in a subprocess with the same import path, and return its standard output.
+def run_in_subprocess(
+    module: str, *arguments: str, patience: float = SUBPROCESS_TIMEOUT, content: bytes | bytearray | None = None
+) -> bytes:
+    """Run a module in a subprocess with the same import path and `content` as input, and return its standard output.
 
     Raises subprocess.SubprocessError where it fails, crashes or takes longer than `patience` (s).
     """
     command = [sys.executable, "-P", "-Wignore", "-m", module, *arguments]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    return subprocess.run(command, env=environment, capture_output=True, timeout=patience, check=True).stdout
+    return subprocess.run(
+        command,
+        env=environment,
+        input=content,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        timeout=patience,
+        check=True,
+    ).stdout
 
 
 def limit_resources(seconds: float, memory: float) -> None:

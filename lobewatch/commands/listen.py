@@ -2,10 +2,11 @@
 
 import contextlib
 import itertools
+import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Never
 
 from typer import Option
 
@@ -20,6 +21,7 @@ from lobewatch.commands.shared_options import (
     rpm,
 )
 from lobewatch.show.terminal.output import (
+    HttpPort,
     Json,
     JsonObject,
     Listen,
@@ -39,13 +41,16 @@ if TYPE_CHECKING:
     from lobewatch.logbook.cut_comparison import CutComparison
     from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.journal.entries import CutEntry
+    from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
 
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
-    machine: Annotated[Path, FolderArgument(help="Machine folder, or a recorded cut of any machine.")],
+    machine: Annotated[
+        Path | None, FolderArgument(help="Machine folder, or a recorded cut of any machine. Not with --page.")
+    ] = None,
     program: Annotated[str, Option(help="Program name.")] = "",
     cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
     speed: Annotated[
@@ -69,7 +74,9 @@ def listen(
     dry_run: Annotated[bool, Option("--dry-run", help="Show the result without storing it.")] = False,
     out: Annotated[Path | None, Option(help="Spectrum figure (.svg, .png, .pdf).")] = None,
     screen: Annotated[bool, Option("--screen", help="Show the result in a browser too.")] = False,
+    page: Annotated[bool, Option("--page", help="Serve a page that takes recordings of a phone.")] = False,
     listen: Listen = "127.0.0.1",
+    http_port: HttpPort = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     *,
@@ -92,7 +99,11 @@ def listen(
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
       lobewatch listen mill-3 --program A --file cut.flac --sensor microphone
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
+      lobewatch listen --page --listen 0.0.0.0 --http-port 8080
     """
+    if page or machine is None:
+        options: ServerOptions = {"listen": listen, "port": http_port, "token": token, "watch_token": watch_token}
+        _serve_page(page, machine, as_json, options)
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
@@ -115,24 +126,48 @@ def listen(
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
-            from lobewatch.screen import CutScreenServer  # imports aiohttp
-
-            server = CutScreenServer(publisher, listen=listen, token=token, watch_token=watch_token)
-            screens.enter_context(server)
-            show_address(server.url, server.watch_url)
+            _start_screen(screens, publisher, {"listen": listen, "token": token, "watch_token": watch_token})
         signal = recorder.acquire_cut(
             logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
         )
         comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
-        if out is not None:
-            from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
-
-            save_cut_spectrum(comparisons, out)
+        _save_figure(comparisons, out)
         if dry_run:
             payload, texts = _suggest_untapped(logbook, comparisons)
             emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
+
+
+def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "ServerOptions") -> Never:
+    """Serve the page that takes recordings of a phone, until Ctrl-C; ValueError if it is not wanted."""
+    if not wanted:
+        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
+    if machine is not None:
+        raise ValueError(f"--page evaluates without a machine folder. Leave out {machine}.")
+    from lobewatch.screen import RecordingServer  # imports aiohttp
+
+    with RecordingServer(**options) as server:
+        show_address(server.url, server.watch_url, as_json)
+        while True:
+            time.sleep(1)
+
+
+def _start_screen(
+    screens: contextlib.ExitStack, publisher: "StatePublisher[CutState]", options: "ServerOptions"
+) -> None:
+    from lobewatch.screen import CutScreenServer  # imports aiohttp
+
+    server = CutScreenServer(publisher, **options)
+    screens.enter_context(server)
+    show_address(server.url, server.watch_url)
+
+
+def _save_figure(comparisons: "Sequence[CutComparison]", out: Path | None) -> None:
+    if out is not None:
+        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
+
+        save_cut_spectrum(comparisons, out)
 
 
 def _is_recording(path: Path) -> bool:
@@ -156,10 +191,7 @@ def _listen_to_file(
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
 
     comparisons, found = hear_file(path, description, request)
-    if out is not None:
-        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
-
-        save_cut_spectrum(comparisons, out)
+    _save_figure(comparisons, out)
     payload = recording_json(comparisons) | next_speeds_json(found)
     emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
 

@@ -1,25 +1,23 @@
 """Command `lobewatch serve`: serve the dashboard of machines."""
 
 import time
-from typing import Annotated
-
-from typer import Option
 
 from lobewatch.commands.shared_options import FleetFolder
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, show_address
+from lobewatch.show.terminal.output import HttpPort, Json, Listen, Token, WatchToken, show_address
 
 
 def serve(
     folder: FleetFolder,
     listen: Listen = "127.0.0.1",
-    http_port: Annotated[int, Option(min=0, max=65535, help="HTTP port. 0: any free port.")] = 0,
+    http_port: HttpPort = 0,
     token: Token = None,
     watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
     """Serve the dashboard of machines.
 
-    START begins a tap test on the port in machine.toml. Ctrl-C ends the server.
+    START begins a tap test on the port in machine.toml. "Hear a cut" evaluates a recording of a phone.
+    Ctrl-C ends the server.
 
     Examples
     --------

@@ -80,8 +80,23 @@ def hear_file(path: Path, description: Description, request: CutFileRequest) -> 
     request
         Flutes, speed, depth and speed range.
     """
+    request.check()
+    return hear_signal(_read_without_sensitivity(path, description), path.name, request)
+
+
+def hear_signal(signal: CutSignal, name: str, request: CutFileRequest) -> tuple[list[CutComparison], NextSpeeds]:
+    """Evaluate the signal of a cut of an unknown machine, and suggest the next speeds.
+
+    Parameters
+    ----------
+    signal
+        Signal of the cut.
+    name
+        Name of the recording.
+    request
+        Flutes, speed, depth and speed range.
+    """
     teeth, speed_rpm, depth, range_rpm = request.check()
-    signal = _read_without_sensitivity(path, description)
     recording = CutRecording(
         signal.acceleration,
         signal.sample_rate,
@@ -93,7 +108,7 @@ def hear_file(path: Path, description: Description, request: CutFileRequest) -> 
         signal.speed_rpm,
     )
     heard = hear_recording(recording, range_rpm, depth)
-    setting = _make_setting(path.name, teeth, speed_rpm, depth)
+    setting = _make_setting(name, teeth, speed_rpm, depth)
     sensor: CutSensor = "microphone" if signal.sensor == MICROPHONE_SENSOR else "accelerometer"
     comparisons = [CutComparison(setting, found, None, sensor, None) for found in heard.evaluations]
     return comparisons, heard.next_speeds

@@ -136,6 +136,7 @@ function show() {
     if (element === next) next = next.nextElementSibling;
     else at("machines").insertBefore(element, next);
   }
+  at("phone").hidden = !list.may_alter;
   at("none").hidden = !list.machines.length || elements.size > 0;
   showFilter();
 }

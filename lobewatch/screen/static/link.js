@@ -14,7 +14,7 @@ export async function ask(path, method = "GET", body = undefined) {
   const headers = { Authorization: `Bearer ${token}` };
   let response;
   try {
-    response = await fetch(path, { method, headers, body: body && JSON.stringify(body) });
+    response = await fetch(path, { method, headers, body: body instanceof Blob ? body : body && JSON.stringify(body) });
   } catch {
     throw new Error("No connection to lobewatch");
   }

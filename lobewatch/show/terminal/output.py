@@ -196,6 +196,7 @@ def blank_nonfinite(value: Any) -> Any:
 
 
 Listen = Annotated[str, typer.Option(help="IP address to listen on. 0.0.0.0: all addresses.")]
+HttpPort = Annotated[int, typer.Option(min=0, max=65535, help="HTTP port. 0: any free port.")]
 Token = Annotated[str | None, typer.Option(help="Full-access token. Default: random.")]
 WatchToken = Annotated[str | None, typer.Option(help="Read-only access token. Default: random.")]
 

@@ -1,0 +1,180 @@
+"""Evaluate the recording of a cut that a browser sent, in a subprocess with limits on length, time and memory."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+
+import msgspec
+import numpy as np
+
+from acquisition import DataError
+from acquisition.files.cut_file import CutSignal
+from acquisition.files.read_cut import MICROPHONE_SENSOR
+from acquisition.files.readers.read_audio import MissingDecoderError, decode_audio
+from acquisition.subprocess_guard import limit_resources, run_in_subprocess
+from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
+from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
+from lobewatch.machine.settings.cut_tables import ProgramTable
+from lobewatch.machine.settings.setup_tables import SpeedTable
+from lobewatch.machine.settings.toml import find_plausible_ranges
+from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+from lobewatch.show.cuts.recorded_cuts import reason_text, recorded_cut_json, recording_texts
+from lobewatch.show.terminal.option_names import with_option_names_inside
+from lobewatch.show.terminal.output import JsonObject
+
+MAX_UPLOAD_BYTES = 50_000_000
+"""Largest size of an uploaded recording (bytes); chosen, five minutes of stereo WAV at 44.1 kHz have 53 MB."""
+MAX_RECORDING_SECONDS = 300.0
+"""Longest recording (s); chosen."""
+SAMPLE_RATES = (8000.0, 96_000.0)
+"""Lowest and highest sample rate (Hz): that of a telephone, and twice that of a good recorder."""
+DEPTHS_MM = (0.001, 300.0)
+"""Lowest and highest depth of cut (mm); chosen, 300 mm is longer than any flute."""
+MAX_CPU_SECONDS = 20.0
+"""Longest processor time of decoding and evaluation (s); chosen."""
+MAX_WAIT_SECONDS = 180.0
+"""Longest time of decoding and evaluation (s), for a busy computer or one without limits of processor time; chosen."""
+MAX_MEMORY = 3e9
+"""Largest memory of decoding and evaluation (bytes); chosen, twice that of five minutes."""
+
+
+class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Values that a person enters with the recording of a cut."""
+
+    teeth: int
+    """Number of flutes."""
+    speed_rpm: float
+    """Set spindle speed (rpm)."""
+    low_rpm: float | None = None
+    """Lowest speed of the machine (rpm)."""
+    high_rpm: float | None = None
+    """Highest speed of the machine (rpm)."""
+    depth_mm: float | None = None
+    """Axial depth of cut (mm)."""
+
+    @property
+    def range_rpm(self) -> tuple[float, float]:
+        """Speed range of the machine (rpm), an unknown end from `ASSUMED_RANGE`."""
+        low, high = (share * self.speed_rpm for share in ASSUMED_RANGE)
+        return low if self.low_rpm is None else self.low_rpm, high if self.high_rpm is None else self.high_rpm
+
+    @property
+    def request(self) -> CutFileRequest:
+        """The same facts as of a recording on the command line."""
+        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
+
+
+LABELS = {
+    "teeth": "number of flutes",
+    "speed_rpm": "speed",
+    "low_rpm": "lowest speed",
+    "high_rpm": "highest speed",
+    "depth_mm": "depth",
+}
+"""Names of the entered values."""
+
+
+def parse_uploaded_cut(query: Mapping[str, str]) -> UploadedCut:
+    """Parse the values that a person entered; ValueError that names an invalid value and its limits."""
+    try:
+        cut = msgspec.convert(dict(query), UploadedCut, strict=False)
+    except msgspec.ValidationError:
+        raise ValueError("flutes or speed are missing or no numbers. Enter both.") from None
+    teeth, speeds = find_plausible_ranges(ProgramTable)["teeth"], find_plausible_ranges(SpeedTable)
+    speed = speeds["low_rpm"].low, speeds["high_rpm"].high
+    limits = dict.fromkeys(("speed_rpm", "low_rpm", "high_rpm"), speed)
+    limits |= {"teeth": (teeth.low, teeth.high), "depth_mm": DEPTHS_MM}
+    for key, (low, high) in limits.items():
+        value = getattr(cut, key)
+        if value is not None and not low <= value <= high:
+            raise ValueError(f"{LABELS[key]} {value:g} is not from {low:g} to {high:g}. Correct this value.")
+    low, high = cut.range_rpm
+    if not (low <= cut.speed_rpm <= high and low < high):
+        text = f"speed {cut.speed_rpm:g} is not between the lowest speed {low:g} and the highest speed {high:g}"
+        raise ValueError(f"{text}. Correct one of them.")
+    return cut
+
+
+def evaluate_upload(content: bytes | bytearray, cut: UploadedCut) -> JsonObject:
+    """Return the result of a recording, or `error` and its `code`, whatever the file contains.
+
+    Codes: "unreadable", "no-decoder", "sample-rate", "too-long", "too-large", "too-slow", "failed".
+    """
+    try:
+        entered = msgspec.json.encode(cut).decode()
+        limits = str(MAX_CPU_SECONDS), str(MAX_MEMORY)
+        output = run_in_subprocess(__name__, entered, *limits, patience=MAX_WAIT_SECONDS, content=content)
+    except subprocess.TimeoutExpired:
+        return _too_slow()
+    except subprocess.CalledProcessError as error:
+        if error.returncode == -signal.SIGXCPU:
+            return _too_slow()
+        crashed = error.returncode < 0
+        return _refuse("unreadable", "the file crashes its decoder. Record the cut again.") if crashed else _failed()
+    answer: JsonObject = json.loads(output)
+    return answer
+
+
+def _refuse(code: str, text: str) -> JsonObject:
+    return {"code": code, "error": text}
+
+
+def _too_slow() -> JsonObject:
+    return _refuse("too-slow", f"the recording needs more than {MAX_CPU_SECONDS:g} s of computing. Send a shorter one.")
+
+
+def _failed() -> JsonObject:
+    return _refuse("failed", "lobewatch could not evaluate this recording. Record the cut again.")
+
+
+def main() -> None:
+    """Write the result of the recording on standard input to standard output as JSON."""
+    cut = msgspec.json.decode(sys.argv[1], type=UploadedCut)
+    content = sys.stdin.buffer.read()
+    limit_resources(*map(float, sys.argv[2:]))
+    sys.stdout.write(json.dumps(with_option_names_inside(_evaluate(content, cut))))
+
+
+def _evaluate(content: bytes, cut: UploadedCut) -> JsonObject:
+    try:
+        rate, columns = decode_audio(content, "recording", MAX_RECORDING_SECONDS)
+        return _find_fault(rate, columns) or _hear(rate, columns, cut)
+    except MissingDecoderError as error:
+        return _refuse("no-decoder", str(error))
+    except DataError as error:
+        return _refuse("unreadable", str(error))
+    except MemoryError:
+        text = f"the recording needs more than {MAX_MEMORY / 1e9:g} GB of memory. Send a shorter one."
+        return _refuse("too-large", text)
+
+
+def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
+    """Return why a decoded recording, shape (channels, n), cannot be evaluated; None if it can."""
+    low, high = SAMPLE_RATES
+    if not low <= rate <= high:
+        text = f"sample rate {rate:g} Hz is not from {low:g} to {high:g} Hz. Record with 48000 Hz."
+        return _refuse("sample-rate", text)
+    if columns.shape[1] > MAX_RECORDING_SECONDS * rate:
+        text = f"the recording is longer than {MAX_RECORDING_SECONDS / 60:g} min. Send a shorter one."
+        return _refuse("too-long", text)
+    if not np.all(np.isfinite(columns)):
+        return _refuse("unreadable", "the recording has infinite or missing values. Record the cut again.")
+    return None
+
+
+def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
+    loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
+    comparisons, found = hear_signal(CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR), "recording", cut.request)
+    newest = comparisons[-1]
+    texts = [text for text in recording_texts(comparisons) if isinstance(text, str)]
+    finding = reason_text(newest) if newest.detected.verdict == "cannot tell" else ""
+    sentence, *_ = [text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)]
+    more = {"finding": finding, "texts": texts, "next_text": sentence}
+    return recorded_cut_json(newest) | next_speeds_json(found) | more
+
+
+if __name__ == "__main__":
+    main()

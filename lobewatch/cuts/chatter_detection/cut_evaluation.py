@@ -4,6 +4,7 @@ The thresholds of this folder were chosen on simulated cuts, with other random n
 (docs/studies/cuts.md, How often it is right).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import spindle_speed
-from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts
+from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
@@ -82,6 +84,7 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
+    shop: Sequence[Floats] = (),
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
@@ -111,8 +114,9 @@ def evaluate_cut(
     speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
-    axes = zip(np.atleast_2d(cut), np.atleast_2d(air), spectra, quiet, strict=True)
-    sounds = [_evaluate_axis(*axis, speed, teeth, immersion)._replace(axis=i) for i, axis in enumerate(axes)]
+    gaps = [[gap[i] for gap in shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
+    axes = zip(np.atleast_2d(cut), gaps, spectra, quiet, strict=True)
+    sounds = [_evaluate_axis(*axis, speed, teeth, immersion, bool(shop))._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
@@ -122,7 +126,7 @@ def evaluate_cut(
 
 
 def _evaluate_axis(
-    cut: Floats, air: Floats, spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float
+    cut: Floats, air: Sequence[Floats], spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float, is_shop: bool
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
@@ -133,9 +137,18 @@ def _evaluate_axis(
         return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion)
 
     sound = evaluate(quiet)
-    if sound.reason != "unexplained-tone" or sound.peaks is None:
+    is_searched = sound.verdict != "stable" if is_shop else sound.reason == "unexplained-tone"
+    if is_searched and sound.peaks is not None:
+        for gap in air:
+            quiet = classification.add_air_tones(quiet, gap, sound.peaks.unexplained.frequency)
+        sound = evaluate(quiet)
+    if not is_shop or sound.reason != "faint" or sound.peaks is None:
         return sound
-    return evaluate(classification.add_air_tones(quiet, air, sound.peaks.unexplained.frequency))
+    left, tooth = sound.peaks.unexplained, speed.frequency * teeth
+    chatter = classification.find_chatter_peaks(left, tooth, spectrum.bin_width)
+    if classification.has_sidebands(left, chatter, speed.frequency, spectrum.bin_width):
+        return sound
+    return _evaluate_stable(sound._replace(verdict="stable", reason=""), sound.peaks, teeth, immersion)
 
 
 def _find_speed(
@@ -256,9 +269,10 @@ class CutRecording(NamedTuple):
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     """Evaluate each cut in a recording; without a cut the only entry gives the reason.
 
-    Reasons without a verdict are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
+    Reasons without a verdict are those of `find_cuts_in_shop` and `evaluate_cut`, "overload" and "lost-scans".
     """
-    cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
+    commanded = recording.commanded_rpm / 60
+    cuts = find_cuts_in_shop(recording.signal, recording.sample_rate, recording.teeth, commanded)
     return [_evaluate_parts(recording, parts) for parts in cuts]
 
 
@@ -269,8 +283,9 @@ def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
     measured = None if recording.measured_rpm is None else _mean_speed(recording.measured_rpm[parts.cut])
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     air = axes[:, slice(0, 0) if reason else parts.air]
+    shop = [axes[:, gap] for gap in parts.shop]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
-    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured)
+    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured, shop)
     return sound._replace(parts=parts, measured_rpm=measured)
 
 

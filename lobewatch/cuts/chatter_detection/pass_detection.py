@@ -1,0 +1,124 @@
+"""Find the passes in a recording by their tooth passing, where a shop is as loud as the cut."""
+
+import numpy as np
+import scipy
+
+from lobewatch.arrays import Floats
+from lobewatch.cuts.chatter_detection import cut_detection as cuts
+from lobewatch.cuts.chatter_detection.cut_detection import CutParts
+
+PASS_PIECE_LENGTH, PASS_PIECE_PERIODS = 0.25, 12.0
+"""Shortest length of the compared pieces (s), and shortest length in periods of tooth passing; chosen.
+
+Twelve periods keep two harmonics apart."""
+PASS_PIECE_STEPS = 4
+"""Steps from one piece to the next in the length of a piece."""
+N_PASS_HARMONICS = 8
+"""Number of harmonics of tooth passing that are compared; chosen on a stable cut recorded by a microphone."""
+PASS_SPEED_TOLERANCE, PASS_SPEED_STEP = 0.05, 5e-4
+"""Largest distance from the commanded speed and step of the tried speeds, relative."""
+N_BACKGROUND_BINS = 31
+"""Number of bins for the mean logarithm around a harmonic."""
+MAX_TOOTH_LEVEL = 2.4
+"""Largest level of a harmonic that counts (log10 of its power over the background)."""
+CLEAREST_SHARE = 0.1
+"""Share of the pieces, the clearest, that tell the speed; chosen."""
+MIN_TOOTH_STEP = 0.35
+"""Smallest difference of the mean level in passes and outside (log10); chosen.
+
+A stable cut recorded by a microphone has 0.7, the same spindle in air 0.2."""
+MIN_PASS_LENGTH = cuts.MIN_CUT_TIME + 2 * cuts.CUT_SETTLING_TIME
+"""Shortest pass (s): the shortest evaluated part, entry and exit."""
+MAX_PASS_AIR = 2.0
+"""Longest air next to a pass (s), as the sound of a shop changes; chosen."""
+
+
+MIN_SEARCHED_CUT = 3.0
+"""Length of a cut found by its loudness from which it may hold several passes (s); chosen."""
+MIN_COVERED_SHARE = 0.5
+"""Smallest length of all passes over that of the cuts found by loudness that they replace; chosen.
+
+Chatter can hide tooth passing, so that only entry and exit of a cut look like passes."""
+
+
+def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded: float) -> list[CutParts]:
+    """Find the cuts in a recording by tooth passing if it finds several, or one where loudness finds none.
+
+    signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; commanded: spindle frequency as set (Hz).
+    """
+    loud = cuts.find_cuts(signal, sample_rate, 1 / commanded)
+    usable = [parts for parts in loud if not parts.reason]
+    length = sum(parts.end - parts.begin for parts in usable)
+    if len(usable) == 1 and length < MIN_SEARCHED_CUT:
+        return loud
+    passes = find_passes(signal, sample_rate, teeth, commanded)
+    covered = sum(parts.end - parts.begin for parts in passes)
+    is_several = len(passes) >= min(len(usable), 1) + 1
+    return passes if is_several and covered >= MIN_COVERED_SHARE * length else loud
+
+
+def find_passes(signal: Floats, sample_rate: float, teeth: int, commanded: float) -> list[CutParts]:
+    """Find the passes in a recording by the harmonics of tooth passing; empty if they never come and go.
+
+    signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; commanded: spindle frequency as set (Hz). Other
+    machines, voices and pumps have other harmonics, so that a pass need not be louder than the shop. Each pass has
+    the longer air before or after it.
+
+    Example: tooth passing at 400 Hz for a second in noise of constant loudness.
+
+    >>> time, noise = np.arange(60_000) / 10e3, np.random.default_rng(0).normal(size=60_000)
+    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) for k in range(1, 9)) / 4
+    >>> sound = np.where((time > 2) & (time < 4), comb + noise, np.sqrt(1.25) * noise)
+    >>> [(round(parts.begin), round(parts.end)) for parts in find_passes(sound, 10e3, 4, 100.0)]
+    [(2, 4)]
+    """
+    axes = np.atleast_2d(signal)
+    size = round(max(PASS_PIECE_LENGTH, PASS_PIECE_PERIODS / (teeth * commanded)) * sample_rate)
+    step = size // PASS_PIECE_STEPS
+    if axes.shape[1] < 2 * cuts.N_QUIET_PIECES * step + size:
+        return []
+    level = np.max([_tooth_level(axis, sample_rate, size, teeth * commanded) for axis in axes], axis=0)
+    level = scipy.ndimage.uniform_filter1d(level, PASS_PIECE_STEPS - 1)
+    is_pass = level > cuts.find_loudness_threshold(level)
+    if cuts.compute_loudness_step(level, is_pass) < MIN_TOOTH_STEP:
+        return []
+    joined = cuts.join_stretches(cuts.find_stretches(is_pass), cuts.MAX_PAUSE_TIME * sample_rate / step)
+    times = np.array(joined) * (step / sample_rate) + 0.5 * (size - step) / sample_rate
+    times = times[times[:, 1] - times[:, 0] > MIN_PASS_LENGTH]
+    return _build_passes(times, axes.shape[1] / sample_rate, sample_rate)
+
+
+def _tooth_level(signal: Floats, rate: float, size: int, tooth: float) -> Floats:
+    """Return the mean level of the harmonics of tooth passing in each piece, at the speed of the clearest pieces."""
+    pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[:: size // PASS_PIECE_STEPS]
+    tried = tooth * (1 + np.arange(-PASS_SPEED_TOLERANCE, PASS_SPEED_TOLERANCE, PASS_SPEED_STEP))
+    count = max(min(N_PASS_HARMONICS, int(rate / 2 / tried[-1] - 0.5)), 1)
+    last = min(int((count + 0.5) * tried[-1] * size / rate) + N_BACKGROUND_BINS, size // 2)
+    power = np.array([np.abs(scipy.fft.rfft(piece * np.hanning(size))[:last]) ** 2 for piece in pieces])
+    above = np.log10(power + np.finfo(np.float64).tiny)
+    above -= scipy.ndimage.uniform_filter1d(above, N_BACKGROUND_BINS, axis=1)
+    above = np.clip(scipy.ndimage.maximum_filter1d(above, 3, axis=1), 0.0, MAX_TOOTH_LEVEL)
+    bins = np.round(np.outer(np.arange(1, count + 1), tried) * size / rate).astype(int)
+    levels = np.mean([above[:, np.minimum(at, last - 1)] for at in bins], axis=0)
+    n_clearest = max(round(CLEAREST_SHARE * len(levels)), PASS_PIECE_STEPS)
+    clearest = np.mean(np.sort(levels, axis=0)[-n_clearest:], axis=0)
+    return np.asarray(levels[:, int(np.argmax(clearest))])
+
+
+def _build_passes(times: Floats, duration: float, rate: float) -> list[CutParts]:
+    """Build the passes between times (s), shape (n, 2), with the air next to each."""
+    settling = cuts.CUT_SETTLING_TIME
+    ends, begins = [0.0, *(times[:, 1] + settling)], [*(times[:, 0] - settling), duration]
+    gaps = zip(ends, begins, strict=True)
+    shop = tuple(slice(round(a * rate), round(b * rate)) for a, b in gaps if b - a > cuts.MIN_AIR_TIME)
+    passes = []
+    for number, (begin, end) in enumerate(times.tolist()):
+        before = max(ends[number], begins[number] - MAX_PASS_AIR), begins[number]
+        after = ends[number + 1], min(begins[number + 1], ends[number + 1] + MAX_PASS_AIR)
+        air = max(before, after, key=lambda gap: gap[1] - gap[0])
+        last = end - settling
+        steady = max(begin + settling, last - cuts.MAX_CUT_TIME), last
+        reason = "" if air[1] - air[0] > cuts.MIN_AIR_TIME else "no-air"
+        slices = (slice(round(max(part[0], 0.0) * rate), max(round(part[1] * rate), 0)) for part in (air, steady))
+        passes.append(CutParts(reason, *slices, begin, end, begin + settling, last, shop))
+    return passes

@@ -105,7 +105,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     if np.count_nonzero(sounds) < 2 * N_QUIET_PIECES:
         return [CutParts("no-cut")]
     is_loud = np.zeros(sounds.size, dtype=np.bool_)
-    is_loud[sounds] = _find_loud_pieces([_piece_power(axis[sounds], sample_rate) for axis in pieces])
+    is_loud[sounds] = find_loud_pieces([compute_piece_power(axis[sounds], sample_rate) for axis in pieces])
     joined = join_stretches(find_stretches(is_loud), MAX_PAUSE_TIME * sample_rate / step)
     stretches = [(first, last) for first, last in joined if (last - first) * step > MAX_KNOCK_TIME * sample_rate]
     if not stretches:
@@ -118,7 +118,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     return [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least] or [longest]
 
 
-def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
+def find_loud_pieces(axes: Sequence[Floats]) -> Flags:
     """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
 
     axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
@@ -185,7 +185,7 @@ def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int
     return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
 
 
-def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
+def compute_piece_power(pieces: Floats, sample_rate: float) -> Floats:
     """Return the power of pieces above `MIN_LOUDNESS_FREQUENCY`; pieces: shape (pieces, size)."""
     size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)

@@ -116,7 +116,9 @@ def evaluate_cut(
         return speed
     gaps = [[gap[i] for gap in shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
     axes = zip(np.atleast_2d(cut), gaps, spectra, quiet, strict=True)
-    sounds = [_evaluate_axis(*axis, speed, teeth, immersion, bool(shop))._replace(axis=i) for i, axis in enumerate(axes)]
+    sounds = [
+        _evaluate_axis(*axis, speed, teeth, immersion, bool(shop))._replace(axis=i) for i, axis in enumerate(axes)
+    ]
     sound = max(sounds, key=_rank_evidence)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
@@ -126,7 +128,14 @@ def evaluate_cut(
 
 
 def _evaluate_axis(
-    cut: Floats, air: Sequence[Floats], spectrum: Spectrum, quiet: Spectrum, speed: SpindleSpeed, teeth: int, immersion: float, is_shop: bool
+    cut: Floats,
+    air: Sequence[Floats],
+    spectrum: Spectrum,
+    quiet: Spectrum,
+    speed: SpindleSpeed,
+    teeth: int,
+    immersion: float,
+    is_shop: bool,
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
     peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)

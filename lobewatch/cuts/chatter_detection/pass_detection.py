@@ -1,5 +1,7 @@
 """Find the passes in a recording by their tooth passing, where a shop is as loud as the cut."""
 
+from itertools import pairwise
+
 import numpy as np
 import scipy
 
@@ -53,8 +55,18 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
         return loud
     passes = find_passes(signal, sample_rate, teeth, commanded)
     covered = sum(parts.end - parts.begin for parts in passes)
-    is_several = len(passes) >= min(len(usable), 1) + 1
-    return passes if is_several and covered >= MIN_COVERED_SHARE * length else loud
+    is_several = len(passes) > min(len(usable), 1) and covered >= MIN_COVERED_SHARE * length
+    return passes if is_several and (not usable or _are_gaps_quieter(signal, passes)) else loud
+
+
+def _are_gaps_quieter(signal: Floats, passes: list[CutParts]) -> bool:
+    """Return whether it is quieter between the passes: within one cut, tooth passing may fade."""
+    axes = np.atleast_2d(signal)
+    between = [slice(one.cut.stop, other.cut.start) for one, other in pairwise(passes)]
+    inside, gaps = (
+        [np.sum(np.var(axes[:, part], axis=1)) for part in parts] for parts in ([one.cut for one in passes], between)
+    )
+    return bool(np.median(gaps) < np.median(inside) / 10**cuts.ENTRY_LOUDNESS_STEP)
 
 
 def find_passes(signal: Floats, sample_rate: float, teeth: int, commanded: float) -> list[CutParts]:

@@ -2,7 +2,7 @@
 
 import contextlib
 import enum
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
@@ -260,15 +260,16 @@ def acquire_cut(
     description: Description,
     show: Callable[[str], None],
     publish: Publish,
-) -> CutSignal:
-    """Read a cut from a file, or record one with the device of machine.toml.
+) -> Generator[CutSignal, None, None]:
+    """Read a cut from a file, or record one after the other with the device of machine.toml.
 
     file: replaces the device. description: what the file does not state itself. time_limit: longest wait for a cut (s).
-    show: called with what to do. publish: as in record_cut. ValueError without a port, DataError for a file without
+    show: called with what to do. publish: as in record_cuts. ValueError without a port, DataError for a file without
     such a recording or if no cut is detected, DeviceError if no device answers.
     """
     if file is not None:
-        return read_cut_recording(file, description)
+        yield read_cut_recording(file, description)
+        return
     port = port or folder.machine.daq.port
     if not port:
         raise ValueError(
@@ -284,7 +285,7 @@ def acquire_cut(
             check_device_rate(folder, device)
         publish(device=label_device(device))
         device.start()
-        return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
+        yield from record_cuts(device, 60 / setting.speed_rpm, time_limit, show, publish)
 
 
 def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:

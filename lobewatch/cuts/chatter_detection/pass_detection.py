@@ -33,10 +33,10 @@ MIN_PASS_LENGTH = cuts.MIN_CUT_TIME + 2 * cuts.CUT_SETTLING_TIME
 """Shortest pass (s): the shortest evaluated part, entry and exit."""
 MAX_PASS_AIR = 2.0
 """Longest air next to a pass (s), as the sound of a shop changes; chosen."""
-
-
 MIN_SEARCHED_CUT = 3.0
 """Length of a cut found by its loudness from which it may hold several passes (s); chosen."""
+MIN_PASSES_IN_CUT = 3
+"""Smallest number of passes that replace one cut found by its loudness, in which tooth passing may fade; chosen."""
 MIN_COVERED_SHARE = 0.5
 """Smallest length of all passes over that of the cuts found by loudness that they replace; chosen.
 
@@ -55,7 +55,8 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
         return loud
     passes = find_passes(signal, sample_rate, teeth, commanded)
     covered = sum(parts.end - parts.begin for parts in passes)
-    is_several = len(passes) > min(len(usable), 1) and covered >= MIN_COVERED_SHARE * length
+    least = MIN_PASSES_IN_CUT if len(usable) == 1 else min(len(usable), 1) + 1
+    is_several = len(passes) >= least and covered >= MIN_COVERED_SHARE * length
     return passes if is_several and (not usable or _are_gaps_quieter(signal, passes)) else loud
 
 

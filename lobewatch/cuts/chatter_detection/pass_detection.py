@@ -44,7 +44,7 @@ Chatter can hide tooth passing, so that only entry and exit of a cut look like p
 
 
 def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded: float) -> list[CutParts]:
-    """Find the cuts in a recording by tooth passing if it finds several, or one where loudness finds none.
+    """Find the cuts in a recording by their loudness, or by tooth passing if that finds more.
 
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; commanded: spindle frequency as set (Hz).
     """
@@ -55,9 +55,15 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
         return loud
     passes = find_passes(signal, sample_rate, teeth, commanded)
     covered = sum(parts.end - parts.begin for parts in passes)
-    least = MIN_PASSES_IN_CUT if len(usable) == 1 else min(len(usable), 1) + 1
-    is_several = len(passes) >= least and covered >= MIN_COVERED_SHARE * length
-    return passes if is_several and (not usable or _are_gaps_quieter(signal, passes)) else loud
+    least = MIN_PASSES_IN_CUT if len(usable) == 1 else len(usable) + 1
+    is_more = len(passes) >= least and covered >= MIN_COVERED_SHARE * length
+    if is_more and (not usable or _are_gaps_quieter(signal, passes)):
+        return passes
+    if len(usable) < 2:
+        return loud
+    times = np.array([(parts.begin, parts.end) for parts in usable])
+    shop = _list_gaps(times, np.shape(signal)[-1] / sample_rate, sample_rate)
+    return [parts._replace(shop=shop) for parts in loud]
 
 
 def _are_gaps_quieter(signal: Floats, passes: list[CutParts]) -> bool:
@@ -118,12 +124,18 @@ def _tooth_level(signal: Floats, rate: float, size: int, tooth: float) -> Floats
     return np.asarray(levels[:, int(np.argmax(clearest))])
 
 
+def _list_gaps(times: Floats, duration: float, rate: float) -> tuple[slice, ...]:
+    """List the samples of air between passes with times (s), shape (n, 2)."""
+    settling = cuts.CUT_SETTLING_TIME
+    gaps = zip([0.0, *(times[:, 1] + settling)], [*(times[:, 0] - settling), duration], strict=True)
+    return tuple(slice(round(a * rate), round(b * rate)) for a, b in gaps if b - a > cuts.MIN_AIR_TIME)
+
+
 def _build_passes(times: Floats, duration: float, rate: float) -> list[CutParts]:
     """Build the passes between times (s), shape (n, 2), with the air next to each."""
     settling = cuts.CUT_SETTLING_TIME
     ends, begins = [0.0, *(times[:, 1] + settling)], [*(times[:, 0] - settling), duration]
-    gaps = zip(ends, begins, strict=True)
-    shop = tuple(slice(round(a * rate), round(b * rate)) for a, b in gaps if b - a > cuts.MIN_AIR_TIME)
+    shop = _list_gaps(times, duration, rate)
     passes = []
     for number, (begin, end) in enumerate(times.tolist()):
         before = max(ends[number], begins[number] - MAX_PASS_AIR), begins[number]

@@ -1,0 +1,63 @@
+"""Air of earlier recorded cuts of a machine, for a cut recorded without air."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition import DataError
+from acquisition.files.cut_file import CutSignal, read_cut_signal
+from lobewatch.arrays import Floats
+from lobewatch.cuts.chatter_detection.cut_detection import find_cuts
+from lobewatch.logbook.logbook import Logbook
+from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.machine.settings.requested_cut import CutSetting
+
+MAX_AIR_SPEED_DIFFERENCE = 0.01
+"""Largest relative difference of two commanded speeds of which the air is the same; chosen."""
+MAX_AIR_RECORDINGS = 5
+"""Largest number of earlier recordings that are searched for air, the newest first; chosen."""
+
+
+class RememberedAir(NamedTuple):
+    """Air next to an earlier cut."""
+
+    cut: str
+    """Identity of the earlier cut."""
+    signal: Floats
+    """Its air in the unit of the recording, shape (axes, n)."""
+
+
+def find_remembered_air(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> RememberedAir | None:
+    """Find the newest air at the speed of a cut, recorded with the same sensors; None without it."""
+    for entry in _list_similar_cuts(logbook, setting, signal):
+        try:
+            earlier, _ = read_cut_signal(logbook.folder.path / entry.recording.file)
+        except (DataError, OSError):
+            continue
+        if _describe_sensors(earlier) != _describe_sensors(signal):
+            continue
+        for parts in reversed(find_cuts(earlier.acceleration, earlier.sample_rate, 60 / setting.speed_rpm)):
+            if not parts.reason:
+                return RememberedAir(entry.id, np.atleast_2d(earlier.acceleration)[:, parts.air])
+    return None
+
+
+def _list_similar_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Iterator[CutEntry]:
+    """Yield the newest recorded cuts at the same speed by the same kind of sensor."""
+    similar = [
+        entry
+        for entry in reversed(logbook.files.contents.cuts)
+        if entry.recording is not None
+        and not entry.excluded
+        and entry.by == signal.sensor
+        and abs(entry.commanded_rpm / setting.speed_rpm - 1) <= MAX_AIR_SPEED_DIFFERENCE
+    ]
+    yield from similar[:MAX_AIR_RECORDINGS]
+
+
+def _describe_sensors(signal: CutSignal) -> tuple[object, ...]:
+    """Return what two recordings of the same sensors have in common."""
+    channels = () if signal.channel is None else (signal.channel, *signal.more_channels)
+    axes = np.atleast_2d(signal.acceleration).shape[0]
+    return signal.sample_rate, axes, signal.sensor, *((channel.quantity, channel.serial_number) for channel in channels)

@@ -15,6 +15,8 @@ from lobewatch.machine.settings.requested_cut import CutSetting
 
 MAX_AIR_SPEED_DIFFERENCE = 0.01
 """Largest relative difference of two commanded speeds of which the air is the same; chosen."""
+SAME_RATE_TOLERANCE = 1e-3
+"""Largest relative difference of the sample rates of one recorder, as columns of times are rounded; chosen."""
 MAX_AIR_RECORDINGS = 5
 """Largest number of earlier recordings that are searched for air, the newest first; chosen."""
 
@@ -35,7 +37,7 @@ def find_remembered_air(logbook: Logbook, setting: CutSetting, signal: CutSignal
             earlier, _ = read_cut_signal(logbook.folder.path / entry.recording.file)
         except (DataError, OSError):
             continue
-        if _describe_sensors(earlier) != _describe_sensors(signal):
+        if not _is_same_recorder(earlier, signal):
             continue
         for parts in reversed(find_cuts(earlier.acceleration, earlier.sample_rate, 60 / setting.speed_rpm)):
             if not parts.reason:
@@ -56,8 +58,16 @@ def _list_similar_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal)
     yield from similar[:MAX_AIR_RECORDINGS]
 
 
-def _describe_sensors(signal: CutSignal) -> tuple[object, ...]:
-    """Return what two recordings of the same sensors have in common."""
-    channels = () if signal.channel is None else (signal.channel, *signal.more_channels)
-    axes = np.atleast_2d(signal.acceleration).shape[0]
-    return signal.sample_rate, axes, signal.sensor, *((channel.quantity, channel.serial_number) for channel in channels)
+def _is_same_recorder(one: CutSignal, other: CutSignal) -> bool:
+    """Return whether two recordings have the same rate, sensors and channels."""
+    if abs(one.sample_rate / other.sample_rate - 1) > SAME_RATE_TOLERANCE:
+        return False
+    return _list_sensors(one) == _list_sensors(other)
+
+
+def _list_sensors(signal: CutSignal) -> list[tuple[str, str, str]]:
+    """List kind, quantity and serial number of each sensor, the last two as far as known."""
+    known = () if signal.channel is None else (signal.channel, *signal.more_channels)
+    if known:
+        return [(signal.sensor, channel.quantity, channel.serial_number) for channel in known]
+    return [(signal.sensor, "", "")] * np.atleast_2d(signal.acceleration).shape[0]

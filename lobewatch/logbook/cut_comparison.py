@@ -82,8 +82,8 @@ class CutComparison:
         tapped = () if self.assembly is None else (*(self.assembly.x or ()), *(self.assembly.y or ()))
         return min((mode.frequency for mode in tapped), key=lambda mode: abs(mode - frequency), default=None)
 
-    def to_recorded_cut(self, at: datetime) -> CutEntry:
-        """Make the journal entry of a cut made at a time (UTC)."""
+    def to_recorded_cut(self, at: datetime, begin: float = 0.0) -> CutEntry:
+        """Make the journal entry of a cut made at a time (UTC); begin: of its part of the recording (s)."""
         chatter = self.detected.chatter
         return CutEntry(
             "",
@@ -95,6 +95,7 @@ class CutComparison:
             by=self.sensor,
             software=lobewatch_version(),
             reason=self.detected.reason,
+            parts=tuple(part.shift(-begin) for part in self.detected.part_verdicts),
         )
 
 
@@ -102,9 +103,11 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     """Evaluate each cut in a recording and predict its chatter."""
     as_set = setting.cut.repeats_per_turn, setting.cut.immersion, setting.speed_rpm
     found = signal.clipped, signal.lost_scans, signal.speed_rpm
-    recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found)
     tool = logbook.query(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
+    modes = () if assembly is None else (*(assembly.x or ()), *(assembly.y or ()))
+    lowest = min((mode.frequency for mode in modes), default=0.0)
+    recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found, lowest)
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
     evaluated, air_from = _evaluate_with_any_air(logbook, setting, signal, recording)
     comparisons = [CutComparison(setting, detected, assembly, sensor, None, air_from) for detected in evaluated]
@@ -141,6 +144,6 @@ def store_recorded_cuts(
     parts = [comparison.detected.parts for comparison in comparisons]
     begins, ends = [0.0, *(part.end for part in parts[:-1])], [*(part.begin for part in parts[1:]), signal.duration]
     return [
-        store_cut(folder, comparison.to_recorded_cut(time), signal.slice_time(begin, end))
+        store_cut(folder, comparison.to_recorded_cut(time, begin), signal.slice_time(begin, end))
         for comparison, begin, end in zip(comparisons, begins, ends, strict=True)
     ]

@@ -160,7 +160,7 @@ def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: sli
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
     parts = CutParts("", air, settled, *(place / rate for place in (begin, end, first, last)))
-    return parts._replace(reason=_find_cut_fault(axes, parts, rate, step))
+    return parts._replace(reason=find_cut_fault(axes, parts, rate, step))
 
 
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
@@ -176,13 +176,30 @@ def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, 
     return entry, leaving
 
 
-def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+def find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
     """Why parts cannot be listened to, a code; empty where they can."""
     if parts.cut.stop - parts.cut.start < MIN_CUT_TIME * sample_rate:
         return "too-short"
     if parts.air.stop - parts.air.start < MIN_AIR_TIME * sample_rate:
         return "no-air"
     return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
+
+
+OVERLOAD_GUARD_TIME = 0.05
+"""Time before and after an overload that is left out, too (s), as sensors and filters recover; chosen."""
+
+
+def trim_overload(parts: CutParts, clipped: Flags, sample_rate: float) -> CutParts:
+    """Leave out the samples of a cut near an overload, if a stretch of `MIN_CUT_TIME` remains; else keep them."""
+    inside = clipped[parts.cut]
+    if parts.reason or not np.any(inside):
+        return parts
+    width = 2 * round(OVERLOAD_GUARD_TIME * sample_rate) + 1
+    clean = find_stretches(~scipy.ndimage.maximum_filter1d(inside, width))
+    begin, end = max(clean, key=lambda stretch: stretch[1] - stretch[0], default=(0, 0))
+    if end - begin < MIN_CUT_TIME * sample_rate:
+        return parts
+    return parts._replace(cut=slice(parts.cut.start + begin, parts.cut.start + end))
 
 
 def compute_piece_power(pieces: Floats, sample_rate: float) -> Floats:

@@ -10,15 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats
+from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection import spindle_speed
-from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts
+from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, trim_overload
+from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
-from lobewatch.machine.journal.entries import CutVerdict
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
+from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows, rank_evidence
+from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
@@ -26,6 +29,10 @@ MIN_SINGLE_PEAK_ENERGY = 1e-2
 """Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
 MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
+MIN_CHATTER_OVER_RIPPLE = 1.5
+"""Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
+MIN_CHATTER_MODE_SHARE = 0.5
+"""Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 MIN_SIDEBANDS = 3
@@ -69,6 +76,10 @@ class CutEvaluation(NamedTuple):
     """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
     """Tachometer speed in the cut (rpm), NaN without pulses there; None without a tachometer."""
+    part_verdicts: tuple[PartVerdict, ...] = ()
+    """Verdicts on the parts of the cut in turn, from the beginning of the recording; empty without a cut."""
+    ripple: Ripple | None = None
+    """Ripple of loudness or speed; None if the cut is steady."""
 
     @property
     def speed_rpm(self) -> float:
@@ -84,18 +95,18 @@ def evaluate_cut(
     immersion: float,
     commanded_rpm: float,
     measured_rpm: float | None = None,
-    shop: Sequence[Floats] = (),
+    known: KnownCut = NOTHING_KNOWN,
 ) -> CutEvaluation:
     """Evaluate the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
     air: the same spindle turning without a cut, n = 0 where there is none; immersion: radial depth over diameter;
     commanded_rpm as it was set; measured_rpm by a tachometer, which the peaks must not contradict
-    ("tacho-contradicts"); None without one. All axes have one speed, and the verdict is that of the loudest evidence:
-    of the axis with the loudest chatter, else of that with the loudest cut. Reasons without a verdict:
-    "speed-not-found", "no-air" (also where only peaks that are there in air make a speed, which is named),
-    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint",
-    "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing are
-    recorded, folded ones too).
+    ("tacho-contradicts"); None without one; known: from other windows of the cut. All axes have one speed, and the
+    verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that with the loudest cut.
+    Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there in air make a speed,
+    which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
+    "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing
+    are recorded, folded ones too), "teeth-contradicted" (the harmonics are those of another number of teeth).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
@@ -109,22 +120,61 @@ def evaluate_cut(
     spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
-    quiet = spectral.compute_spectra(air, sample_rate)
+    quiet = known.air or spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    follows = known.speed is not None and not is_measured
+    speed = spindle_speed.follow_speed(spectra, quiet, known.speed) if follows else None
+    if speed is None:
+        speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
     if isinstance(speed, CutEvaluation):
         return speed
-    gaps = [[gap[i] for gap in shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
-    axes = zip(np.atleast_2d(cut), gaps, spectra, quiet, strict=True)
-    sounds = [
-        _evaluate_axis(*axis, speed, teeth, immersion, bool(shop))._replace(axis=i) for i, axis in enumerate(axes)
-    ]
-    sound = max(sounds, key=_rank_evidence)
+    even = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    cut, spectra, quiet, speed, ripple = even
+    gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
+    axes = zip(cut, gaps, spectra, quiet, strict=True)
+    about = speed, teeth, immersion, known
+    sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
+    sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
         return sound
     distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, speed, others)
     return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
+
+
+def _even_speed(
+    cut: Floats, spectra: Spectra, quiet: Spectra, speed: SpindleSpeed
+) -> tuple[Floats, Spectra, Spectra, SpindleSpeed, Ripple | None]:
+    """Sample a cut at equal angles if its speed ripples, and return its ripple."""
+    envelopes = load_ripple.follow_multiples(cut, spectra, speed.frequency)
+    ahead = load_ripple.find_deviation(envelopes)
+    ripple = load_ripple.find_ripple(envelopes, ahead)
+    if not ahead.size:
+        return cut, spectra, quiet, speed, ripple
+    rate, times = spectra[0].sample_rate, np.arange(ahead.size) / envelopes.rate
+    deviation = rate * np.interp(np.arange(cut.shape[1]) / rate, times, ahead)
+    even = load_ripple.sample_evenly(cut, deviation)
+    spectra = spectral.compute_spectra(even, rate)
+    peaks = classification.find_cut_peaks(spectra, quiet).loudest(MAX_COMB_PEAKS)
+    refined = refine_comb(speed.frequency, peaks, spectra[0].bin_width)
+    return even, spectra, [load_ripple.widen_air(air) for air in quiet], refined or speed, ripple
+
+
+def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    """Compare chatter with the loudest comb of all axes, as an axis with hardly any cut shows all that is faint."""
+    combs = [0.0 if sound.peaks is None else sound.peaks.comb.energy for sound in sounds]
+    loudest, compared = max(combs), list(sounds)
+    for i, (sound, comb) in enumerate(zip(sounds, combs, strict=True)):
+        if sound.chatter is not None and comb < loudest:
+            ratio = sound.energy_ratio * max(comb, MIN_COMB_ENERGY * loudest) / loudest
+            if ratio < _least_energy(sound.chatter):
+                compared[i] = sound._replace(verdict="cannot tell", reason="faint", chatter=None, energy_ratio=ratio)
+    return compared
+
+
+def _least_energy(chatter: ChatterPeaks) -> float:
+    """Return the smallest energy of unexplained peaks over that of the comb that is chatter."""
+    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
 
 
 def _evaluate_axis(
@@ -135,23 +185,23 @@ def _evaluate_axis(
     speed: SpindleSpeed,
     teeth: int,
     immersion: float,
-    is_shop: bool,
+    known: KnownCut,
 ) -> CutEvaluation:
     """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    peaks = spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width)
+    peaks = spectral.find_separate_peaks(spectrum)
     unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
 
     def evaluate(quiet: Spectrum) -> CutEvaluation:
         by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
-        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion)
+        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion, known)
 
     sound = evaluate(quiet)
-    is_searched = sound.verdict != "stable" if is_shop else sound.reason == "unexplained-tone"
+    is_searched = sound.verdict != "stable" if known.shop else sound.reason == "unexplained-tone"
     if is_searched and sound.peaks is not None:
         for gap in air:
             quiet = classification.add_air_tones(quiet, gap, sound.peaks.unexplained.frequency)
         sound = evaluate(quiet)
-    if not is_shop or sound.reason != "faint" or sound.peaks is None:
+    if not known.shop or sound.reason != "faint" or sound.peaks is None:
         return sound
     left, tooth = sound.peaks.unexplained, speed.frequency * teeth
     chatter = classification.find_chatter_peaks(left, tooth, spectrum.bin_width)
@@ -198,16 +248,17 @@ def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=distant)
 
 
-def _rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
-    """Rank an axis: chatter first, then by energy."""
-    peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
-    return sound.chatter is not None, peaks.energy if peaks else 0.0
-
-
 def _evaluate_peaks(
-    peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, signal: Floats, teeth: int, immersion: float
+    peaks: PeaksByOrigin,
+    spectrum: Spectrum,
+    speed: SpindleSpeed,
+    signal: Floats,
+    teeth: int,
+    immersion: float,
+    known: KnownCut,
 ) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
+    peaks = _remove_ripple(peaks, spectrum, speed, known.lowest)
     sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
@@ -216,20 +267,35 @@ def _evaluate_peaks(
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
     chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
-    end = spectral.compute_spectrum(signal[signal.size // 2 :], spectrum.sample_rate)
-    end_power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
-    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
-    still = min(end_power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
+    still = 1.0 if known.is_begun else _share_at_end(chatter, signal, spectrum.sample_rate)
     ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
     sound = sound._replace(energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_stable(sound, peaks, teeth, immersion)
-    if ratio < (MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY):
+    if ratio < _least_energy(chatter):
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:
+    """Return the power of chatter in the second half of a window over that in all of it, at most 1."""
+    end = spectral.compute_spectrum(signal[signal.size // 2 :], sample_rate)
+    power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
+    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
+    return min(power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
+
+
+def _remove_ripple(peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, lowest: float) -> PeaksByOrigin:
+    """Remove side bands of ripple, and what is below the lowest frequency of chatter (Hz), from unexplained peaks."""
+    left = peaks.unexplained[peaks.unexplained.frequency >= lowest]
+    if len(left) and len(peaks.comb):
+        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
+        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
+        left = left[~is_ripple]
+    return peaks._replace(unexplained=left)
 
 
 def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
@@ -273,6 +339,8 @@ class CutRecording(NamedTuple):
     """Number of lost scans."""
     measured_rpm: Floats | None = None
     """Tachometer speed at each sample (rpm), NaN without pulses, shape (n,); None without a tachometer."""
+    lowest_mode: float = 0.0
+    """Frequency of the lowest known mode of the tool (Hz); 0 without one."""
 
 
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
@@ -282,19 +350,37 @@ def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     """
     commanded = recording.commanded_rpm / 60
     cuts = find_cuts_in_shop(recording.signal, recording.sample_rate, recording.teeth, commanded)
-    return [_evaluate_parts(recording, parts) for parts in cuts]
+    return [_evaluate_windows(recording, parts) for parts in cuts]
 
 
-def _evaluate_parts(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation:
+    """Evaluate all windows of a cut."""
+    rate, axes = recording.sample_rate, np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
+    lowest = max(MIN_CHATTER_FREQUENCY, MIN_CHATTER_MODE_SHARE * recording.lowest_mode)
+    if parts.reason in ("too-short", "no-cut", "no-air") or recording.lost_scans:
+        return _evaluate_window(recording, parts, KnownCut(lowest=lowest))
+
+    def evaluate(place: slice, known: KnownCut) -> CutEvaluation:
+        of_window = parts if place == parts.cut else parts._replace(cut=place, reason="")
+        return _evaluate_window(recording, of_window, known)
+
+    shop = tuple(axes[:, gap] for gap in parts.shop)
+    known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest, shop=shop)
+    return evaluate_windows(evaluate, axes, parts, rate, known)
+
+
+def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:
+    """Evaluate the samples `cut` of parts, without those near an overload."""
+    if recording.clipped is not None:
+        parts = trim_overload(parts, recording.clipped, recording.sample_rate)
     reason = _find_signal_fault(recording, parts)
     if reason and reason != "no-air":
         return CutEvaluation("cannot tell", reason, parts)
     measured = None if recording.measured_rpm is None else _mean_speed(recording.measured_rpm[parts.cut])
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     air = axes[:, slice(0, 0) if reason else parts.air]
-    shop = [axes[:, gap] for gap in parts.shop]
     _, sample_rate, teeth, immersion, commanded_rpm, *_ = recording
-    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured, shop)
+    sound = evaluate_cut(axes[:, parts.cut], air, sample_rate, teeth, immersion, commanded_rpm, measured, known)
     return sound._replace(parts=parts, measured_rpm=measured)
 
 
@@ -340,4 +426,5 @@ def _shift_times(sound: CutEvaluation, earlier: float) -> CutEvaluation:
     """Return an evaluation with times in a recording that begins later (s)."""
     names = ("begin", "end", "steady_begin", "steady_end")
     times = {name: float(np.maximum(getattr(sound.parts, name) - earlier, 0.0)) for name in names}
-    return sound._replace(parts=sound.parts._replace(**times))
+    part_verdicts = tuple(part.shift(-earlier) for part in sound.part_verdicts)
+    return sound._replace(parts=sound.parts._replace(**times), part_verdicts=part_verdicts)

@@ -49,7 +49,7 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; commanded: spindle frequency as set (Hz).
     """
     loud = cuts.find_cuts(signal, sample_rate, 1 / commanded)
-    usable = [parts for parts in loud if not parts.reason]
+    usable = [parts for parts in loud if parts.reason in ("", "knock")]
     length = sum(parts.end - parts.begin for parts in usable)
     if len(usable) == 1 and length < MIN_SEARCHED_CUT:
         return loud
@@ -104,7 +104,9 @@ def find_passes(signal: Floats, sample_rate: float, teeth: int, commanded: float
     joined = cuts.join_stretches(cuts.find_stretches(is_pass), cuts.MAX_PAUSE_TIME * sample_rate / step)
     times = np.array(joined) * (step / sample_rate) + 0.5 * (size - step) / sample_rate
     times = times[times[:, 1] - times[:, 0] > MIN_PASS_LENGTH]
-    return _build_passes(times, axes.shape[1] / sample_rate, sample_rate)
+    step = round(cuts.CUT_PIECE_LENGTH * sample_rate) // 2
+    passes = _build_passes(times, axes.shape[1] / sample_rate, sample_rate)
+    return [parts._replace(reason=cuts.find_cut_fault(axes, parts, sample_rate, step)) for parts in passes]
 
 
 def _tooth_level(signal: Floats, rate: float, size: int, tooth: float) -> Floats:
@@ -143,7 +145,6 @@ def _build_passes(times: Floats, duration: float, rate: float) -> list[CutParts]
         air = max(before, after, key=lambda gap: gap[1] - gap[0])
         last = end - settling
         steady = max(begin + settling, last - cuts.MAX_CUT_TIME), last
-        reason = "" if air[1] - air[0] > cuts.MIN_AIR_TIME else "no-air"
         slices = (slice(round(max(part[0], 0.0) * rate), max(round(part[1] * rate), 0)) for part in (air, steady))
-        passes.append(CutParts(reason, *slices, begin, end, begin + settling, last, shop))
+        passes.append(CutParts("", *slices, begin, end, begin + settling, last, shop))
     return passes

@@ -130,9 +130,13 @@ def compute_spectra(signal: Floats, sample_rate: float) -> list[Spectrum]:
 
 def _noise_level(power: Floats) -> Floats:
     """Return the mean noise power, from the quiet bins of each neighborhood (power of noise is exponential)."""
-    blocks = np.array_split(power, max(power.size // (PADDING_FACTOR * NOISE_BINS), 2))
-    level = np.array([np.quantile(block, NOISE_QUANTILE) for block in blocks]) / -np.log(1 - NOISE_QUANTILE)
-    middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
+    count = max(power.size // (PADDING_FACTOR * NOISE_BINS), 2)
+    size, n_longer = divmod(power.size, count)
+    end = n_longer * (size + 1)
+    blocks = power[:end].reshape(n_longer, size + 1), power[end:].reshape(count - n_longer, size)
+    quiet = np.concatenate([np.quantile(block, NOISE_QUANTILE, axis=1) for block in blocks if len(block)])
+    sizes = np.repeat([size + 1, size], [n_longer, count - n_longer])
+    level, middle = quiet / -np.log(1 - NOISE_QUANTILE), np.cumsum(sizes) - sizes / 2
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), np.finfo(np.float64).tiny))
 
 
@@ -162,3 +166,10 @@ def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPea
     shift = 0.5 * (before - after) / np.where(bend < 0, bend, -1.0)
     amplitude = np.sqrt(np.exp(top - 0.25 * (before - after) * shift))
     return SpectralPeaks((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
+
+
+def find_separate_peaks(spectrum: Spectrum, distance: float = 0.0) -> SpectralPeaks:
+    """Find peaks without those on the skirts of others; distance: from any louder peak, at least (Hz)."""
+    peaks = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
+    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency) < distance
+    return peaks[~np.any(apart & (peaks.amplitude > peaks.amplitude[:, np.newaxis]), axis=1)]

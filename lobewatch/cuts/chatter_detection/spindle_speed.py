@@ -47,6 +47,8 @@ VOTE_PEAK_WIDTH = 9
 """Number of grid steps around each compared speed."""
 MIN_GRID_SHARE = 0.5
 """Smallest share of peaks on the harmonic grid, and of peaks with a neighbor one or two turns or teeth away."""
+RIPPLE_DISTANCE = 30.0
+"""Distance between peaks by which a speed is searched again (Hz), as side bands of ripple are nearer."""
 MIN_AGREEING_PEAKS = 3
 """Smallest number of matching peaks, as a pump has a comb, too."""
 
@@ -75,18 +77,38 @@ def _count_same(speed: SpindleSpeed, others: Sequence[SpindleSpeed]) -> int:
 
 
 def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
-    """Find the speed of all axes together."""
-    peaks, voted = find_cut_peaks(spectra, air), _find_speed_by_peaks(spectra, air, teeth, commanded)
+    """Find the speed of all axes together; where the peaks fit none, once more without the side bands of ripple."""
+    found = (_find_speed(spectra, air, teeth, commanded, distance) for distance in (0.0, RIPPLE_DISTANCE))
+    return next((speed for speed in found if speed is not None), None)
+
+
+def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> SpindleSpeed | None:
+    """Refine a speed of another part of the same cut by the multiples in this part; None if few agree."""
+    peaks = find_cut_peaks(spectra, air).loudest(combs.MAX_COMB_PEAKS)
+    speed = combs.refine_comb(known.frequency, peaks, spectra[0].bin_width)
+    if speed is None or abs(speed.frequency / known.frequency - 1) > USUAL_SPEED_TOLERANCE:
+        return None
+    return speed if speed.agreeing >= MIN_SURE_VOTES else None
+
+
+def _find_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float, distance: float) -> SpindleSpeed | None:
+    """Find the spindle frequency (Hz); distance: of separate peaks, at least (Hz)."""
+    peaks, voted = (
+        find_cut_peaks(spectra, air, distance),
+        _find_speed_by_peaks(spectra, air, teeth, commanded, distance),
+    )
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         return voted or summed
     return summed if refine_speed(summed.frequency, peaks, spectra[0].bin_width).agreeing >= voted.agreeing else voted
 
 
-def _find_speed_by_peaks(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
+def _find_speed_by_peaks(
+    spectra: Spectra, air: Spectra, teeth: int, commanded: float, distance: float
+) -> SpindleSpeed | None:
     """Find the speed by peaks clear of the noise."""
-    peaks = [spectral.remove_skirts(spectral.find_peaks(spectrum), spectrum.bin_width) for spectrum in spectra]
-    of_cut, first = find_cut_peaks(spectra, air), spectra[0]
+    peaks = [spectral.find_separate_peaks(spectrum, distance) for spectrum in spectra]
+    of_cut, first = find_cut_peaks(spectra, air, distance), spectra[0]
     voted = find_speed_by_votes(of_cut, spectral.join_peaks(peaks), first, teeth, commanded)
     comb = find_comb(of_cut, first.bin_width, first.sample_rate, teeth, commanded, COMB_SPEED_TOLERANCE)
     if comb is None:

@@ -1,7 +1,7 @@
 """Journal lines for test cuts, events and exclusions, and the tests and cuts that all lines give."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from operator import attrgetter
 from typing import Any, Literal, get_args
@@ -38,6 +38,24 @@ class RecordingFile:
     def file(self) -> str:
         """Path of the file in the machine folder."""
         return f"cuts/{self.id}.h5"
+
+
+@dataclass(frozen=True)
+class PartVerdict:
+    """Verdict on a part of a cut."""
+
+    from_s: float
+    """Time at which the part begins, from the beginning of the recording (s)."""
+    to_s: float
+    """Time at which it ends (s)."""
+    verdict: CutVerdict
+    """Verdict on the part."""
+    hz: float | None = None
+    """Chatter frequency (Hz); None without chatter."""
+
+    def shift(self, seconds: float) -> "PartVerdict":
+        """Return the part in a recording that begins some seconds earlier."""
+        return replace(self, from_s=round(self.from_s + seconds, 3), to_s=round(self.to_s + seconds, 3))
 
 
 @dataclass(frozen=True)
@@ -82,6 +100,8 @@ class CutEntry:
     """Recording of the cut; None without one."""
     power: CutPower | None = None
     """Power of the cut; None if it was not read."""
+    parts: tuple[PartVerdict, ...] = ()
+    """Verdicts on the parts of the cut, from the beginning of its recording; empty without them."""
     excluded: str = ""
     """Reason of its exclusion, from other lines; empty if included."""
 
@@ -103,6 +123,8 @@ class CutEntry:
     def line(self) -> dict[str, Any]:
         """Journal line."""
         fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        if not self.parts:
+            del fields["parts"]
         return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
 
 
@@ -117,6 +139,7 @@ def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
     fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
     for name, kind in (("recording", RecordingFile), ("power", CutPower)):
         fields[name] = kind(**line[name]) if line.get(name) else None
+    fields["parts"] = tuple(PartVerdict(**part) for part in line.get("parts", ()))
     return CutEntry(**fields | {"excluded": excluded})
 
 

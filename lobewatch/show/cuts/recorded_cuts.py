@@ -18,6 +18,7 @@ from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine import ProgramTable
+from lobewatch.show.cuts.cut_parts import parts_json, parts_texts, recorded_cut_remarks
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.programs.verdicts import chance_text, factor_text
@@ -133,7 +134,8 @@ def cut_verdict_label(comparison: CutComparison) -> str:
 
 def recorded_cut_texts(comparison: CutComparison) -> list[str]:
     """Return the verdict on a recorded cut, and its evidence."""
-    detected, texts = comparison.detected, [cut_verdict_text(comparison)]
+    detected = comparison.detected
+    texts = [cut_verdict_text(comparison), *parts_texts(detected.part_verdicts)]
     if detected.spindle_speed is not None:
         set_rpm = comparison.setting.speed_rpm
         off = 100 * (comparison.speed_rpm / set_rpm - 1)
@@ -157,7 +159,7 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
         texts.append(f"air taken from {comparison.air_from}, a cut at the same speed")
     if comparison.power is not None:
         texts.append(power_text(comparison.power, comparison.setting.cut))
-    return [*texts, *_prediction_texts(comparison)]
+    return [*texts, *_prediction_texts(comparison), *remark_lines(recorded_cut_remarks(comparison))]
 
 
 def _prediction_texts(comparison: CutComparison) -> Iterator[str]:
@@ -206,10 +208,7 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
         "predicted": expected and ("stable" if expected.stable else "chatter"),
         "predicted_frequency_hz": expected and expected.frequency,
         "predicted_apart_hz": comparison.frequency_difference,
-        "begin_s": heard.parts.begin,
-        "end_s": heard.parts.end,
-        "steady_begin_s": heard.parts.steady_begin,
-        "steady_end_s": heard.parts.steady_end,
+        **parts_json(comparison),
     }
 
 
@@ -217,7 +216,7 @@ def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[
     """Return the cut in a recording, several as a list in `cuts`; more: further keys of each."""
     cuts = [recorded_cut_json(comparison) for comparison in comparisons]
     for cut, keys in zip(cuts, more, strict=False):
-        cut.update(keys)
+        cut |= {**keys, "remarks": [*cut["remarks"], *keys.get("remarks", ())]}
     return cuts[0] if len(cuts) == 1 else {"cuts": cuts}
 
 

@@ -1,0 +1,49 @@
+"""Show the parts of a recorded cut, and the remarks on its ripple."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from acquisition import Remark
+from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.machine.journal.entries import PartVerdict
+from lobewatch.show.terminal.output import JsonObject
+
+
+def part_text(part: PartVerdict) -> str:
+    """Return the verdict on a part of a cut with its times, such as "chatter at 1760 Hz from 1.6 to 4.6 s"."""
+    at = "" if part.hz is None else f" at {part.hz:.0f} Hz"
+    word = "period-two chatter" if part.verdict == "flip" else part.verdict
+    return f"{word}{at} from {part.from_s:.1f} to {part.to_s:.1f} s"
+
+
+def parts_texts(parts: Sequence[PartVerdict]) -> list[str]:
+    """Return the verdicts on the parts of a cut in one text, empty if they are one part."""
+    return [", ".join(map(part_text, parts))] if len(parts) > 1 else []
+
+
+def recorded_cut_remarks(comparison: CutComparison) -> list[Remark]:
+    """Return the remarks on a recorded cut."""
+    ripple = comparison.detected.ripple
+    if ripple is None:
+        return []
+    kinds = [f"loudness by {100 * ripple.loudness:.0f} %"] if ripple.loudness else []
+    kinds += [f"speed by {100 * ripple.speed:.2f} %"] if ripple.speed else []
+    text = f"the cut ripples at {ripple.frequency:.1f} Hz ({', '.join(kinds)}), which is no chatter"
+    cure = "Check ribs, small circles, the ball screw and the drive for this frequency"
+    return [Remark("modulated", comparison.setting.program or "reference cut", text, cure)]
+
+
+def parts_json(comparison: CutComparison) -> JsonObject:
+    """Return the place and the parts of a recorded cut, its ripple, and the codes of the remarks on it."""
+    heard, ripple = comparison.detected, comparison.detected.ripple
+    return {
+        "begin_s": heard.parts.begin,
+        "end_s": heard.parts.end,
+        "steady_begin_s": heard.parts.steady_begin,
+        "steady_end_s": heard.parts.steady_end,
+        "parts": [asdict(part) for part in heard.part_verdicts],
+        "ripple_hz": ripple and ripple.frequency,
+        "loudness_ripple": ripple and ripple.loudness,
+        "speed_ripple": ripple and ripple.speed,
+        "remarks": [remark.code for remark in recorded_cut_remarks(comparison)],
+    }

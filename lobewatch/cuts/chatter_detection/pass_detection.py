@@ -33,10 +33,8 @@ MIN_PASS_LENGTH = cuts.MIN_CUT_TIME + 2 * cuts.CUT_SETTLING_TIME
 """Shortest pass (s): the shortest evaluated part, entry and exit."""
 MAX_PASS_AIR = 2.0
 """Longest air next to a pass (s), as the sound of a shop changes; chosen."""
-MIN_SEARCHED_CUT = 3.0
-"""Length of a cut found by its loudness from which it may hold several passes (s); chosen."""
 MIN_PASSES_IN_CUT = 3
-"""Smallest number of passes that replace one cut found by its loudness, in which tooth passing may fade; chosen."""
+"""Smallest number of passes that replace one cut found by its loudness, as tooth passing may fade in it; chosen."""
 MIN_COVERED_SHARE = 0.5
 """Smallest length of all passes over that of the cuts found by loudness that they replace; chosen.
 
@@ -51,19 +49,23 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
     loud = cuts.find_cuts(signal, sample_rate, 1 / commanded)
     usable = [parts for parts in loud if parts.reason in ("", "knock")]
     length = sum(parts.end - parts.begin for parts in usable)
-    if len(usable) == 1 and length < MIN_SEARCHED_CUT:
-        return loud
     passes = find_passes(signal, sample_rate, teeth, commanded)
     covered = sum(parts.end - parts.begin for parts in passes)
     least = MIN_PASSES_IN_CUT if len(usable) == 1 else len(usable) + 1
     is_more = len(passes) >= least and covered >= MIN_COVERED_SHARE * length
-    if is_more and (not usable or _are_gaps_quieter(signal, passes)):
+    if is_more and (not _has_several(usable, passes) or _are_gaps_quieter(signal, passes)):
         return passes
     if len(usable) < 2:
         return loud
     times = np.array([(parts.begin, parts.end) for parts in usable])
     shop = _list_gaps(times, np.shape(signal)[-1] / sample_rate, sample_rate)
     return [parts._replace(shop=shop) for parts in loud]
+
+
+def _has_several(loud: list[CutParts], passes: list[CutParts]) -> bool:
+    """Return whether a cut found by its loudness holds several passes."""
+    middles = np.array([(parts.begin + parts.end) / 2 for parts in passes])
+    return any(np.count_nonzero((middles > parts.begin) & (middles < parts.end)) > 1 for parts in loud)
 
 
 def _are_gaps_quieter(signal: Floats, passes: list[CutParts]) -> bool:

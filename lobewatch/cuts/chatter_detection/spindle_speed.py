@@ -63,7 +63,14 @@ def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded:
     if len(spectra) == 1:
         return together
     found = (_find_common_speed([axis], [quiet], teeth, commanded) for axis, quiet in zip(spectra, air, strict=True))
-    alone = [speed for speed in found if speed is not None]
+    return choose_common_speed(together, [speed for speed in found if speed is not None])
+
+
+def choose_common_speed(together: SpindleSpeed | None, alone: Sequence[SpindleSpeed]) -> SpindleSpeed | None:
+    """Choose the speed of all axes together if it is that of an axis alone, else that of most axes.
+
+    Without a speed of all axes together, two axes must agree.
+    """
     if together is not None and (not alone or _count_same(together, alone)):
         return together
     best = max(alone, key=lambda speed: (_count_same(speed, alone), speed.agreeing), default=None)

@@ -13,8 +13,8 @@ from lobewatch.cuts.chatter_detection.cut_evaluation import (
     CutEvaluation,
     CutRecording,
     evaluate_recording,
-    evaluate_with_air,
 )
+from lobewatch.cuts.chatter_detection.earlier_air import evaluate_with_air
 from lobewatch.cuts.chatter_detection.spectrum import sideband_distance
 from lobewatch.cuts.learning.cut_likelihood import ExpectedChatter, predict_chatter
 from lobewatch.logbook.analysis import Analysis

@@ -1,6 +1,5 @@
 """Air of earlier recorded cuts of a machine, for a cut recorded without air."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from acquisition.files.cut_file import CutSignal, read_cut_signal
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import find_cuts
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.machine.journal.entries import RecordingFile
 from lobewatch.machine.settings.requested_cut import CutSetting
 
 MAX_AIR_SPEED_DIFFERENCE = 0.01
@@ -32,30 +31,30 @@ class RememberedAir(NamedTuple):
 
 def find_remembered_air(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> RememberedAir | None:
     """Find the newest air at the speed of a cut, recorded with the same sensors; None without it."""
-    for entry in _list_similar_cuts(logbook, setting, signal):
+    for recorded in _list_similar_cuts(logbook, setting, signal):
         try:
-            earlier, _ = read_cut_signal(logbook.folder.path / entry.recording.file)
+            earlier, _ = read_cut_signal(logbook.folder.path / recorded.file)
         except (DataError, OSError):
             continue
         if not _is_same_recorder(earlier, signal):
             continue
         for parts in reversed(find_cuts(earlier.acceleration, earlier.sample_rate, 60 / setting.speed_rpm)):
             if not parts.reason:
-                return RememberedAir(entry.id, np.atleast_2d(earlier.acceleration)[:, parts.air])
+                return RememberedAir(recorded.id, np.atleast_2d(earlier.acceleration)[:, parts.air])
     return None
 
 
-def _list_similar_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Iterator[CutEntry]:
-    """Yield the newest recorded cuts at the same speed by the same kind of sensor."""
+def _list_similar_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> list[RecordingFile]:
+    """List the newest recordings of cuts at the same speed by the same kind of sensor."""
     similar = [
-        entry
+        entry.recording
         for entry in reversed(logbook.files.contents.cuts)
         if entry.recording is not None
         and not entry.excluded
         and entry.by == signal.sensor
         and abs(entry.commanded_rpm / setting.speed_rpm - 1) <= MAX_AIR_SPEED_DIFFERENCE
     ]
-    yield from similar[:MAX_AIR_RECORDINGS]
+    return similar[:MAX_AIR_RECORDINGS]
 
 
 def _is_same_recorder(one: CutSignal, other: CutSignal) -> bool:

@@ -397,34 +397,3 @@ def _find_signal_fault(recording: CutRecording, parts: CutParts) -> str:
     if recording.clipped is not None and np.any(recording.clipped if parts.reason else recording.clipped[parts.cut]):
         return "overload"
     return "lost-scans" if recording.lost_scans else parts.reason
-
-
-def evaluate_with_air(recording: CutRecording, air: Floats, *, is_calibrated: bool) -> list[CutEvaluation]:
-    """Evaluate each cut in a recording after air from an earlier recording at the same speed, shape (axes, n).
-
-    is_calibrated: the same sensor has the same sensitivity. Otherwise the noise of the air is made as loud as that of
-    the recording, as a microphone may be nearer. Times count from the beginning of the recording.
-    """
-    axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
-    if not is_calibrated:
-        levels = [
-            [np.median(spectrum.noise) for spectrum in spectral.compute_spectra(part, 1.0)] for part in (axes, air)
-        ]
-        air = air * np.sqrt(np.array(levels[0]) / np.array(levels[1]))[:, np.newaxis]
-    count = air.shape[1]
-    longer = recording._replace(
-        signal=np.concatenate([air, axes], axis=1),
-        clipped=None if recording.clipped is None else np.pad(recording.clipped, (count, 0)),
-        measured_rpm=None
-        if recording.measured_rpm is None
-        else np.pad(recording.measured_rpm, (count, 0), mode="edge"),
-    )
-    return [_shift_times(sound, count / recording.sample_rate) for sound in evaluate_recording(longer)]
-
-
-def _shift_times(sound: CutEvaluation, earlier: float) -> CutEvaluation:
-    """Return an evaluation with times in a recording that begins later (s)."""
-    names = ("begin", "end", "steady_begin", "steady_end")
-    times = {name: float(np.maximum(getattr(sound.parts, name) - earlier, 0.0)) for name in names}
-    part_verdicts = tuple(part.shift(-earlier) for part in sound.part_verdicts)
-    return sound._replace(parts=sound.parts._replace(**times), part_verdicts=part_verdicts)

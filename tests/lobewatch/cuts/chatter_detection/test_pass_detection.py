@@ -26,7 +26,7 @@ def comb(frequency: float, count: int = 10) -> Floats:
 
 def between(*times: tuple[float, float]) -> Floats:
     """One between times (s), else zero."""
-    return np.sum([(begin <= TIME) & (end > TIME) for begin, end in times], axis=0).astype(np.float64)
+    return np.asarray(np.sum([(begin <= TIME) & (end > TIME) for begin, end in times], axis=0), dtype=np.float64)
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,8 @@ def test_a_cut_that_loudness_finds_keeps_its_times() -> None:
     random = np.random.default_rng(3)
     signal = 0.05 * random.normal(size=TIME.size) + between((3.0, 5.0)) * comb(TEETH * TURN)
     (parts,) = find_cuts_in_shop(signal, RATE, TEETH, 75.0)
-    assert (parts.begin, parts.end, parts.shop) == (pytest.approx(3.0, abs=0.03), pytest.approx(5.0, abs=0.03), ())
+    assert (parts.begin, parts.end) == pytest.approx((3.0, 5.0), abs=0.03)
+    assert parts.shop == ()
 
 
 @pytest.mark.parametrize(

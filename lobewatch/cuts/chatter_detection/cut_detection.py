@@ -159,7 +159,7 @@ def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: sli
     if steady[1] - steady[0] >= longest:
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
-    parts = CutParts("", air, settled, *(place / rate for place in (begin, end, first, last)))
+    parts = CutParts("", air, settled, begin / rate, end / rate, first / rate, last / rate)
     return parts._replace(reason=find_cut_fault(axes, parts, rate, step))
 
 

@@ -147,6 +147,8 @@ def _build_passes(times: Floats, duration: float, rate: float) -> list[CutParts]
         air = max(before, after, key=lambda gap: gap[1] - gap[0])
         last = end - settling
         steady = max(begin + settling, last - cuts.MAX_CUT_TIME), last
-        slices = (slice(round(max(part[0], 0.0) * rate), max(round(part[1] * rate), 0)) for part in (air, steady))
-        passes.append(CutParts("", *slices, begin, end, begin + settling, last, shop))
+        air_slice, cut_slice = (
+            slice(round(max(part[0], 0.0) * rate), max(round(part[1] * rate), 0)) for part in (air, steady)
+        )
+        passes.append(CutParts("", air_slice, cut_slice, begin, end, begin + settling, last, shop))
     return passes

@@ -42,7 +42,7 @@ Chatter can hide tooth passing, so that only entry and exit of a cut look like p
 
 
 def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded: float) -> list[CutParts]:
-    """Find the cuts in a recording by their loudness, or by tooth passing if that finds more.
+    """Find the cuts in a recording by their loudness, or by tooth passing if that finds more or joins fragments.
 
     signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; commanded: spindle frequency as set (Hz).
     """
@@ -52,7 +52,8 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
     passes = find_passes(signal, sample_rate, teeth, commanded)
     covered = sum(parts.end - parts.begin for parts in passes)
     least = MIN_PASSES_IN_CUT if len(usable) == 1 else len(usable) + 1
-    is_more = len(passes) >= least and covered >= MIN_COVERED_SHARE * length
+    is_broken = len(passes) >= MIN_PASSES_IN_CUT and _has_several(passes, usable)
+    is_more = (is_broken or len(passes) >= least) and covered >= MIN_COVERED_SHARE * length
     if is_more and (not _has_several(usable, passes) or _are_gaps_quieter(signal, passes)):
         return passes
     if len(usable) < 2:
@@ -62,10 +63,10 @@ def find_cuts_in_shop(signal: Floats, sample_rate: float, teeth: int, commanded:
     return [parts._replace(shop=shop) for parts in loud]
 
 
-def _has_several(loud: list[CutParts], passes: list[CutParts]) -> bool:
-    """Return whether a cut found by its loudness holds several passes."""
-    middles = np.array([(parts.begin + parts.end) / 2 for parts in passes])
-    return any(np.count_nonzero((middles > parts.begin) & (middles < parts.end)) > 1 for parts in loud)
+def _has_several(longer: list[CutParts], shorter: list[CutParts]) -> bool:
+    """Return whether a cut found in one way holds several found in the other."""
+    middles = np.array([(parts.begin + parts.end) / 2 for parts in shorter])
+    return any(np.count_nonzero((middles > parts.begin) & (middles < parts.end)) > 1 for parts in longer)
 
 
 def _are_gaps_quieter(signal: Floats, passes: list[CutParts]) -> bool:

@@ -34,9 +34,9 @@ class CutSignal:
     sample_rate: float
     """Sample rate (Hz)."""
     codes: Codes | None = None
-    """ADC codes, shape (n,); None if a recording of another program holds values."""
+    """ADC codes, shape (n,) or (responses, n); None if a recording of another program holds values."""
     channel: Channel | None = None
-    """Channel that turns codes into m/s^2; None without codes."""
+    """Channel that turns codes of the first response into m/s^2; None without codes."""
     lost_scans: int = 0
     """Number of missing scans."""
     overload: bool = False
@@ -45,6 +45,10 @@ class CutSignal:
     """Kind of sensor: accelerometer or microphone."""
     speed_rpm: Floats | None = None
     """Spindle speed by a tachometer at each sample (rpm), NaN if unknown, shape (n,); None without one."""
+    more_channels: tuple[Channel, ...] = ()
+    """Channels of the codes of further responses."""
+    overload_spans: tuple[tuple[int, int], ...] = ()
+    """First sample and the one after the last of each reported overload; empty if it is not known where."""
 
     @property
     def duration(self) -> float:
@@ -56,21 +60,36 @@ class CutSignal:
         """True for each clipped sample, shape (n,).
 
         A sample is clipped at a rail of its converter, or in three equal extreme values in a row where there are no
-        codes. All are where the device reported an overload. With several responses, any of them counts.
+        codes. So are those of a reported overload, all of them if its place is unknown. With several responses, any
+        of them counts.
         """
-        if self.overload or not self.acceleration.size:
-            return np.full(self.acceleration.shape[-1], self.overload)
+        is_everywhere = self.overload and not self.overload_spans
+        if is_everywhere or not self.acceleration.size:
+            return np.full(self.acceleration.shape[-1], is_everywhere)
+        found = self._find_clipped()
+        for first, last in self.overload_spans:
+            found[first:last] = True
+        return found
+
+    def _find_clipped(self) -> Flags:
+        """Return where any response is at its limits, shape (n,)."""
         if self.codes is not None and self.channel is not None:
-            low, high = self.channel.effective_rails(self.codes)
-            return np.asarray((self.codes <= low) | (self.codes >= high))
+            rows = zip(np.atleast_2d(self.codes), (self.channel, *self.more_channels), strict=True)
+            limits = [(codes, *channel.effective_rails(codes)) for codes, channel in rows]
+            return np.asarray(np.any([(codes <= low) | (codes >= high) for codes, low, high in limits], axis=0))
         return np.asarray(np.any([_find_extremes(axis) for axis in np.atleast_2d(self.acceleration)], axis=0))
 
     def slice_time(self, begin: float, end: float) -> CutSignal:
         """Return the part from one time to another (s)."""
         inside = slice(max(round(begin * self.sample_rate), 0), max(round(end * self.sample_rate), 0))
-        codes = None if self.codes is None else self.codes[inside]
+        codes = None if self.codes is None else self.codes[..., inside]
         speed = None if self.speed_rpm is None else self.speed_rpm[inside]
-        return replace(self, acceleration=self.acceleration[..., inside], codes=codes, speed_rpm=speed)
+        part = replace(self, acceleration=self.acceleration[..., inside], codes=codes, speed_rpm=speed)
+        if not self.overload_spans:
+            return part
+        shifted = [(max(a - inside.start, 0), min(b, inside.stop) - inside.start) for a, b in self.overload_spans]
+        spans = tuple((first, last) for first, last in shifted if first < last)
+        return replace(part, overload_spans=spans, overload=bool(spans))
 
 
 def _find_extremes(values: Floats) -> Flags:
@@ -102,11 +121,16 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
         file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
         if signal.codes is not None and signal.channel is not None:
-            codes = signal.codes.astype(raw_hits.choose_code_type([signal.channel]))
-            _write_compressed(file, "codes", codes, "ADC code")
-            raw_hits.write_channel(file["codes"].attrs, signal.channel)
+            channels = signal.channel, *signal.more_channels
+            for name, row, channel in zip(
+                _code_names(len(channels)), np.atleast_2d(signal.codes), channels, strict=True
+            ):
+                _write_compressed(file, name, row.astype(raw_hits.choose_code_type([channel])), "ADC code")
+                raw_hits.write_channel(file[name].attrs, channel)
         else:
             _write_compressed(file, "acceleration", signal.acceleration, "m/s^2")
+        if signal.overload_spans:
+            _write_compressed(file, "overload_spans", np.array(signal.overload_spans, dtype=np.int64), "sample")
         if signal.speed_rpm is not None:
             _write_compressed(file, "speed", signal.speed_rpm, "rpm")
     content = hdf5_file.append_checksum(memory.getvalue())
@@ -136,9 +160,18 @@ def _read_signal(file: h5py.File) -> CutSignal:
         sensor = str(file.attrs.get("sensor", "accelerometer"))
         speed = file["speed"][()] if "speed" in file else None
         return CutSignal(file["acceleration"][()], rate, None, None, lost, overload, sensor, speed)
-    channel = raw_hits.read_channel(file["codes"].attrs)
-    codes = file["codes"][()].astype(np.int32)
-    return CutSignal(codes * channel.scale, rate, codes, channel, lost, overload)
+    names = [name for name in _code_names(len(file)) if name in file]
+    channel, *more = (raw_hits.read_channel(file[name].attrs) for name in names)
+    rows = np.stack([file[name][()].astype(np.int32) for name in names])
+    values = rows * np.array([[one.scale] for one in (channel, *more)])
+    codes, values = (rows, values) if more else (rows[0], values[0])
+    spans = tuple((int(a), int(b)) for a, b in file["overload_spans"][()]) if "overload_spans" in file else ()
+    return CutSignal(values, rate, codes, channel, lost, overload, more_channels=tuple(more), overload_spans=spans)
+
+
+def _code_names(count: int) -> list[str]:
+    """Return the names of the codes of so many responses; older versions read the first only."""
+    return ["codes", *(f"codes_{number}" for number in range(2, count + 1))]
 
 
 def _write_compressed(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:

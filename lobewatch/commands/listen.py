@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -71,6 +72,9 @@ def listen(
     pulses: Annotated[int | None, Option(min=1, help="Tachometer pulses per revolution. Default: 1.")] = None,
     port: Annotated[str, Option(help="Serial port of the DAQ. Default: [daq] port.")] = "",
     seconds: Annotated[float, Option(min=2, help="Longest wait for a cut (s).")] = 120.0,
+    cuts: Annotated[
+        int | None, Option(min=1, help="Number of cuts to record. Default: no limit at a terminal, else 1.")
+    ] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Show the result without storing it.")] = False,
     out: Annotated[Path | None, Option(help="Spectrum figure (.svg, .png, .pdf).")] = None,
     screen: Annotated[bool, Option("--screen", help="Show the result in a browser too.")] = False,
@@ -83,10 +87,10 @@ def listen(
     file_options: FileOptions,
     as_json: Json = False,
 ) -> None:
-    """Record a cut and detect chatter.
+    """Record cuts and detect chatter.
 
-    Start with the spindle running in air, then cut for at least one second. The recording and its result are stored.
-    lobewatch exclude takes the cut out of all results.
+    Start with the spindle running in air, then cut for at least one second. Each recording and its result are stored.
+    lobewatch then waits for the next cut, until you press Ctrl-C. lobewatch exclude takes a cut out of all results.
 
     A recorded cut instead of a machine folder needs --teeth and --speed. The result is not stored.
 
@@ -127,16 +131,22 @@ def listen(
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
             _start_screen(screens, publisher, {"listen": listen, "token": token, "watch_token": watch_token})
-        signal = recorder.acquire_cut(
-            logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
+        signals = screens.enter_context(
+            contextlib.closing(
+                recorder.acquire_cut(
+                    logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
+                )
+            )
         )
-        comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
-        _save_figure(comparisons, out)
-        if dry_run:
-            payload, texts = _suggest_untapped(logbook, comparisons)
-            emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
-        else:
-            _store(logbook, comparisons, signal, date, publisher, as_json)
+        limit = cuts or (None if notes.is_terminal and sys.stdin.isatty() else 1)
+        for signal in itertools.islice(signals, limit):
+            comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
+            _save_figure(comparisons, out)
+            if dry_run:
+                payload, texts = _suggest_untapped(logbook, comparisons)
+                emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
+            else:
+                _store(logbook, comparisons, signal, date, publisher, as_json)
 
 
 def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "ServerOptions") -> Never:

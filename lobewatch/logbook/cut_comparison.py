@@ -9,12 +9,18 @@ import numpy as np
 
 from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
-from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.cut_evaluation import (
+    CutEvaluation,
+    CutRecording,
+    evaluate_recording,
+)
+from lobewatch.cuts.chatter_detection.earlier_air import evaluate_with_air
 from lobewatch.cuts.chatter_detection.spectrum import sideband_distance
-from lobewatch.cuts.chatter_detection.without_air import evaluate_with_or_without_air
+from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
 from lobewatch.cuts.learning.cut_likelihood import ExpectedChatter, predict_chatter
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
+from lobewatch.logbook.remembered_air import find_remembered_air
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import lobewatch_version, resolve_cutting_time, store_cut
 from lobewatch.machine.journal.entries import CutEntry
@@ -40,6 +46,8 @@ class CutComparison:
     """Sensor that recorded the cut."""
     predicted: ExpectedChatter | None
     """Chatter predicted from the modes at the detected speed, else at the set speed. None without modes."""
+    air_from: str = ""
+    """Identity of the earlier cut whose air was used; empty with air of its own."""
 
     @property
     def tooth_passing_frequency(self) -> float:
@@ -102,12 +110,33 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     lowest = min((mode.frequency for mode in modes), default=0.0)
     recording = CutRecording(signal.acceleration, signal.sample_rate, *as_set, *found, lowest)
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
-    evaluate = evaluate_with_or_without_air if isinstance(tool, DataError) else evaluate_recording
-    evaluated = evaluate(recording)
-    comparisons = [CutComparison(setting, detected, assembly, sensor, None) for detected in evaluated]
+    evaluated, air_from = _evaluate_with_any_air(logbook, setting, signal, recording)
+    if isinstance(tool, DataError) and not air_from:
+        evaluated = evaluate_without_air(recording, evaluated)
+    comparisons = [CutComparison(setting, detected, assembly, sensor, None, air_from) for detected in evaluated]
     if assembly is None:
         return comparisons
     return [replace(cut, predicted=predict_chatter(setting, assembly, cut.speed_rpm)) for cut in comparisons]
+
+
+NO_AIR_REASONS = ("no-air", "no-cut")
+"""Reasons of recordings that air of an earlier cut may resolve: all of it may be one cut."""
+
+
+def _evaluate_with_any_air(
+    logbook: Logbook, setting: CutSetting, signal: CutSignal, recording: CutRecording
+) -> tuple[list[CutEvaluation], str]:
+    """Evaluate each cut; without air in the recording with that of an earlier cut, whose identity is returned."""
+    evaluated = evaluate_recording(recording)
+    if any(detected.reason not in NO_AIR_REASONS for detected in evaluated):
+        return evaluated, ""
+    air = find_remembered_air(logbook, setting, signal)
+    if air is None:
+        return evaluated, ""
+    again = evaluate_with_air(recording, air.signal, is_calibrated=signal.sensor != "microphone")
+    if any(detected.reason in NO_AIR_REASONS for detected in again):
+        return evaluated, ""
+    return again, air.cut
 
 
 def store_recorded_cuts(

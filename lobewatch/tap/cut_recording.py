@@ -2,26 +2,27 @@
 
 import contextlib
 import enum
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
-from acquisition import Block, Channel, DataError, Description, Device, DeviceError
-from acquisition.arrays import Codes
+from acquisition import DataError, Description, Device, DeviceError
 from acquisition.errors import format_error, join_sentences
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import read_cut_recording
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import find_cuts
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
+from lobewatch.cuts.chatter_detection.cut_search import CutSearch
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
 from lobewatch.machine import MachineFolder, check_device_rate
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, get_newest_codes, label_device, open_device
+from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
+from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, label_device, open_device
 from lobewatch.tap.live_curves import find_extremes
 from lobewatch.tap.state import LiveState, StatePublisher
 
@@ -99,8 +100,8 @@ def build_cut_curves(comparison: CutComparison) -> dict[str, Floats]:
 
 CUT_SEARCH_INTERVAL = 0.5
 """Time between two searches for a cut in the recorded signal (s)."""
-KEPT_SIGNAL_SECONDS = 20.0
-"""Length of the newest signal that is kept (s)."""
+UNCLEAR_CUT_INTERVAL = 2.0
+"""Time to the next search if the whole signal does not show the cut that its bands show (s); chosen."""
 MAX_CUT_SECONDS = 8.0
 """Length after which a cut is evaluated, whether it ends or not (s)."""
 AIR_AFTER_CUT = 0.3
@@ -117,47 +118,6 @@ CUT_TOO_SHORT_TEXT = (
 CUT_RUNNING_TEXT = "Cut for a second or longer, then leave the cut. The verdict then appears automatically."
 
 
-@dataclass
-class _SignalBuffer:
-    """Newest signal of one channel."""
-
-    channel: Channel
-    row: int
-    rate: float
-    codes: list[Codes] = field(default_factory=list)
-    marks: list[tuple[int, int]] = field(default_factory=list)
-    count: int = 0
-    received: int = 0
-
-    def add(self, block: Block) -> None:
-        """Keep a block and drop what is too old."""
-        codes = block.codes[self.row]
-        if block.lost_before or block.overload >> self.row & 1:
-            self.marks.append((self.received, block.lost_before or -1))
-        self.codes.append(codes)
-        self.received, self.count = self.received + codes.size, self.count + codes.size
-        while self.count - self.codes[0].size > KEPT_SIGNAL_SECONDS * self.rate:
-            self.count -= self.codes.pop(0).size
-
-    @property
-    def signal(self) -> CutSignal:
-        """Signal that is kept."""
-        codes, first = np.concatenate(self.codes), self.received - self.count
-        marks = [mark for place, mark in self.marks if place > first]
-        lost = sum(mark for mark in marks if mark > 0)
-        values = np.asarray(codes * self.channel.scale, np.float64)
-        return CutSignal(values, self.rate, codes, self.channel, lost, -1 in marks)
-
-    @property
-    def level(self) -> float:
-        """RMS about the mean over the newest LEVEL_WINDOW (m/s^2)."""
-        return float(np.std(get_newest_codes(self.codes, self.rate)) * abs(self.channel.scale))
-
-    def forget(self) -> None:
-        """Drop the signal so far."""
-        self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
-
-
 Publish = Callable[..., None]
 """Function called with changed fields of CutState."""
 
@@ -165,66 +125,130 @@ Publish = Callable[..., None]
 def record_cut(
     device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
 ) -> CutSignal:
-    """Record the next whole cut of a started device, from the air before it to the air after it.
+    """Record the next whole cut of a started device, as `record_cuts` does."""
+    return next(record_cuts(device, turn, time_limit, show, publish))
 
-    turn: time of a spindle revolution (s). time_limit: longest wait for the end of the cut (s). show: called with what
-    is awaited. publish: called with the changed fields of CutState. DataError without an accelerometer or if no cut is
-    detected in time, DeviceError if the sensor is dead.
+
+def record_cuts(
+    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
+) -> Iterator[CutSignal]:
+    """Record one whole cut of a started device after the other, each from the air before it to the air after it.
+
+    turn: time of a spindle revolution (s). time_limit: longest wait for the end of a cut (s), after which the
+    recording ends. show: called with what is awaited. publish: called with the changed fields of CutState. All
+    acceleration channels are recorded. DataError without an accelerometer or if no cut is detected in time,
+    DeviceError if a sensor is dead.
     """
-    row = next((i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"), None)
-    if row is None:
+    rows = [i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"]
+    if not rows:
         cure = "Plug the accelerometer in, or add a [[daq.channel]] for it to machine.toml"
         raise DataError(join_sentences("the device has no acceleration channel", cure))
-    buffer = _SignalBuffer(device.channels[row], row, device.sample_rate)
-    waiting = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+    buffer = SignalBuffer([device.channels[row] for row in rows], rows, device.sample_rate)
     show("Recording. Start the cut.")
-    for signal in _iterate_signals(device, buffer, time_limit, publish):
-        parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
-        has_ended = np.isfinite(parts.end) and signal.duration - parts.end > AIR_AFTER_CUT
-        if has_ended and parts.reason:
-            buffer.forget()
-            show(CUT_TOO_SHORT_TEXT)
-            waiting = {"word": CutStep.AGAIN, "reason": CUT_TOO_SHORT_TEXT}
-            publish(**waiting, cut_seconds=None)
-        elif not parts.reason and (has_ended or parts.end - parts.begin > MAX_CUT_SECONDS):
-            return signal.slice_time(max(parts.begin - AIR_BEFORE_CUT, 0.0), parts.end + AIR_AFTER_CUT)
-        elif np.isfinite(parts.begin):
-            publish(word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=parts.end - parts.begin)
-        elif buffer.received >= SENSOR_CHECK_DELAY * buffer.rate:
-            publish(**waiting, cut_seconds=None)
-    cure = "Start with the spindle running in air, then cut, or increase record_cut.time_limit"
-    raise DataError(join_sentences(f"no cut was detected in {time_limit:g} s", cure))
-
-
-def _iterate_signals(device: Device, buffer: _SignalBuffer, time_limit: float, publish: Publish) -> Iterator[CutSignal]:
-    """Yield the signal so far, again and again."""
-    next_look, next_level, checked = CUT_SEARCH_INTERVAL, LEVEL_WINDOW, False
+    recorder = _CutRecorder(buffer, CutSearch(device.sample_rate, turn, KEPT_SIGNAL_SECONDS), turn, show, publish)
+    n_cuts, until = 0, time_limit
     for block in device.blocks():
-        buffer.add(block)
-        seconds = buffer.received / buffer.rate
-        if not checked and seconds >= SENSOR_CHECK_DELAY:
-            _check_sensor_signal(buffer)
-            checked = True
-        if seconds >= next_level:
-            next_level = seconds + LEVEL_WINDOW
-            publish(level=buffer.level, left=max(time_limit - seconds, 0.0))
-        if seconds >= next_look:
-            next_look = seconds + CUT_SEARCH_INTERVAL
-            yield buffer.signal
-        if seconds > time_limit:
-            return
+        recorder.search.add(buffer.add(block))
+        recorder.watch(until)
+        signal = recorder.look() if buffer.seconds >= recorder.next_look else None
+        if signal is not None:
+            yield signal
+            n_cuts, until = n_cuts + 1, buffer.seconds + time_limit
+        if buffer.seconds > until:
+            break
+    if not n_cuts:
+        cure = "Start with the spindle running in air, then cut, or increase record_cut.time_limit"
+        raise DataError(join_sentences(f"no cut was detected in {time_limit:g} s", cure))
 
 
-def _check_sensor_signal(buffer: _SignalBuffer) -> None:
-    codes = np.concatenate(buffer.codes)
-    low, high = buffer.channel.rails
-    if np.mean((codes <= low) | (codes >= high)) > 0.5:
-        raise DeviceError(
-            "the accelerometer signal is at the limit of the input range", "Check the cable and the power supply"
+WAITING: Mapping[str, Any] = {"word": CutStep.LISTENING, "reason": SENSOR_ON_HOUSING_TEXT}
+"""Fields of CutState while the first cut is awaited. After a cut its result stays to be seen."""
+
+
+@dataclass
+class _CutRecorder:
+    """Watcher of a stream for whole cuts."""
+
+    buffer: SignalBuffer
+    search: CutSearch
+    turn: float
+    show: Callable[[str], None]
+    publish: Publish
+    next_look: float = CUT_SEARCH_INTERVAL
+    next_level: float = LEVEL_WINDOW
+    is_checked: bool = False
+    waiting: Mapping[str, Any] = field(default_factory=lambda: WAITING)
+    """Fields of CutState while a cut is awaited."""
+
+    def watch(self, until: float) -> None:
+        """Check the sensors once, and publish the level again and again; until: end of the wait (s)."""
+        seconds = self.buffer.seconds
+        if not self.is_checked and seconds >= SENSOR_CHECK_DELAY:
+            _check_sensor_signal(self.buffer)
+            self.is_checked = True
+        if seconds >= self.next_level:
+            self.next_level = seconds + LEVEL_WINDOW
+            self.publish(level=self.buffer.level, left=max(until - seconds, 0.0))
+
+    def look(self) -> CutSignal | None:
+        """Look for a cut at little cost, and return it if it is whole."""
+        now = self.buffer.seconds
+        self.next_look = now + CUT_SEARCH_INTERVAL
+        newest = self.search.find_newest()
+        if newest is None:
+            if self.is_checked:
+                self.publish(**self.waiting, cut_seconds=None)
+            return None
+        begin, end = newest
+        if now - end > AIR_AFTER_CUT or end - begin > MAX_CUT_SECONDS:
+            return self._take_whole_cut(now)
+        self._show_cutting(end - begin)
+        return None
+
+    def _take_whole_cut(self, now: float) -> CutSignal | None:
+        """Return the newest cut if it is whole and usable; if it is over and not usable, ask for another one."""
+        start = self.buffer.first / self.buffer.rate
+        kept = self.buffer.take(start, now)
+        parts = find_cuts(kept.acceleration, kept.sample_rate, self.turn)[-1]
+        begin, end = start + parts.begin, start + parts.end
+        has_ended = np.isfinite(end) and now - end > AIR_AFTER_CUT
+        if has_ended and parts.reason:
+            self._forget(now)
+            self.show(CUT_TOO_SHORT_TEXT)
+            self.waiting = {"word": CutStep.AGAIN, "reason": CUT_TOO_SHORT_TEXT}
+            self.publish(**self.waiting, cut_seconds=None)
+        elif not parts.reason and (has_ended or end - begin > MAX_CUT_SECONDS):
+            signal = self.buffer.take(max(begin - AIR_BEFORE_CUT, start), end + AIR_AFTER_CUT)
+            self._forget(end)
+            self.waiting = {}
+            return signal
+        else:
+            self.next_look = now + UNCLEAR_CUT_INTERVAL
+            if np.isfinite(begin):
+                self._show_cutting(end - begin)
+        return None
+
+    def _show_cutting(self, seconds: float) -> None:
+        self.publish(
+            word=CutStep.CUTTING, reason=CUT_RUNNING_TEXT, cut_seconds=seconds, comparison=None, saved="", plots=None
         )
-    if np.ptp(codes) == 0:
-        cure = "Plug the accelerometer in, fix it to the housing, and run the spindle"
-        raise DeviceError("the accelerometer signal is constant", cure)
+
+    def _forget(self, before: float) -> None:
+        """Forget the stream before a time (s)."""
+        self.buffer.forget(before)
+        self.search.forget(before)
+
+
+def _check_sensor_signal(buffer: SignalBuffer) -> None:
+    for channel, codes in zip(buffer.channels, np.concatenate(buffer.codes, axis=1), strict=True):
+        low, high = channel.rails
+        if np.mean((codes <= low) | (codes >= high)) > 0.5:
+            raise DeviceError(
+                "the accelerometer signal is at the limit of the input range", "Check the cable and the power supply"
+            )
+        if np.ptp(codes) == 0:
+            cure = "Plug the accelerometer in, fix it to the housing, and run the spindle"
+            raise DeviceError("the accelerometer signal is constant", cure)
 
 
 def acquire_cut(
@@ -236,15 +260,16 @@ def acquire_cut(
     description: Description,
     show: Callable[[str], None],
     publish: Publish,
-) -> CutSignal:
-    """Read a cut from a file, or record one with the device of machine.toml.
+) -> Generator[CutSignal, None, None]:
+    """Read a cut from a file, or record one after the other with the device of machine.toml.
 
     file: replaces the device. description: what the file does not state itself. time_limit: longest wait for a cut (s).
-    show: called with what to do. publish: as in record_cut. ValueError without a port, DataError for a file without
+    show: called with what to do. publish: as in record_cuts. ValueError without a port, DataError for a file without
     such a recording or if no cut is detected, DeviceError if no device answers.
     """
     if file is not None:
-        return read_cut_recording(file, description)
+        yield read_cut_recording(file, description)
+        return
     port = port or folder.machine.daq.port
     if not port:
         raise ValueError(
@@ -260,7 +285,7 @@ def acquire_cut(
             check_device_rate(folder, device)
         publish(device=label_device(device))
         device.start()
-        return record_cut(device, 60 / setting.speed_rpm, time_limit, show, publish)
+        yield from record_cuts(device, 60 / setting.speed_rpm, time_limit, show, publish)
 
 
 def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:

@@ -71,6 +71,8 @@ class CutParts(NamedTuple):
     """Time at which the entry ends (s)."""
     steady_end: float = np.nan
     """Time at which the exit begins (s)."""
+    shop: tuple[slice, ...] = ()
+    """Samples of all air between passes in a shop, whose tones come and go."""
 
 
 WHOLE_SIGNAL = CutParts("")
@@ -103,12 +105,12 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     if np.count_nonzero(sounds) < 2 * N_QUIET_PIECES:
         return [CutParts("no-cut")]
     is_loud = np.zeros(sounds.size, dtype=np.bool_)
-    is_loud[sounds] = _find_loud_pieces([_piece_power(axis[sounds], sample_rate) for axis in pieces])
-    joined = _join_stretches(_find_stretches(is_loud), MAX_PAUSE_TIME * sample_rate / step)
+    is_loud[sounds] = find_loud_pieces([compute_piece_power(axis[sounds], sample_rate) for axis in pieces])
+    joined = join_stretches(find_stretches(is_loud), MAX_PAUSE_TIME * sample_rate / step)
     stretches = [(first, last) for first, last in joined if (last - first) * step > MAX_KNOCK_TIME * sample_rate]
     if not stretches:
         return [CutParts("no-cut")]
-    air = _find_longest_air(_find_stretches(is_loud | ~sounds), sounds.size, step)
+    air = _find_longest_air(find_stretches(is_loud | ~sounds), sounds.size, step)
     power = np.log10(np.sum(np.var(pieces, axis=2), axis=0) + np.finfo(np.float64).tiny)
     cuts = [_build_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
@@ -116,24 +118,24 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     return [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least] or [longest]
 
 
-def _find_loud_pieces(axes: Sequence[Floats]) -> Flags:
+def find_loud_pieces(axes: Sequence[Floats]) -> Flags:
     """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
 
     axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
     """
     loudness = np.max([_loudness(power) for power in axes], axis=0)
     power = np.log10(np.sum([np.sum(power, axis=1) for power in axes], axis=0))
-    is_loud, is_strong = (level > _loudness_threshold(level) for level in (loudness, power))
-    is_clearer = _loudness_step(power, is_strong) > _loudness_step(loudness, is_loud) + POWER_STEP_MARGIN
+    is_loud, is_strong = (level > find_loudness_threshold(level) for level in (loudness, power))
+    is_clearer = compute_loudness_step(power, is_strong) > compute_loudness_step(loudness, is_loud) + POWER_STEP_MARGIN
     return np.asarray(is_strong if is_clearer else is_loud)
 
 
-def _loudness_step(level: Floats, is_loud: Flags) -> float:
+def compute_loudness_step(level: Floats, is_loud: Flags) -> float:
     """By how much what is loud is louder than what is not, in the mean."""
     return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if np.any(is_loud) and not np.all(is_loud) else 0.0
 
 
-def _loudness_threshold(level: Floats) -> float:
+def find_loudness_threshold(level: Floats) -> float:
     """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
     smooth = scipy.ndimage.uniform_filter1d(level, N_QUIET_PIECES)
     half_window = N_QUIET_PIECES // 2
@@ -157,8 +159,8 @@ def _build_parts(axes: Floats, power: Floats, stretch: tuple[int, int], air: sli
     if steady[1] - steady[0] >= longest:
         first, last = steady
     settled = slice(max(first, last - longest), max(first, last))
-    parts = CutParts("", air, settled, *(place / rate for place in (begin, end, first, last)))
-    return parts._replace(reason=_find_cut_fault(axes, parts, rate, step))
+    parts = CutParts("", air, settled, begin / rate, end / rate, first / rate, last / rate)
+    return parts._replace(reason=find_cut_fault(axes, parts, rate, step))
 
 
 def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, int]:
@@ -168,13 +170,13 @@ def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, 
     changes.
     """
     smooth = scipy.ndimage.uniform_filter1d(power, N_QUIET_PIECES)
-    usual = _join_stretches(_find_stretches(np.abs(smooth - np.median(smooth)) < ENTRY_LOUDNESS_STEP), join)
+    usual = join_stretches(find_stretches(np.abs(smooth - np.median(smooth)) < ENTRY_LOUDNESS_STEP), join)
     first, last = max(usual, key=lambda stretch: stretch[1] - stretch[0])
     entry, leaving = (n if n <= min(power.size / 4, most) else 0 for n in (first, power.size - last))
     return entry, leaving
 
 
-def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+def find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
     """Why parts cannot be listened to, a code; empty where they can."""
     if parts.cut.stop - parts.cut.start < MIN_CUT_TIME * sample_rate:
         return "too-short"
@@ -183,7 +185,24 @@ def _find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int
     return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
 
 
-def _piece_power(pieces: Floats, sample_rate: float) -> Floats:
+OVERLOAD_GUARD_TIME = 0.05
+"""Time before and after an overload that is left out, too (s), as sensors and filters recover; chosen."""
+
+
+def trim_overload(parts: CutParts, clipped: Flags, sample_rate: float) -> CutParts:
+    """Leave out the samples of a cut near an overload, if a stretch of `MIN_CUT_TIME` remains; else keep them."""
+    inside = clipped[parts.cut]
+    if parts.reason or not np.any(inside):
+        return parts
+    width = 2 * round(OVERLOAD_GUARD_TIME * sample_rate) + 1
+    clean = find_stretches(~scipy.ndimage.maximum_filter1d(inside, width))
+    begin, end = max(clean, key=lambda stretch: stretch[1] - stretch[0], default=(0, 0))
+    if end - begin < MIN_CUT_TIME * sample_rate:
+        return parts
+    return parts._replace(cut=slice(parts.cut.start + begin, parts.cut.start + end))
+
+
+def compute_piece_power(pieces: Floats, sample_rate: float) -> Floats:
     """Return the power of pieces above `MIN_LOUDNESS_FREQUENCY`; pieces: shape (pieces, size)."""
     size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
@@ -205,13 +224,13 @@ def _loudness(power: Floats) -> Floats:
     return np.asarray(np.log10(np.mean(np.minimum(power / least, MAX_POWER_OVER_AIR), axis=1)))
 
 
-def _find_stretches(loud: Flags) -> list[tuple[int, int]]:
+def find_stretches(loud: Flags) -> list[tuple[int, int]]:
     """Return the first piece and the one after the last of each stretch."""
     edge = np.diff(np.concatenate(([0], loud.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))
 
 
-def _join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
+def join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
     """Stretches with short pauses between them as one; gap: longest pause (pieces)."""
     joined: list[tuple[int, int]] = []
     for begin, end in stretches:

@@ -13,9 +13,10 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, find_cuts
+from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, trim_overload
 from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
+from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
@@ -129,7 +130,8 @@ def evaluate_cut(
         return speed
     even = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     cut, spectra, quiet, speed, ripple = even
-    axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
+    gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
+    axes = zip(cut, gaps, spectra, quiet, strict=True)
     about = speed, teeth, immersion, known
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)
@@ -177,7 +179,7 @@ def _least_energy(chatter: ChatterPeaks) -> float:
 
 def _evaluate_axis(
     cut: Floats,
-    air: Floats,
+    air: Sequence[Floats],
     spectrum: Spectrum,
     quiet: Spectrum,
     speed: SpindleSpeed,
@@ -194,9 +196,18 @@ def _evaluate_axis(
         return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion, known)
 
     sound = evaluate(quiet)
-    if sound.reason != "unexplained-tone" or sound.peaks is None:
+    is_searched = sound.verdict != "stable" if known.shop else sound.reason == "unexplained-tone"
+    if is_searched and sound.peaks is not None:
+        for gap in air:
+            quiet = classification.add_air_tones(quiet, gap, sound.peaks.unexplained.frequency)
+        sound = evaluate(quiet)
+    if not known.shop or sound.reason != "faint" or sound.peaks is None:
         return sound
-    return evaluate(classification.add_air_tones(quiet, air, sound.peaks.unexplained.frequency))
+    left, tooth = sound.peaks.unexplained, speed.frequency * teeth
+    chatter = classification.find_chatter_peaks(left, tooth, spectrum.bin_width)
+    if classification.has_sidebands(left, chatter, speed.frequency, spectrum.bin_width):
+        return sound
+    return _evaluate_stable(sound._replace(verdict="stable", reason=""), sound.peaks, teeth, immersion)
 
 
 def _find_speed(
@@ -335,9 +346,10 @@ class CutRecording(NamedTuple):
 def evaluate_recording(recording: CutRecording) -> list[CutEvaluation]:
     """Evaluate each cut in a recording; without a cut the only entry gives the reason.
 
-    Reasons without a verdict are those of `find_cuts` and `evaluate_cut`, "overload" and "lost-scans".
+    Reasons without a verdict are those of `find_cuts_in_shop` and `evaluate_cut`, "overload" and "lost-scans".
     """
-    cuts = find_cuts(recording.signal, recording.sample_rate, 60 / recording.commanded_rpm)
+    commanded = recording.commanded_rpm / 60
+    cuts = find_cuts_in_shop(recording.signal, recording.sample_rate, recording.teeth, commanded)
     return [_evaluate_windows(recording, parts) for parts in cuts]
 
 
@@ -352,12 +364,15 @@ def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation
         of_window = parts if place == parts.cut else parts._replace(cut=place, reason="")
         return _evaluate_window(recording, of_window, known)
 
-    known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest)
+    shop = tuple(axes[:, gap] for gap in parts.shop)
+    known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest, shop=shop)
     return evaluate_windows(evaluate, axes, parts, rate, known)
 
 
 def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:
-    """Evaluate the samples `cut` of parts."""
+    """Evaluate the samples `cut` of parts, without those near an overload."""
+    if recording.clipped is not None:
+        parts = trim_overload(parts, recording.clipped, recording.sample_rate)
     reason = _find_signal_fault(recording, parts)
     if reason and reason != "no-air":
         return CutEvaluation("cannot tell", reason, parts)

@@ -40,6 +40,8 @@ class KnownCut(NamedTuple):
     """Lowest frequency of chatter (Hz)."""
     is_begun: bool = False
     """True if the cut has begun before the window, so that no mode rings down from the entry."""
+    shop: tuple[Floats, ...] = ()
+    """All air between passes in a shop, whose tones come and go, each of shape (axes, n)."""
 
 
 NOTHING_KNOWN = KnownCut()

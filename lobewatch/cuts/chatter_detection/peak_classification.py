@@ -101,7 +101,7 @@ def add_air_tones(air: Spectrum, signal: Floats, frequency: Floats) -> Spectrum:
     signal: of the air, shape (n,). A tone counts if it exceeds its neighbours within a piece. A knock does not,
     nor does a tone that moves 40 Hz or more in a piece, such as a harmonic of a spindle that slows down.
     """
-    size = round(AIR_PIECE_LENGTH * air.sample_rate)
+    size = min(round(AIR_PIECE_LENGTH * air.sample_rate), signal.size)
     step, level = air.sample_rate / size, np.zeros(frequency.size)
     reaches = round(spectral.AIR_PEAK_TOLERANCE), TONE_NOISE_BINS
     near, tolerance = (_bins_around(frequency / step, bins, size // 2) for bins in reaches)

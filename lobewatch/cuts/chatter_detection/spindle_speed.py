@@ -1,5 +1,7 @@
 """Find the true spindle speed of a cut, with or without a tachometer."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
@@ -19,6 +21,8 @@ SAME_SPEED_TOLERANCE = 1e-3
 
 A comb that explains as many peaks is preferred, since it has one unknown. Votes have one more for each family of
 sidebands."""
+MIN_SAME_AXES = 2
+"""Number of axes whose speeds must be the same where all axes together have none."""
 MIN_SURE_VOTES = 6
 """Number of matching peaks that a speed by votes needs without a plain comb and with a misfit (`MAX_SPEED_MISFIT`)."""
 VOTE_SPEED_TOLERANCE = 0.021
@@ -52,9 +56,35 @@ MIN_AGREEING_PEAKS = 3
 def find_speed_of_spectra(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
     """Find the spindle frequency (Hz) in the steady part of a cut, near the commanded one (Hz), or None.
 
-    spectra: of all axes of the cut; air: of the same spindle without a cut. Where the peaks fit no speed, it is
-    searched once more without the side bands of ripple.
+    spectra: of all axes of the cut; air: of the same spindle without a cut. If the speed of all axes together is that
+    of none of them alone, the one on which most axes agree is taken: a loud axis of few peaks must not shift it.
     """
+    together = _find_common_speed(spectra, air, teeth, commanded)
+    if len(spectra) == 1:
+        return together
+    found = (_find_common_speed([axis], [quiet], teeth, commanded) for axis, quiet in zip(spectra, air, strict=True))
+    return choose_common_speed(together, [speed for speed in found if speed is not None])
+
+
+def choose_common_speed(together: SpindleSpeed | None, alone: Sequence[SpindleSpeed]) -> SpindleSpeed | None:
+    """Choose the speed of all axes together if it is that of an axis alone, else that of most axes.
+
+    Without a speed of all axes together, two axes must agree.
+    """
+    if together is not None and (not alone or _count_same(together, alone)):
+        return together
+    best = max(alone, key=lambda speed: (_count_same(speed, alone), speed.agreeing), default=None)
+    is_confirmed = best is not None and (together is not None or _count_same(best, alone) >= MIN_SAME_AXES)
+    return best if is_confirmed else together
+
+
+def _count_same(speed: SpindleSpeed, others: Sequence[SpindleSpeed]) -> int:
+    """Count the speeds that are the same as one."""
+    return sum(abs(other.frequency / speed.frequency - 1) < SAME_SPEED_TOLERANCE for other in others)
+
+
+def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
+    """Find the speed of all axes together; where the peaks fit none, once more without the side bands of ripple."""
     found = (_find_speed(spectra, air, teeth, commanded, distance) for distance in (0.0, RIPPLE_DISTANCE))
     return next((speed for speed in found if speed is not None), None)
 

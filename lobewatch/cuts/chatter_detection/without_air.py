@@ -34,7 +34,11 @@ def evaluate_with_or_without_air(recording: CutRecording) -> list[CutEvaluation]
     recording
         Recording to be evaluated.
     """
-    found = evaluate_recording(recording)
+    return evaluate_without_air(recording, evaluate_recording(recording))
+
+
+def evaluate_without_air(recording: CutRecording, found: list[CutEvaluation]) -> list[CutEvaluation]:
+    """Evaluate a recording of nothing but a cut; the evaluations found with air if it has any."""
     if len(found) > 1 or found[0].reason not in AIR_REASONS:
         return found
     return [_evaluate_whole(recording, found[0])]

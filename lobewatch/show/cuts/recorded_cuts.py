@@ -155,6 +155,8 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
         )
     if comparison.sensor == "microphone":
         texts.append(MICROPHONE_NOTE)
+    if comparison.air_from:
+        texts.append(f"air taken from {comparison.air_from}, a cut at the same speed")
     if comparison.power is not None:
         texts.append(power_text(comparison.power, comparison.setting.cut))
     return [*texts, *_prediction_texts(comparison), *remark_lines(recorded_cut_remarks(comparison))]
@@ -192,6 +194,7 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
         "elsewhere_rpm": heard.distant_rpm,
         "unexplained_tone_hz": heard.tone,
         "sensor": comparison.sensor,
+        "air_from": comparison.air_from or None,
         "speed_rpm": heard.speed_rpm,
         "speed_rpm_std": heard.spindle_speed and heard.spindle_speed.error * 60,
         "commanded_rpm": comparison.setting.speed_rpm,

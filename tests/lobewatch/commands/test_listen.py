@@ -125,6 +125,36 @@ def test_several_cuts_in_a_file_are_reported_and_kept_each_with_its_own_air(shop
     assert "chatter at 1712" in picture.read_text("utf-8")
 
 
+def trim_to_cut(path: Path, name: str) -> Path:
+    """Write a recording of `recording` again without its air."""
+    heading, *rows = path.read_text().splitlines()
+    trimmed = path.with_name(name)
+    trimmed.write_text("\n".join([heading, *rows[round(0.55 * RATE) : round(1.65 * RATE)]]) + "\n")
+    return trimmed
+
+
+@pytest.mark.parametrize("chatter", [None, 1712.3])
+def test_a_cut_without_air_has_that_of_an_earlier_cut_at_its_speed(
+    shop: Shop, tmp_path: Path, chatter: float | None
+) -> None:
+    place = ("--program", "A", "--speed", 12000, "--json")
+    short = trim_to_cut(recording(tmp_path / "next.csv", chatter), "short.csv")
+    alone = json.loads(run(shop, *place, "--file", short, "--dry-run").stdout)
+    assert (alone["word"], alone["air_from"]) == ("cannot tell", None)
+    whole = json.loads(run(shop, *place, "--file", recording(tmp_path / "cut.csv")).stdout)
+    assert (whole["word"], whole["air_from"], whole["id"]) == ("stable", None, "c1")
+    told = json.loads(run(shop, *place, "--file", short).stdout)
+    assert (told["word"], told["air_from"], told["id"]) == ("chatter" if chatter else "stable", "c1", "c2")
+    assert told["speed_rpm"] == pytest.approx(12077.0, rel=5e-5)
+    assert (told["begin_s"], told["end_s"]) == pytest.approx((0.0, 1.1), abs=0.05)
+    other = json.loads(run(shop, *place[:3], 12200, "--json", "--file", short, "--dry-run").stdout)
+    assert (other["word"], other["air_from"]) == ("cannot tell", None)
+    quiet = recording(tmp_path / "quiet.csv", seconds=0.05).read_text().splitlines()
+    (tmp_path / "idle.csv").write_text("\n".join([quiet[0], *quiet[round(0.6 * RATE) :]]) + "\n")
+    idle = json.loads(run(shop, *place, "--file", tmp_path / "idle.csv", "--dry-run").stdout)
+    assert idle["word"] == "cannot tell"
+
+
 def test_a_tone_that_nothing_explains_is_reported_with_its_distance_from_the_modes(shop: Shop, tmp_path: Path) -> None:
     shop.tap_both()
     time = np.arange(round(2.0 * RATE)) / RATE

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource, find_driver
 from acquisition.emulation import Passage
+from acquisition.files.cut_file import read_cut_signal, write_cut_signal
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
-from lobewatch.tap.cut_recording import record_cut
+from lobewatch.tap.cut_recording import record_cut, record_cuts
+from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
 from lobewatch.tap.emulated_cut import emulate_cut
 
 RATE = 12800.0
@@ -30,8 +32,9 @@ class Stream:
 
     identity, follows_clock, loss_detection, fault = DeviceIdentity("stream"), False, "", ""
 
-    def __init__(self, signal: Floats, lost_at: int = -1, channels: Any = CHANNELS) -> None:
+    def __init__(self, signal: Floats, lost_at: int = -1, channels: Any = CHANNELS, overloaded: int = -1) -> None:
         self.signal, self.lost_at, self.channels, self.sample_rate = signal, lost_at, channels, RATE
+        self.overloaded = overloaded
         self.events: deque[Any] = deque()
 
     def blocks(self) -> Iterator[Block]:
@@ -39,7 +42,9 @@ class Stream:
         for number, first in enumerate(range(0, codes.size, 256)):
             part = codes[first : first + 256]
             lost = 50 if number == self.lost_at else 0
-            yield Block(first, np.stack([np.zeros_like(part)] * (len(self.channels) - 1) + [part]), lost_before=lost)
+            rows = np.stack([part if one.quantity == "acceleration" else np.zeros_like(part) for one in self.channels])
+            overload = 1 << len(self.channels) - 1 if number == self.overloaded else 0
+            yield Block(first, rows, lost_before=lost, overload=overload)
 
 
 def sound(*parts: tuple[float, bool]) -> Floats:
@@ -73,6 +78,38 @@ def test_one_cut_is_taken_with_the_air_around_it() -> None:
     )
     assert abs(at - 900) < 0.05 * RATE
     assert len(told) == 1
+
+
+def test_cut_after_cut_is_recorded_with_its_own_air_until_none_comes() -> None:
+    signal = sound((2.0, False), (1.5, True), (2.5, False), (2.0, True), (2.5, False), (1.0, True), (6.0, False))
+    found = list(record_cuts(Stream(signal), 0.005, 5.5, lambda _: None))  # type: ignore[arg-type]
+    assert [cut.duration for cut in found] == pytest.approx([1.0 + length + 0.3 for length in (1.5, 2.0, 1.0)], abs=0.1)
+    assert all(np.std(cut.acceleration[: round(0.8 * RATE)]) < 0.1 for cut in found)
+
+
+def test_all_accelerometers_are_recorded_and_kept(tmp_path: Path) -> None:
+    channels = (*CHANNELS, Channel("acceleration", 2e-2, 5.0, serial_number="B7"))
+    found, _ = record(Stream(sound((1.0, False), (1.5, True), (1.0, False)), channels=channels))
+    assert found.acceleration.shape == (2, found.codes.shape[1])
+    assert found.acceleration[0] == pytest.approx(2 * found.acceleration[1], abs=0.02)
+    write_cut_signal(tmp_path / "c1.h5", found, {})
+    again, _ = read_cut_signal(tmp_path / "c1.h5")
+    assert np.array_equal(again.acceleration, found.acceleration)
+    assert again.more_channels == found.more_channels == channels[2:]
+
+
+def test_an_overload_marks_its_block_only_and_is_forgotten_with_it() -> None:
+    long = sound((1.0, False), (1.5, True), (1.0, False))
+    found, _ = record(Stream(long, overloaded=round(2.0 * RATE / 256)))
+    (span,) = found.overload_spans
+    assert np.count_nonzero(found.clipped) == span[1] - span[0] == 256
+    assert span[0] / RATE == pytest.approx(2.0 - 0.0, abs=0.05)
+    again, _ = record(Stream(np.concatenate([sound((30.0, False)), long]), overloaded=10))
+    assert (again.overload, again.overload_spans) == (False, ())
+    buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
+    for number in range(6000):
+        buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), lost_before=number % 2, overload=number % 2))
+    assert max(len(buffer.overloads), len(buffer.lost)) <= KEPT_SIGNAL_SECONDS * RATE / 256
 
 
 def test_a_cut_that_is_too_short_is_skipped() -> None:

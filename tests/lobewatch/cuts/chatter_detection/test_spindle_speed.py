@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
-from lobewatch.cuts.chatter_detection.spindle_speed import find_speed_by_votes
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum, compute_spectra
+from lobewatch.cuts.chatter_detection.spindle_speed import (
+    choose_common_speed,
+    find_speed_by_votes,
+    find_speed_of_spectra,
+)
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
 pytestmark = pytest.mark.quick
 
@@ -68,3 +73,46 @@ def test_lines_must_have_another_one_or_two_turns_or_teeth_away() -> None:
     assert np.isnan(speed_of([k * TURN for k in (4, 7, 18, 31, 45)], TURN * 1.002))
     assert speed_of([k * TURN for k in (4, 8, 9, 13, 21)], TURN * 1.002) == pytest.approx(TURN, rel=1e-9)
     assert speed_of([k * TURN for k in (3, 5, 20, 28)], TURN * 1.002) == pytest.approx(TURN, rel=1e-9)
+
+
+def spectra_of(*axes: Sequence[tuple[float, float]], seconds: float = 1.0) -> tuple[list[Spectrum], list[Spectrum]]:
+    """Spectra of axes of tones (Hz, amplitude) in noise, and of their air."""
+    random, time = np.random.default_rng(7), np.arange(round(seconds * RATE)) / RATE
+    sounds = [sum(a * np.cos(2 * np.pi * f * time + f) for f, a in axis) for axis in axes]
+    noise = 0.02 * random.normal(size=(2, len(axes), time.size))
+    return compute_spectra(noise[0] + np.array(sounds), RATE), compute_spectra(noise[1], RATE)
+
+
+@pytest.mark.parametrize("other", [0.9971, 1.003])
+def test_all_axes_together_have_the_speed_of_one_of_them(other: float) -> None:
+    """A third axis with the comb of another spindle is louder than two that agree."""
+    comb = [(4 * k * TURN, 1.0 / k) for k in range(1, 9)]
+    beside = [(4 * k * other * TURN, 3.0 / k**0.5) for k in range(1, 12)]
+    spectra, air = spectra_of(comb, [(f * 1.00001, 0.8 * a) for f, a in comb], beside)
+    alone = [find_speed_of_spectra([one], [quiet], 4, TURN) for one, quiet in zip(spectra, air, strict=True)]
+    together = find_speed_of_spectra(spectra, air, 4, TURN)
+    assert together is not None
+    assert min(abs(together.frequency / one.frequency - 1) for one in alone if one is not None) < 1e-3
+
+
+def speed_at(rpm: float, agreeing: int = 5) -> SpindleSpeed:
+    return SpindleSpeed(rpm / 60, 1e-3, 1.0, agreeing, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("together", "alone", "chosen"),
+    [
+        (6980.0, (7000.0, 7001.0), 7000.0),
+        (6980.0, (6960.0, 7000.0, 7001.0), 7000.0),
+        (7000.0, (6980.0, 7001.0), 7000.0),
+        (7000.0, (), 7000.0),
+        (None, (7000.0, 7001.0), 7000.0),
+        (None, (7000.0, 6960.0), None),
+        (None, (), None),
+    ],
+)
+def test_all_axes_together_have_the_speed_of_most_that_agree(
+    together: float | None, alone: tuple[float, ...], chosen: float | None
+) -> None:
+    found = choose_common_speed(None if together is None else speed_at(together), [speed_at(rpm) for rpm in alone])
+    assert (None if found is None else found.frequency * 60) == (None if chosen is None else pytest.approx(chosen))

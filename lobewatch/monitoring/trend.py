@@ -14,6 +14,7 @@ import numpy as np
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
+from lobewatch.monitoring.series_drop import DropModel, model_drop
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, Readings, SeriesScatterPrior, days_of_use
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
@@ -28,8 +29,6 @@ FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
 """Longest forecast after the last point (days); chosen."""
 MAX_RUN_IN_RATE = 0.4
 """Present rate of a drop over its mean rate, below which it has slowed down; chosen."""
-N_START_POINTS = 3
-"""Number of first points that define the start of a series without a fitted line; chosen."""
 
 
 class TapValue(NamedTuple):
@@ -108,16 +107,21 @@ class Trend:
         shape = self.forecast.likeliest
         return shape._replace(start=float(np.interp(shape.start, self.past_fit.dates, point_days(self.points))))
 
+    @cached_property
+    def drop_model(self) -> DropModel:
+        """Start and scatter of the series, by which each value becomes a drop."""
+        return model_drop(self.readings, np.array([point.error for point in self.points]), self.past_fit)
+
     @property
     def start(self) -> float:
-        """Start (%): the highest of the fitted line at the first 8 points, else of the first three points.
+        """Start (%): the highest of the fitted line at the first 8 points, else of the first three points."""
+        return self.drop_model.start
 
-        A first test clamped badly must not hide a drop for ever, and a mean of the first ones would hide that of a
-        spindle that drops from the beginning.
-        """
-        if self.past_fit is not None:
-            return float(self.past_fit.fitted[:MIN_FORECAST_POINTS].max())
-        return max(point.percent for point in self.points[:N_START_POINTS])
+    @cached_property
+    def drops(self) -> Floats:
+        """Drop of each point since the start (%), at the mean conditions, shape (n,)."""
+        model = self.drop_model
+        return np.array([model.percent_below_start(it.percent, it.temperature, it.operator) for it in self.points])
 
     @property
     def is_stale(self) -> bool:

@@ -154,26 +154,26 @@ class DropModel:
     start_variance: float
     """Variance of the start over that of a point."""
     start_error: float
-    """Standard error of the start from its tap test alone (%), where the scatter is not measured."""
+    """Standard error of the start from its tap test alone (%); 0 where the measured scatter contains it."""
     scatter: ScatterPosterior
     """Posterior of the scatter of a point."""
     effects: ConditionEffects = NO_EFFECTS
     """Effects of the conditions."""
+    is_short: bool = False
+    """True if the scatter is not measured, so that it does not contain the errors of the tap tests."""
 
     def percent_below_start(self, percent: float, temperature: float, operator: str) -> float:
         """Return the drop (%) of a value, given as 100 ln over the first test, at the mean conditions."""
         return -100 * math.expm1((percent - self.effects.at(temperature, operator)[0] - self.start) / 100)
 
-    def drop_at(self, percent: float, temperature: float, operator: str, error: float) -> SeriesDrop:
-        """Return the drop of a value with its interval; error: standard error from its tap test alone (%)."""
-        value = self.percent_below_start(percent, temperature, operator)
+    def drop_at(self, value: float, temperature: float, operator: str, error: float) -> SeriesDrop:
+        """Return a drop (%) with its interval; error: standard error of the value from its tap test alone (%)."""
         lever = 1 + self.start_variance + self.effects.at(temperature, operator)[1]
-        alone = math.hypot(self.start_error, np.nan_to_num(error) if self.start_error else 0.0)
+        alone = math.hypot(self.start_error, np.nan_to_num(error) if self.is_short else 0.0)
         ratio, change = 1 - value / 100, abs(100 * math.log1p(-value / 100))
-        tail = self.scatter.tail(change, lever, alone)
         std = ratio * math.hypot(math.sqrt(lever) * self.scatter.percent, alone)
-        is_proven = tail < float(scipy.special.ndtr(-PROVEN_DROP_SCORE))
-        return SeriesDrop(value, std, ratio * self.scatter.half_width(lever, alone), is_proven)
+        is_proven = self.scatter.tail(change, lever, alone) < scipy.special.ndtr(-PROVEN_DROP_SCORE)
+        return SeriesDrop(value, std, ratio * self.scatter.half_width(lever, alone), bool(is_proven))
 
     def half_width(self, error: float) -> float:
         """Return half the width of the 95 % interval of one value (%), with the scatter of a point."""
@@ -199,7 +199,7 @@ def _model_short_series(readings: Readings, errors: Floats) -> DropModel:
     scatter = ScatterPosterior.of(squares, y.size - 1.0, known, math.sqrt(apart) * USUAL_SCATTER[1])
     at = int(np.argmax(first))
     error = float(np.nan_to_num(errors[at]))
-    return DropModel(float(first[at]), HIGHEST_SQUARE[first.size - 1], error, scatter)
+    return DropModel(float(first[at]), HIGHEST_SQUARE[first.size - 1], error, scatter, is_short=True)
 
 
 def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:

@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Flags, Floats, Indices
+from lobewatch.monitoring.alarm_estimate import SeriesChange, estimate_drop
 from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
@@ -33,22 +34,10 @@ MIN_SHARED_CHANGE = 0.5
 SCORE_BLOCK_ROWS = 64
 """Number of points evaluated at once, which limits memory."""
 
-ChangeKind = Literal["step", "slope"]
-MIN_POINTS_AROUND_CHANGE: dict[ChangeKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
+MonitoredKind = Literal["step", "slope"]
+"""Kind of a change that the monitor looks for."""
+MIN_POINTS_AROUND_CHANGE: dict[MonitoredKind, tuple[int, int]] = {"step": (2, 2), "slope": (1, 3)}
 """Smallest number of points before and after a change of each kind."""
-
-
-class SeriesChange(NamedTuple):
-    """Change of a series, as fitted to its points."""
-
-    kind: ChangeKind
-    """Kind of the change: a step, or a slope since then."""
-    point: int
-    """Index of the first point after the step, or of the last one before the slope."""
-    size: float
-    """Drop from there to the last fitted point, in the unit of the series."""
-    half_width: float
-    """Half the width of the 95 % interval of the size."""
 
 
 class LikeliestChange(NamedTuple):
@@ -192,7 +181,7 @@ def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floa
 
 def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:
     """Fit the change up to one of the points to the whole series; at: index of that point."""
-    kind: ChangeKind = "step" if change.is_step[at] else "slope"
+    kind: MonitoredKind = "step" if change.is_step[at] else "slope"
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
@@ -204,15 +193,24 @@ N_CLOSING_POINTS = 4
 """Number of consecutive points without a certain drop that close an alarm; chosen."""
 
 
-class DetectedDrop(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class DetectedDrop:
     """Drop that has triggered an alarm; points by their index in the series."""
 
     triggered_at: int
     """Point that triggered it, the second consecutive certain one."""
     closed_at: int | None
     """Point that closed it; None while it is open."""
-    change: SeriesChange
-    """Kind and beginning when it was triggered, and present size."""
+    begin: int
+    """First point of the monitor that detected it."""
+    readings: Readings
+    """Series from there on."""
+
+    @cached_property
+    def change(self) -> SeriesChange:
+        """Kind, beginning and size of the drop, as all points from there on tell."""
+        change = estimate_drop(self.readings)
+        return change._replace(point=self.begin + change.point)
 
 
 class Detection(NamedTuple):
@@ -246,7 +244,7 @@ def detect_changes(readings: Readings) -> Detection:
         risen = up.first_alarm
         end = count if risen is None else begin + risen + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
-        drops += _find_drops(down, begin, judged, end)
+        drops += _find_drops(down, readings.since(begin), begin, judged, end)
         judged = end
         if risen is not None:
             seen = up.change_at(risen)
@@ -254,14 +252,12 @@ def detect_changes(readings: Readings) -> Detection:
     return Detection(scores, tuple(drops), rise)
 
 
-def _find_drops(watch: ChangeMonitor, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
+def _find_drops(watch: ChangeMonitor, readings: Readings, begin: int, first: int, end: int) -> Iterator[DetectedDrop]:
     """Find the drops that a monitor triggers an alarm for between two points."""
     raised = next(watch.alarms_from(first - begin), None)
     while raised is not None and begin + raised < end:
         closed = _find_closing_point(watch, raised)
-        drop = watch.change_at(raised)
-        shifted = drop._replace(point=begin + drop.point)
-        yield DetectedDrop(begin + raised, None if closed is None else begin + closed, shifted)
+        yield DetectedDrop(begin + raised, None if closed is None else begin + closed, begin, readings)
         raised = None if closed is None else next(watch.alarms_from(closed + 1), None)
 
 

@@ -163,7 +163,7 @@ class PastFit(NamedTuple):
     def rate(self) -> Rate:
         """Rate of change at its last point."""
         rate, error = (np.concatenate(rates) for rates in zip(*(f.rate() for f in self.families), strict=True))
-        low, high = (_mixture_quantile(self.weight, rate, error, self.freedom, p) for p in RATE_QUANTILES)
+        low, high = (mixture_quantile(self.weight, rate, error, self.freedom, p) for p in RATE_QUANTILES)
         return Rate(float(self.weight @ rate), low, high)
 
 
@@ -173,12 +173,12 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
     if y.size < MIN_FORECAST_POINTS or at[-1] <= 0:
         needed = f"a forecast needs {MIN_FORECAST_POINTS} points on several dates"
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates, but {needed}")
-    places = _average_neighbors(at)
-    base = build_level_model(_average_readings(readings))
+    places = average_neighbors(at)
+    base = build_level_model(average_readings(readings))
     families = trend_shapes.fit_shapes(base, places)
     walks = [trend_shapes.fit_random_walks(base, places, kind) for kind in ("wander", "bend")]
     kept, weight = _select_heaviest([*families, *walks])
-    first = _average_neighbors(y)[0]
+    first = average_neighbors(y)[0]
     fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
     return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))
 
@@ -190,17 +190,17 @@ def _point_spread(families: Sequence[trend_shapes.ShapeFits]) -> float:
     return float(np.sqrt(weight @ variance / weight.sum()))
 
 
-def _average_neighbors(values: Floats) -> Floats:
+def average_neighbors(values: Floats) -> Floats:
     """Average neighbors where there are many."""
     return np.array([part.mean() for part in np.array_split(values, min(values.size, MAX_FITTED_POINTS))])
 
 
-def _average_readings(readings: Readings) -> Readings:
+def average_readings(readings: Readings) -> Readings:
     """Average readings; operators count only where each reading is one point."""
     if readings.y.size <= MAX_FITTED_POINTS:
         return readings
-    temperature = None if readings.temperature is None else _average_neighbors(readings.temperature)
-    return Readings(_average_neighbors(readings.y), temperature)
+    temperature = None if readings.temperature is None else average_neighbors(readings.temperature)
+    return Readings(average_neighbors(readings.y), temperature)
 
 
 def _select_heaviest(families: Sequence[FitFamily]) -> tuple[tuple[FitFamily, ...], Floats]:
@@ -224,7 +224,7 @@ def _student_cdf(freedom: Floats, t: Floats) -> Floats:
     return np.asarray(share)
 
 
-def _mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
+def mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
     """Return a quantile of a mixture of Student's t; an error of 0 is a value that is certain."""
     reach = scipy.special.stdtrit(freedom, 1 - NEGLIGIBLE_PROBABILITY) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())

@@ -19,7 +19,8 @@ from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
 from lobewatch.measurement.tap_age import is_too_old, too_old_remark
 from lobewatch.monitoring import status_rules as rules
-from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SeriesChange
+from lobewatch.monitoring.alarm_estimate import ChangeKind, SeriesChange
+from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import Alarm, StatusLevel, TriggeredAlarm, add_acknowledgements
@@ -70,10 +71,15 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
 def _describe_change(change: SeriesChange) -> dict[str, str]:
     """Describe trend and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
     past, present = ("dropped", "dropping") if change.size > 0 else ("rose", "rising")
+    courses: dict[ChangeKind, str] = {
+        "step": f"{past} suddenly before",
+        "slope": f"has been {present} since",
+        "mixed": f"{past} suddenly and steadily since",
+        "dropped": f"{past} since",
+    }
     ratio = math.exp(-change.size / 100)
     size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} % (95 % interval)"
-    course = f"{past} suddenly before" if change.kind == "step" else f"has been {present} since"
-    return {"course": course, "change": size}
+    return {"course": courses[change.kind], "change": size}
 
 
 @dataclass(frozen=True)

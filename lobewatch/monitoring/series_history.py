@@ -18,7 +18,8 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.history.history import WATCHED_VALUES, HistoryRow
 from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
-from lobewatch.monitoring.change_detection import SeriesChange, find_newest_change
+from lobewatch.monitoring.alarm_estimate import SeriesChange
+from lobewatch.monitoring.change_detection import find_newest_change
 from lobewatch.monitoring.series_drop import NO_DROP, UNKNOWN_DROP, SeriesDrop
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, SeriesScatterPrior
 from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_points

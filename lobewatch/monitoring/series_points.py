@@ -51,12 +51,15 @@ class Readings(NamedTuple):
     """Values of the other direction from the same clampings, NaN if there are none, shape (n,)."""
     scatter_prior: SeriesScatterPrior = NO_SERIES_PRIOR
     """Prior of the scatter."""
+    days: Floats | None = None
+    """Days of use of the points, increasing, shape (n,); evenly spaced if None."""
 
     def since(self, begin: int) -> Self:
         """Return the points from one on."""
         y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
         temperature, other = (None if values is None else values[begin:] for values in optional)
-        return self._replace(y=y, temperature=temperature, operators=operators, other_direction=other)
+        later = self._replace(y=y, temperature=temperature, operators=operators, other_direction=other)
+        return later if self.days is None else later._replace(days=self.days[begin:])
 
     @property
     def shared_points(self) -> Indices:

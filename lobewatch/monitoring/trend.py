@@ -182,9 +182,10 @@ def fit_trend(
     points, past = list_newest_points(taps), None
     percents, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
     others = np.array([*_other_percents(points, list_newest_points(other))])
-    readings = Readings(percents, warmth, tuple(point.operator for point in points), others, known)
+    days = days_of_use(point_days(points), np.array([point.hours for point in points]))
+    readings = Readings(percents, warmth, tuple(point.operator for point in points), others, known, days)
     if len(points) >= MIN_FORECAST_POINTS:
-        past = fit_past(days_of_use(point_days(points), np.array([point.hours for point in points])), readings)
+        past = fit_past(days, readings)
     return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
 
 

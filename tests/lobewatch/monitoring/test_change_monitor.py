@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as students
 
+from lobewatch.monitoring.alarm_estimate import SeriesChange
 from lobewatch.monitoring.change_detection import (
     SURE_CHANGE_SCORE,
     ChangeMonitor,
-    SeriesChange,
     detect_changes,
     find_newest_change,
     monitor_drops,

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from lobewatch.monitoring.change_detection import SeriesChange
+from lobewatch.monitoring.alarm_estimate import SeriesChange
 from lobewatch.monitoring.trend import TapValue, Trend, fit_trend
 
 START = datetime(2024, 1, 15, 9, tzinfo=UTC)

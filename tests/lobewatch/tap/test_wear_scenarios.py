@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from dsm import natural_frequencies
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.monitoring.change_detection import SeriesChange
+from lobewatch.monitoring.alarm_estimate import SeriesChange
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, TapValue, Trend, days_since_epoch, fit_trend
 from lobewatch.show.terminal.option_names import with_option_names
 from lobewatch.tap.demo import PlannedTap, forecast_levels, plan_taps

@@ -135,14 +135,14 @@ class StatusRule(NamedTuple):
 FREQUENCY_ALARM = StatusRule(
     "frequency-alarm",
     ALARM,
-    "frequency dropped {drop:.1f} % since the first tests (alarm at {limit:g} %)",
+    "frequency {drop} (alarm at {limit:g} %)",
     "Stop. Inspect bearings, tool and clamping, then repeat the tap test.",
     is_limit=True,
 )
 FREQUENCY_DECAY = StatusRule(
     "decay",
     ALARM,
-    "frequency {course} {since:%Y-%m-%d}, by {change}{run_in}",
+    "frequency {course} {since:%Y-%m-%d}, now {drop}{run_in}",
     "Inspect bearings, tool and clamping. Then run {event} after a repair, "
     "or operator_entries.acknowledge_alarms {folder} if the cause is known.",
 )
@@ -160,7 +160,7 @@ NEVER_TAPPED = StatusRule(
 FREQUENCY_WARNING = StatusRule(
     "frequency-warn",
     WARN,
-    "frequency dropped {drop:.1f} % since the first tests (warning at {limit:g} %)",
+    "frequency {drop} (warning at {limit:g} %)",
     "Repeat the tap test. If the second test confirms the drop, inspect bearings and clamping soon.",
     is_limit=True,
 )
@@ -187,7 +187,7 @@ PROGRAM_DOUBTFUL = StatusRule(
     "Run Logbook.verdicts for the cause of this verdict and for safe values",
 )
 FREQUENCY_ROSE = StatusRule(
-    "frequency-rose", GOOD, "frequency rose by {change} (assembly changed?)", "Run {event} if the assembly was changed"
+    "frequency-rose", GOOD, "frequency rose, now {drop} (assembly changed?)", "Run {event} if the assembly was changed"
 )
 VALUE_CHANGED = StatusRule(
     "value-changed",

@@ -15,6 +15,7 @@ from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.measurement import Measurement
 from lobewatch.measurement.recording_questions import check_question_codes, find_device_questions, find_open_questions
 from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.drop_text import describe_drop
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceOpener
 from lobewatch.tap.hit_loop import TapPhases, TapStopped
@@ -272,8 +273,8 @@ def _format_values(measurement: Measurement, series: SeriesStatus | None) -> lis
     if find_open_questions(measurement.remarks):
         against = "but the test has an open question"
     elif series is not None and not series.is_baseline:
-        sign = "+" if series.drop.value < 0 else ""
-        against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % compared with the first test"
+        drop = series.drop
+        against = describe_drop(drop.value, drop.half_width, is_proven=series.is_change_proven)
     damping = format_with_error(mode.damping_ratio, zeta_std, 0.01)
     stiffness = f"Stiffness {format_with_error(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:

@@ -87,8 +87,8 @@ class Gauge(NamedTuple):
     """Position of the alarm limit."""
 
 
-def make_gauge(drop: float, warn: float, alarm: float) -> Gauge:
-    """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty."""
+def make_gauge(drop: float, change: str, warn: float, alarm: float) -> Gauge:
+    """Return the gauge of a frequency drop and its limits (%), with its change as text; a rise leaves it empty."""
     scale = GAUGE_WIDTH / (1.25 * alarm)
-    text = f"f1 change {-drop:+z.2f} %, warning at -{warn:g} %, alarm at -{alarm:g} %"
+    text = f"f1 change {change}, warning at -{warn:g} %, alarm at -{alarm:g} %"
     return Gauge(text, min(max(drop, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

@@ -90,11 +90,12 @@ class ReportData:
         return [it.finding for it in shown], [it.finding for it in others if it not in shown]
 
     def _pick_reasons(self) -> tuple[list[Remark], list[Remark]]:
-        """Return the most severe reason, of the series with the largest drop, and those that no table shows."""
+        """Return the most severe reason, of the series of the figures if it has it, and those that no table shows."""
         status = self.outlook.status
-        plain, order = set(status.reasons), {series.name: place for place, series in enumerate(status.series)}
+        order = [self.series.name, *(series.name for series in status.series)]
         alike = [remark for remark in status.remarks if remark.code == status.remarks[0].code]
-        first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
+        alike.sort(key=lambda remark: order.index(remark.about) if remark.about in order else 0)
+        first, plain = merge_remarks(alike)[:1], set(status.reasons)
         other = [remark for remark in status.remarks if remark.code not in TABLE_REASON_CODES or remark not in plain]
         return first, [remark for remark in merge_remarks(other) if remark not in first]
 

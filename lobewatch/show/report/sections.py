@@ -78,7 +78,7 @@ def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
         TableCell(status_label(*status), status_css_class(*status)),
         "\N{NO-BREAK SPACE}→ ".join(f"{value:.1f}" for value in values) or "-",
         "first test" if series.is_baseline else trends.change_text(series),
-        (trend and trends.trend_text(trend)) or f"since {series.first_time:%Y-%m-%d}",
+        trends.trend_text(series) or f"since {series.first_time:%Y-%m-%d}",
         (trend and trends.rate_text(trend)) or f"needs {MIN_FORECAST_POINTS} tests",
         _margin_text(alarm - drop.value) if drop.is_known else "-",
         f"{trend.spread:.2f} %" if trend is not None and is_fitted else "-",

@@ -179,8 +179,8 @@ def _summarize_series(series: SeriesStatus) -> SeriesSummary:
     scatter = series_points.estimate_scatter(trend.readings.y)
     common_scatter = series_points.estimate_scatter(trend.readings.mean_of_directions.y)
     points = tuple(_thin_out(trend))
-    shown = scatter, common_scatter, points, half_width, series.is_change_proven
-    return SeriesSummary(*names, value, std, frequency, alarm, *shown)
+    proven = series.is_change_proven
+    return SeriesSummary(*names, value, std, frequency, alarm, scatter, common_scatter, points, half_width, proven)
 
 
 def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:

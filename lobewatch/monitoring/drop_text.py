@@ -10,6 +10,8 @@ from dsm import format_with_error
 
 def format_change(drop: float, half_width: float | None) -> str:
     """Return a drop (%) as a change with its 95 % interval, such as "-0.24 ± 0.40 %"."""
+    if not half_width or not math.isfinite(half_width):
+        return f"{-drop:+z.2f} %"
     sign = "+" if drop < 0 else ""
     return f"{sign}{format_with_error(-drop, half_width)} %"
 

@@ -206,6 +206,7 @@ def assess_status(
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.interval_days
+    series.sort(key=_severity_of_series)
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
@@ -216,7 +217,6 @@ def assess_status(
     remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]
     remarks += _old_program_remarks(history, machine, now)
     remarks += _direction_remarks(rows)
-    series.sort(key=_severity_of_series)
     left = rules.count_days_left(newest.time, interval, now)
     alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
     status = _build_status(now, remarks, rules.next_tap_step(newest.time, interval), alarms)

@@ -27,6 +27,8 @@ USUAL_SCATTER = 0.05, 0.6
 higher so that the interval holds at 0.5 too; chosen."""
 MEASURED_SCATTER_RANGE = 0.1, 10.0
 """Range of scatters over the estimated one, to which a posterior is computed."""
+MIN_SCATTER = 1e-9
+"""Smallest scatter (%), above rounding."""
 N_SCATTERS = 48
 """Number of scatters of a posterior."""
 INTERVAL_PROBABILITY = 0.95
@@ -60,8 +62,9 @@ class ScatterPosterior(NamedTuple):
         """
         squares, freedom = squares + known.freedom * known.percent**2, freedom + known.freedom
         middle = math.sqrt(squares / freedom) if freedom else 0.0
-        ends = np.array(MEASURED_SCATTER_RANGE) * max(middle, np.finfo(float).tiny)
-        scatter = np.geomspace(*((USUAL_SCATTER[0], highest) if highest and not known.freedom else ends), N_SCATTERS)
+        low, high = (end * max(middle, MIN_SCATTER) for end in MEASURED_SCATTER_RANGE)
+        low, high = (USUAL_SCATTER[0], highest) if highest and not known.freedom else (low, high)
+        scatter = np.geomspace(low, high, N_SCATTERS)
         log = -freedom * np.log(scatter) - squares / (2 * scatter**2)
         weight = np.exp(log - log.max())
         return cls(scatter, weight / weight.sum())
@@ -134,9 +137,10 @@ class ConditionEffects(NamedTuple):
 
     def at(self, temperature: float, operator: str) -> tuple[float, float]:
         """Return the effect (%) of conditions, and its variance over that of a point."""
-        warmer = [] if math.isnan(self.mean_temperature) else [temperature - self.mean_temperature]
-        columns = [np.nan_to_num(warmer), [float(name == operator) for name in self.operators]]
-        away = np.concatenate(columns) - self.mean
+        warmer = temperature - self.mean_temperature
+        columns = [] if math.isnan(self.mean_temperature) else [0.0 if math.isnan(warmer) else warmer]
+        columns += [float(name == operator) for name in self.operators]
+        away = np.array(columns) - self.mean
         unknown = OPERATOR_SPREAD**2 if operator and self.operators and operator not in self.operators else 0.0
         return float(away @ self.size), float(away @ self.covariance @ away) + unknown
 
@@ -207,7 +211,7 @@ def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
     base, freedom = build_level_model(readings), readings.y.size - 2.0
     effects, rest = _fit_effects(base, readings, past.fitted)
     start, variance = _fit_start(past)
-    spread = max(past.spread, np.finfo(float).tiny)
+    spread = max(past.spread, MIN_SCATTER)
     kept = base.columns[:, : 1 + base.n_temperature_columns]
     alone = LevelModel(base.y, base.newest, kept, base.n_temperature_columns).inverse_normal_matrix[0, 0]
     of_operators = float(base.inverse_normal_matrix[0, 0] - alone)

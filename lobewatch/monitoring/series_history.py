@@ -10,6 +10,7 @@ from datetime import datetime
 from functools import cached_property
 from itertools import chain, compress
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -130,7 +131,7 @@ class ValueHistory:
 
     def percent_below_start(self, row: HistoryRow) -> float:
         """Return the drop (%) of a row without its interval; NaN if the row has no value."""
-        trend, (number, _) = self._reference_trend, getattr(row, self.name)
+        trend, number = self._reference_trend, float(getattr(row, self.name).value)
         if trend is None or not number > 0:
             return math.nan
         if trend.past_fit is None and self.name != "frequency":
@@ -224,27 +225,68 @@ def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHisto
     return {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED_VALUES)}
 
 
-def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
-    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.preload_left.
+class BearingChange(NamedTuple):
+    """Bearing stiffness at the start and now, by the model and the drop of the frequency (N/m)."""
 
-    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it
-    open, or where one of the calibrated bearings has rollers.
+    start: float
+    """Stiffness at the frequency of the start."""
+    newest: float
+    """Stiffness now."""
+    low: float
+    """Lower end of the 95 % interval of the stiffness now, with reclamping and the uncertainty of the start."""
+    high: float
+    """Upper end."""
+
+    @property
+    def percent(self) -> float:
+        """Change since the start (%)."""
+        return 100 * (self.newest / self.start - 1)
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the 95 % interval of the change (%)."""
+        return 50 * (self.high - self.low) / self.start
+
+
+def compare_bearings(series: SeriesHistory, machine: Machine) -> BearingChange | None:
+    """Compare the bearing stiffness with that at the start, by the drop of the frequency.
+
+    None where no two tests gave a bearing stiffness, or not the newest, or where one of the frequencies leaves it
+    open or belongs to another model.
     """
-    stiffness = series.values["bearing_stiffness"]
-    change = stiffness.change
-    if machine.spindle is None or not change.is_known or len(stiffness.reference_rows) < 2:
+    stiffness, drop = series.values["bearing_stiffness"], series.drop
+    if machine.spindle is None or drop.interval is None or len(stiffness.reference_rows) < 2:
         return None
-    if any(_is_preload_open(row, machine) for row in (stiffness.reference_rows[0], series.rows[-1])):
+    if not series.rows[-1].bearing_stiffness.is_known:
+        return None
+    start, drops = series.frequency.start.value, (0.0, drop.value, *reversed(drop.interval))
+    found = [_calibrate_bearings(series.rows[-1].tool, start * (1 - percent / 100), machine) for percent in drops]
+    values = [value for value in found if value is not None]
+    return BearingChange(*values) if len(values) == len(found) else None
+
+
+def _calibrate_bearings(tool: str, frequency: float, machine: Machine) -> float | None:
+    """Return the bearing stiffness at a frequency; None if that leaves it open or belongs to another model."""
+    try:
+        found = calibrate(machine.model(tool), frequency, None, machine.mode.model_mode)
+    except (ValueError, ArithmeticError):
+        return None
+    return None if found.is_open else found.bearing_stiffness
+
+
+MAX_PRELOAD_RATIO = 2.0
+"""Largest upper end of a stated preload over its lower end; chosen."""
+
+
+def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
+    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.remaining_preload.
+
+    None without that change, where one of the calibrated bearings has rollers, or where the range is too wide to say
+    anything.
+    """
+    change = compare_bearings(series, machine)
+    if machine.spindle is None or change is None:
         return None
     calibrated = [bearing for bearing in machine.spindle.build().bearings if bearing.group]
-    return remaining_preload(calibrated, 1 + change.value / 100)
-
-
-def _is_preload_open(row: HistoryRow, machine: Machine) -> bool:
-    """Return whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
-    frequency, std = row.frequency
-    try:
-        model = machine.model(row.tool)
-        return calibrate(model, frequency, std if math.isfinite(std) else None, machine.mode.model_mode).is_open
-    except (ValueError, ArithmeticError):
-        return True
+    left = remaining_preload(calibrated, change.low / change.start, change.high / change.start)
+    return None if left is None or left.high > MAX_PRELOAD_RATIO * left.low else left

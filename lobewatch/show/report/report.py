@@ -8,14 +8,13 @@ from typing import Any
 
 from lobewatch.logbook import Analysis, Logbook
 from lobewatch.monitoring.status_rules import StatusLevel
-from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, change_cell, due_text
+from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, change_cell, due_text, half_width_of
 from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import ReportData, collect_report_data
 from lobewatch.show.report.section import NumberTable
 from lobewatch.show.report.sections import SECTIONS, SectionMakers, make_programs, make_series
 from lobewatch.show.terminal.output import JsonObject
 from lobewatch.show.terminal.status_labels import status_css_class, status_label, status_name
-from lobewatch.show.trend import change_text
 from lobewatch.verdicts import Stability
 
 
@@ -63,7 +62,7 @@ def make_summary(data: ReportData) -> dict[str, Any]:
     return {
         "label": status_label(*level),
         "kind": status_css_class(*level),
-        "gauge": make_gauge(series.drop.value, change_text(series), *levels) if has_changed else None,
+        "gauge": make_gauge(series.drop.value, *levels, half_width=series.drop.half_width) if has_changed else None,
         "next_step": status.next_step,
         "reasons": data.reasons[0],
         "has_notes": bool(data.reasons[1]),
@@ -109,7 +108,7 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
         "kind": status_css_class(row["light"], row["is_early"]),
         "reasons": row["reasons"] or ["no finding" if is_good else "-"],
         "change": change or "first test",
-        "gauge": make_gauge(row["fall"], change, *row["limits"]) if has_changed else None,
+        "gauge": make_gauge(row["fall"], *row["limits"], half_width=half_width_of(row)) if has_changed else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
         "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,

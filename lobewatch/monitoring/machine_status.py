@@ -22,6 +22,7 @@ from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.alarm_estimate import ChangeKind, SeriesChange
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.drop_text import format_below_start
+from lobewatch.monitoring.scatter_check import ScatterCheck
 from lobewatch.monitoring.series_drop import SeriesDrop
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
@@ -60,6 +61,14 @@ def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str =
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         yield rules.FREQUENCY_ROSE.remark(name, event=event, drop=text)
+
+
+def _scatter_remarks(name: str, check: ScatterCheck | None) -> Iterator[Remark]:
+    """Remark on scatter that is not independent."""
+    if check is not None and check.is_correlated:
+        yield rules.SCATTER_CORRELATED.remark(name, correlation=check.correlation, share=check.false_alarm_share)
+    if check is not None and check.group_distance:
+        yield rules.SCATTER_GROUPS.remark(name, distance=check.group_distance, share=check.false_alarm_share)
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -248,6 +257,7 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
     of_watch = [*_trend_remarks(name, trend, drop, path)] if trend else []
     remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
+    remarks += _scatter_remarks(name, trend.scatter_check) if trend else []
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
     pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
     raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]

@@ -194,6 +194,20 @@ VALUE_CHANGED = StatusRule(
     GOOD,
     "{value} {course} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
 )
+SCATTER_CORRELATED = StatusRule(
+    "scatter-correlated",
+    GOOD,
+    "scatter of f1 repeats from test to test (correlation {correlation:.2f}), so {share:.0%} of healthy spindles have "
+    "a false alarm in 24 tests",
+    "Reclamp the tool for every test, and record operator and temperature",
+)
+SCATTER_GROUPS = StatusRule(
+    "scatter-groups",
+    GOOD,
+    "f1 scatters in two groups {distance:.2g} % apart, as of two operators or two ways of clamping. {share:.0%} of "
+    "healthy spindles have a false alarm in 24 tests",
+    "Record the operator of every test",
+)
 ONE_DIRECTION = StatusRule(
     "one-direction",
     GOOD,
@@ -224,7 +238,8 @@ STATUS_RULES = (
     *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),
     *_rules_of(*CLOCK_QUESTIONS, "emulated-device", "one-hit", "spindle-turning", "tap-in-future", TOO_OLD_CODE),
     *_rules_of("chain-not-checked"),
-    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED),
+    *(SCATTER_CORRELATED, SCATTER_GROUPS, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}

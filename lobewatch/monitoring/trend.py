@@ -14,6 +14,7 @@ import numpy as np
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
+from lobewatch.monitoring.scatter_check import ScatterCheck, check_scatter
 from lobewatch.monitoring.series_drop import DropModel, model_drop
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, Readings, SeriesScatterPrior, days_of_use
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
@@ -122,6 +123,12 @@ class Trend:
         """Drop of each point since the start (%), at the mean conditions, shape (n,)."""
         model = self.drop_model
         return np.array([model.percent_below_start(it.percent, it.temperature, it.operator) for it in self.points])
+
+    @cached_property
+    def scatter_check(self) -> ScatterCheck | None:
+        """Check of the scatter for independence; None below 20 points."""
+        has_changed = bool(self.detection.drops) or self.detection.rise is not None
+        return check_scatter(100 * np.log1p(-self.drops / 100), self.past_fit, has_changed=has_changed)
 
     @property
     def is_stale(self) -> bool:

@@ -52,6 +52,7 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
         "fall_std_percent": series.drop.std,
         "fall_interval_percent": series.drop.interval,
         "is_change_proven": series.is_change_proven,
+        "scatter": trend and _scatter_json(trend),
         "preload_left": preload,
         "rate_percent_per_month": rate and rate._asdict(),
         "forecast": build_forecast_rows(outlook.programs, outlook.limits),
@@ -60,7 +61,17 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
 
 def _drop_json(trend: Trend) -> JsonObject | None:
     drop, since = trend.open_drop, trend.drop_since
-    return drop and {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
+    if drop is None:
+        return None
+    return {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
+
+
+def _scatter_json(trend: Trend) -> JsonObject:
+    """Return the scatter of a point (%), and whether it is independent from point to point."""
+    check = trend.scatter_check
+    checked = check and {**check._asdict(), "is_independent": check.is_independent}
+    shares = check and {"false_alarm_share_in_24_points": check.false_alarm_share}
+    return {"percent": trend.drop_model.scatter.percent, **(checked or {}), **(shares or {})}
 
 
 def trend_csv(series: SeriesStatus) -> str:

@@ -62,7 +62,7 @@ def make_summary(data: ReportData) -> dict[str, Any]:
     return {
         "label": status_label(*level),
         "kind": status_css_class(*level),
-        "gauge": make_gauge(series.drop.value, *levels, half_width=series.drop.half_width) if has_changed else None,
+        "gauge": make_gauge(series.drop.value, *levels, series.drop.half_width) if has_changed else None,
         "next_step": status.next_step,
         "reasons": data.reasons[0],
         "has_notes": bool(data.reasons[1]),
@@ -108,7 +108,7 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
         "kind": status_css_class(row["light"], row["is_early"]),
         "reasons": row["reasons"] or ["no finding" if is_good else "-"],
         "change": change or "first test",
-        "gauge": make_gauge(row["fall"], *row["limits"], half_width=half_width_of(row)) if has_changed else None,
+        "gauge": make_gauge(row["fall"], *row["limits"][:2], half_width_of(row)) if has_changed else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
         "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,

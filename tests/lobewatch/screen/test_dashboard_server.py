@@ -23,6 +23,7 @@ from lobewatch.cli import main
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.monitoring.series_drop import NO_DROP
 from lobewatch.monitoring.status_rules import OVERDUE
 from lobewatch.screen import DashboardServer
 from lobewatch.tap.emulated_spindle import build_structure, set_bearing_stiffness

@@ -26,7 +26,7 @@ class SeriesChange(NamedTuple):
     kind: ChangeKind
     """Kind of the change; "dropped" where no other kind fits."""
     point: int
-    """Index of the first point after the step, or of the last one before the slope."""
+    """Index of the first point after the step, or of the last one before the slope, at least 1."""
     size: float
     """Drop from before the change to the last fitted point, in the unit of the series."""
     half_width: float
@@ -51,11 +51,11 @@ class DropFamily(NamedTuple):
 DROP_FAMILIES = (
     DropFamily("step", 1.0, ("level",)),
     DropFamily("slope", 1.0, ("rate",)),
-    DropFamily("mixed", 0.2, ("both",)),
+    DropFamily("mixed", 0.3, ("both",)),
     DropFamily("mixed", 0.1, ("level", "rate")),
     DropFamily("mixed", 0.1, ("rate", "level")),
     DropFamily("dropped", 0.1, ("level", "level")),
-    DropFamily("dropped", 0.1, ("rate", "rate")),
+    DropFamily("dropped", 0.3, ("rate", "rate")),
     DropFamily("dropped", 0.1, ("rate", "both")),
 )
 """All families of shapes: drops with one date, and with two."""
@@ -108,7 +108,7 @@ def estimate_drop(readings: Readings) -> SeriesChange:
     low, high = (mixture_quantile(weight, fit.size, fit.error, fit.freedom, p) for p in SIZE_QUANTILES)
     first = np.array_split(number, days.size)[fit.point[best]][0]
     kind: ChangeKind = "slope" if fit.accelerates[best] else DROP_FAMILIES[family].kind
-    return SeriesChange(kind, int(first), (low + high) / 2, (high - low) / 2)
+    return SeriesChange(kind, max(int(first), 1), (low + high) / 2, (high - low) / 2)
 
 
 def _fit_family(base: LevelModel, days: Floats, family: int) -> _ShapeFits:
@@ -119,7 +119,7 @@ def _fit_family(base: LevelModel, days: Floats, family: int) -> _ShapeFits:
     fits = base.fit_columns(columns)
     sizes, errors = fits.rate(-columns[:, :, -1])
     many = np.log(len(places) / odds) + columns.shape[1] / 2 * np.log(days.size)
-    log_weight = -fits.freedom / 2 * np.log(fits.rss) - many
+    log_weight = -days.size / 2 * np.log(fits.rss) - many
     freedom, families = np.full(len(places), float(fits.freedom)), np.full(len(places), family)
     accelerates = (fits.size < 0).all(axis=1) & (set(parts) == {"rate"})
     return _ShapeFits(log_weight, sizes, errors, freedom, families, places[:, 0], accelerates)

@@ -29,6 +29,13 @@ MIN_POINTS_WITH_PRIOR = 5
 """Smallest number of points for an evaluation if a scatter prior is known; chosen."""
 SURE_CHANGE_SCORE = 3.3
 """Score from which a change is certain; chance of 1 in 2000 if only the last point is checked."""
+SURE_FIRST_STEP_SCORE = 2.5
+"""Score from which a step after the first point is certain; chosen.
+
+It is one comparison for the whole series and not one more with each point, so that its probability has a larger
+weight (Genovese, Roeder & Wasserman 2006, "False discovery control with p-value weighting", Biometrika 93(3))."""
+MIN_FIRST_STEP_POINTS = 36
+"""Smallest number of points for that score, so that the comparison changes little with each further point; chosen."""
 MIN_SHARED_CHANGE = 0.5
 """Smallest share of the change of a mean of two series that one of them must show; chosen."""
 SCORE_BLOCK_ROWS = 64
@@ -114,6 +121,7 @@ def monitor_drops_and_rises(readings: Readings) -> tuple[ChangeMonitor, ChangeMo
     common = build_level_model(readings.mean_of_directions)
     pairs = zip(_score_points(base), _score_points(common), strict=True)
     drops, rises = (_merge_directions(base, alone, common, together, shared) for alone, together in pairs)
+    drops, rises = _add_first_step(base, drops, 1), _add_first_step(base, rises, -1)
     return ChangeMonitor(base, drops, 1), ChangeMonitor(base, rises, -1)
 
 
@@ -156,6 +164,24 @@ def _find_likeliest_changes(base: LevelModel, last: Indices) -> tuple[LikeliestC
     return drop, rise
 
 
+def _add_first_step(base: LevelModel, change: LikeliestChange, sign: int) -> LikeliestChange:
+    """Add the step after the first point where it is certain."""
+    n = np.arange(MIN_FIRST_STEP_POINTS, base.y.size + 1)
+    if not n.size:
+        return change
+    step = _score_leans(base, -sign * base.explained_root("step", n[:, np.newaxis], np.array([1]))[:, 0], n)
+    score = step + SURE_CHANGE_SCORE - SURE_FIRST_STEP_SCORE
+    last = (n - 1)[(step >= SURE_FIRST_STEP_SCORE) & (score > change.score[n - 1])]
+    change.score[last], change.is_step[last], change.point[last] = score[last - n[0] + 1], True, 1
+    return change
+
+
+def _score_leans(base: LevelModel, lean: Floats, n: Indices) -> Floats:
+    """Return Student's t of changes by their signed roots of explained squares in the first n (r,), as a quantile."""
+    t = lean / np.sqrt(base.point_variance(lean**2, n))
+    return np.asarray(-scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -t)))
+
+
 def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats]:
     """Find where a drop and a rise of each kind explain most in the first n (r,), shape (2, 2, r) each."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
@@ -173,10 +199,9 @@ def _find_largest_changes(base: LevelModel, n: Indices) -> tuple[Indices, Floats
 
 def _choose_likeliest(base: LevelModel, n: Indices, points: Indices, leans: Floats) -> LikeliestChange:
     """Choose the likelier of a step and a slope in the first n (r,) points."""
-    t = [lean / np.sqrt(base.point_variance(lean**2, n)) for lean in leans]
-    scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
-    fell = t[0] >= t[1]
-    return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
+    step, slope = (_score_leans(base, lean, n) for lean in leans)
+    fell = step >= slope
+    return LikeliestChange(np.maximum(step, slope), fell, np.where(fell, points[0], points[1]))
 
 
 def _fit_change(base: LevelModel, change: LikeliestChange, at: int, sign: int) -> SeriesChange:

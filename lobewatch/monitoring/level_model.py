@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats, Indices
-from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, winsorize
+from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, guard_first_points, winsorize
 
 MIN_TEMPERATURE_POINTS = 12
 """Smallest number of points with a temperature to fit its effect; chosen."""
@@ -242,4 +242,5 @@ def build_level_model(readings: Readings) -> LevelModel:
         rest -= STEEL_FREQUENCY_PER_KELVIN * columns[-1]
     names = dict.fromkeys(filter(None, readings.operators))
     columns += [np.array([held == name for held in readings.operators], dtype=np.float64) for name in names]
+    rest = guard_first_points(rest)
     return LevelModel(winsorize(rest), rest, np.column_stack(columns), int(is_warm), readings.scatter_prior.single)

@@ -57,7 +57,7 @@ def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str =
     if trend.open_drop is not None:
         texts = {"course": _describe_course(trend.open_drop.change), "run_in": RUN_IN_TEXT if trend.is_run_in else ""}
         yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, drop=text, event=event, folder=folder, **texts)
-    elif trend.detection.needs_repeat:
+    elif trend.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         yield rules.FREQUENCY_ROSE.remark(name, event=event, drop=text)

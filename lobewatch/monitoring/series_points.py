@@ -56,10 +56,18 @@ class Readings(NamedTuple):
 
     def since(self, begin: int) -> Self:
         """Return the points from one on."""
-        y, operators, optional = self.y[begin:], self.operators[begin:], (self.temperature, self.other_direction)
-        temperature, other = (None if values is None else values[begin:] for values in optional)
-        later = self._replace(y=y, temperature=temperature, operators=operators, other_direction=other)
-        return later if self.days is None else later._replace(days=self.days[begin:])
+        return self._select(slice(begin, None))
+
+    def until(self, end: int) -> Self:
+        """Return the points before one."""
+        return self._select(slice(end))
+
+    def _select(self, part: slice) -> Self:
+        optional = (self.temperature, self.other_direction, self.days)
+        temperature, other, days = (None if values is None else values[part] for values in optional)
+        return self._replace(
+            y=self.y[part], temperature=temperature, operators=self.operators[part], other_direction=other, days=days
+        )
 
     @property
     def shared_points(self) -> Indices:
@@ -126,6 +134,37 @@ def winsorize(y: Floats) -> Floats:
                 values[i] = middle + copysign(limit, away)
         insort(steps, abs(y[i] - y[i - 1]))
     return np.array(values)
+
+
+N_GUARDED_POINTS = 3
+"""Number of first points that are compared with those after them; chosen, as no earlier points tell whether they are
+outliers."""
+N_GUARDING_POINTS = 8
+"""Number of first points from which the guarded ones are compared with the others; chosen."""
+MAX_FIRST_DISTANCE = 4.5
+"""Distance of a first point from the others (their standard deviations), up to which it is no outlier; chosen."""
+MIN_CLAMPING_ERROR = 2.0
+"""Smallest distance (%) of a badly clamped first test; chosen between a drop of 1 % after the first test, which counts,
+and a bad clamping of 3 %, which does not."""
+
+
+def guard_first_points(y: Floats) -> Floats:
+    """Set each of the first points of a series (n,) that no neighbour confirms to the third point after it.
+
+    From eight points on. The first eight decide, so that no later point changes it again. The median of the others
+    in its place would make the scatter too small.
+    """
+    if y.size < N_GUARDING_POINTS:
+        return y
+    guarded, first = y.copy(), y[:N_GUARDING_POINTS]
+    for i in range(N_GUARDED_POINTS):
+        others = np.delete(first, i)
+        middle = np.median(others)
+        limit = max(MAX_FIRST_DISTANCE * float(np.std(others, ddof=1)), MIN_CLAMPING_ERROR)
+        away, around = first[i] - middle, np.delete(first[: i + 2], i)[-2:] - middle
+        if abs(away) > limit and (around / away < CONFIRMED_DISTANCE_SHARE).all():
+            guarded[i] = y[i + N_GUARDED_POINTS]
+    return guarded
 
 
 MIN_SCATTER_POINTS = 8

@@ -13,10 +13,18 @@ import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detect_changes
-from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate, fit_past
+from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate
+from lobewatch.monitoring.level_model import build_level_model
+from lobewatch.monitoring.newest_point import fit_confirmed_past, measure_newest_distance
 from lobewatch.monitoring.scatter_check import ScatterCheck, check_scatter
 from lobewatch.monitoring.series_drop import DropModel, model_drop
-from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, Readings, SeriesScatterPrior, days_of_use
+from lobewatch.monitoring.series_points import (
+    MAX_OUTLIER_DISTANCE,
+    NO_SERIES_PRIOR,
+    Readings,
+    SeriesScatterPrior,
+    days_of_use,
+)
 from lobewatch.monitoring.threshold_dates import NO_FORECAST, ThresholdDates
 from lobewatch.monitoring.trend_shapes import TrendShape
 
@@ -81,7 +89,9 @@ class Trend:
     readings: Readings
     """Percentages of the points, with temperatures, operators and prior."""
     past_fit: PastFit | None
-    """Fitted shapes over days of use, those after the last point being days since 1970; None below 8 points."""
+    """Fitted shapes over days of use, those after the last point being days since 1970; None below 8 points.
+
+    A newest point that nothing confirms yet is left out."""
     today: int
     """Day of the evaluation (days since 1970)."""
 
@@ -93,6 +103,12 @@ class Trend:
     def detection(self) -> Detection:
         """Changes detected by the monitor."""
         return detect_changes(self.readings)
+
+    @property
+    def needs_repeat(self) -> bool:
+        """True if only the newest point shows a drop."""
+        is_low = measure_newest_distance(build_level_model(self.readings).y) < -MAX_OUTLIER_DISTANCE
+        return self.detection.needs_repeat or (is_low and self.open_drop is None)
 
     @cached_property
     def forecast(self) -> Forecast | None:
@@ -186,14 +202,12 @@ def fit_trend(
     now: its day tells whether that is too long ago for a forecast; other: of the other direction, also; known:
     what is known of its scatter beforehand.
     """
-    points, past = list_newest_points(taps), None
+    points = list_newest_points(taps)
     percents, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
     others = np.array([*_other_percents(points, list_newest_points(other))])
     days = days_of_use(point_days(points), np.array([point.hours for point in points]))
     readings = Readings(percents, warmth, tuple(point.operator for point in points), others, known, days)
-    if len(points) >= MIN_FORECAST_POINTS:
-        past = fit_past(days, readings)
-    return Trend(points, taps[0].value, readings, past, int(days_since_epoch(now)))
+    return Trend(points, taps[0].value, readings, fit_confirmed_past(days, readings), int(days_since_epoch(now)))
 
 
 def list_newest_points(taps: Sequence[TapValue]) -> tuple[TrendPoint, ...]:

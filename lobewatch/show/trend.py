@@ -125,9 +125,10 @@ def no_dates_text(outlook: MachineForecast) -> str:
     reaches += [reach for _, reach in outlook.limits]
     if any(reach.forecast_end is not None for reach in reaches) or all(reach.is_measured for reach in reaches):
         return ""
-    points = max((len(series.trend.points) for series in outlook.status.series if series.trend), default=0)
-    if points >= MIN_FORECAST_POINTS:
+    trends = [series.trend for series in outlook.status.series if series.trend]
+    if any(trend.is_stale for trend in trends):
         return "No forecast: the last tap tests are too old. Tap again."
+    points = max((min(len(trend.points), MIN_FORECAST_POINTS - 1) for trend in trends), default=0)
     return f"No forecast yet: a forecast needs {MIN_FORECAST_POINTS} points, and the longest series has {points}."
 
 

@@ -104,6 +104,7 @@ def main():
         os.chdir(ROOT)
     script = {"docs": os.path.join("docs", "make_site.py"), "bench": os.path.join("bench", "performance.py")}
     if arguments[0] == "test":
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the tests have a process on each core
         command = tests(arguments[1:])
     elif extras:
         command = [python(extras), script[arguments[0]]] + arguments[1:]

@@ -14,7 +14,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
@@ -53,8 +53,14 @@ class Import:
     """True if the import is in a function or only for type checking."""
 
 
+@cache
+def read_house(root: Path) -> House:
+    """Return the modules of a checkout, read once in a process."""
+    return House(root)
+
+
 class House:
-    """The modules of a checkout, read once."""
+    """The modules of a checkout."""
 
     def __init__(self, root: Path, packages: Iterable[str] = PACKAGES) -> None:
         """root: of the checkout."""

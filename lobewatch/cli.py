@@ -115,6 +115,7 @@ def _root_options(
 
 def main() -> None:
     """Run a command. Exit codes: 0 success, 1 not everything is stable, 2 error, 130 interrupted."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads on small matrices mostly wait for each other
     gc.set_threshold(GC_THRESHOLD)
     atexit.register(gc.freeze)  # no garbage collection at the end
     if threading.current_thread() is threading.main_thread():

@@ -1,1 +1,1 @@
-"""Data of the simulated example: the surrogate spindle as a machine file."""
+"""Data of the simulated example: its machine file, two tap tests and two cuts, and the script that made them."""

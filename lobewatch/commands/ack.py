@@ -5,14 +5,14 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import Machine
+from lobewatch.commands.shared_options import LocalTime, Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def ack(
     machine: Machine,
     alarm: Annotated[str, Argument(help="Alarm ID, or a unique part of it. Default: all open alarms.")] = "",
-    until: Annotated[datetime | None, Option(help="Time to repeat the alarm (local time). Default: never.")] = None,
+    until: Annotated[datetime | None, LocalTime(help="Time to repeat the alarm (local time). Default: never.")] = None,
     note: Annotated[str, Option(help="Note for your colleagues.")] = "",
     operator: Annotated[str, Option(help="Name of the operator. Default: login name.")] = "",
     as_json: Json = False,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import FileOptions, add_file_options, join_hit_files
+from lobewatch.commands.shared_options import FileOptions, LocalTime, add_file_options, join_hit_files
 from lobewatch.show.terminal.output import Json, emit
 
 
@@ -20,7 +20,7 @@ def convert(
     hits: Annotated[bool, Option("--hits", help="Write time signals instead of the FRF.")] = False,
     *,
     file_options: FileOptions,
-    date: Annotated[datetime | None, Option(help="Recording date. Default: from the file.")] = None,
+    date: Annotated[datetime | None, LocalTime(help="Recording date. Default: from the file.")] = None,
     direction: Annotated[str, Option(help="Direction at the tool tip. Default: from the file.")] = "",
     as_json: Json = False,
 ) -> None:

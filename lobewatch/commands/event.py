@@ -5,14 +5,14 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from lobewatch.commands.shared_options import Machine
+from lobewatch.commands.shared_options import LocalTime, Machine
 from lobewatch.show.terminal.output import Json, emit
 
 
 def event(
     machine: Machine,
     text: Annotated[str, Argument(help="Description of the work, not needed with --withdraw.")] = "",
-    date: Annotated[datetime | None, Option(help="Date of the work (local time). Default: now.")] = None,
+    date: Annotated[datetime | None, LocalTime(help="Date of the work (local time). Default: now.")] = None,
     new_baseline: Annotated[
         bool, Option("--new-baseline", help="Compare later tap tests with the first tap test after --date.")
     ] = False,
@@ -26,7 +26,7 @@ def event(
     Examples
     --------
       lobewatch event mill-3 "bearings replaced" --date 2026-11-02 --new-baseline
-      lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30:00
+      lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30
       lobewatch event mill-3 --withdraw e2
     """
     from lobewatch.logbook import Logbook

@@ -16,7 +16,9 @@ def replay(
     files: Annotated[list[Path], Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')],
     tool: Annotated[str, Option(help="Tool in the spindle. Default: from the file, or [tap] tool.")] = "",
     direction: Annotated[str, Option(help="Direction at the tool tip: x or y. Default: from the file, or x.")] = "",
-    date: Annotated[datetime | None, Option(help="Recording date (local time). Default: from the file.")] = None,
+    date: Annotated[
+        datetime | None, shared.LocalTime(help="Recording date (local time). Default: from the file.")
+    ] = None,
     date_pattern: Annotated[str, Option(help='Date format in file names: "%Y%m%d". With "/" in paths.')] = "",
     *,
     file_options: shared.FileOptions,

@@ -69,6 +69,11 @@ def present_time(text: str) -> datetime:
     raise BadParameter(f"{text!r} is not a date from {dates}. Write 2026-11-27, 2026-11-27T08:30 or 2026-11-27T08:30Z.")
 
 
+def local_time(text: str) -> datetime:
+    """Parse a date or time (ISO 8601) to local time without a time zone."""
+    return present_time(text).replace(tzinfo=None)
+
+
 Command = Callable[..., None]
 FolderArgument = functools.partial(Argument, parser=to_folder_path)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
@@ -91,7 +96,8 @@ Now = Annotated[
         help="Date that the age of tap tests is counted to, for tests and scripts (local time). Default: now.",
     ),
 ]
-CutDate = Annotated[datetime | None, Option(help="Date of the cut (local time). Default: now.")]
+LocalTime = functools.partial(Option, parser=local_time, metavar="DATE")
+CutDate = Annotated[datetime | None, LocalTime(help="Date of the cut (local time). Default: now.")]
 Seed = Annotated[int, Option(help="Seed of the random numbers.")]
 ReclampingScatter = Annotated[float, Option(help="Reclamping repeatability of f1: standard deviation (%), 0 to 5.")]
 Material = Annotated[str | None, Option(help="Material in machine.toml or lobewatch materials.")]

@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import msgspec
 
-from acquisition import DataError
+from acquisition import DataError, Remark
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.logbook.analysis import Analysis
@@ -27,11 +28,21 @@ def recommend_requested(logbook: Logbook, cut: Mapping[str, Any], name: str | No
     recommended program gets the name. ValueError for an invalid cut, DataError without a tap test.
     """
     machine = logbook.machine
-    table, either = requested_cut.build_cut_without_setting(machine, cut)
-    table = msgspec.structs.replace(table, name=name or table.name)
+    requested = requested_cut.build_cut_without_setting(machine, cut)
+    table = msgspec.structs.replace(requested.table, name=name or requested.table.name)
     logbook.newest_tap()
     speed = cut.get("speed_rpm") or requested_cut.find_common_speed(machine, table.tool)
-    return _recommend_cut(logbook, table, either, cut.get("depth_mm"), speed)
+    answer = _recommend_cut(logbook, table, requested.is_any_direction, cut.get("depth_mm"), speed)
+    remarks = [_reference_remark(table, cut)] if requested.is_reference else []
+    return replace(answer, remarks=(*answer.remarks, *remarks))
+
+
+def _reference_remark(table: ProgramTable, cut: Mapping[str, Any]) -> Remark:
+    """Return what the cut has from [reference_cut]."""
+    material = f"material {table.material}" if table.material else "cutting-force coefficients"
+    direction = "" if cut.get("direction") else f" and the direction ({table.direction} milling)"
+    cure = "Give ProgramTable.material and ProgramTable.direction for another cut"
+    return Remark("from-reference-cut", "", f"{material}{direction} taken from [reference_cut]", cure)
 
 
 def _recommend_for_program(logbook: Logbook, program: ProgramTable) -> Recommendation:

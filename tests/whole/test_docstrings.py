@@ -9,10 +9,10 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from rooms import House, field_docstrings
+from rooms import field_docstrings, read_house
 
 ROOT = Path(__file__).parents[2]
-HOUSE = House(ROOT)
+HOUSE = read_house(ROOT)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 from statistics import mean
 
 import pytest
-from rooms import PACKAGES, House
+from rooms import PACKAGES, read_house
 
 from lobewatch.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
-HOUSE = House(ROOT)
+HOUSE = read_house(ROOT)
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
 DOOR = ("lobewatch.cli", "lobewatch.commands")
 """Entry points, which import modules on demand."""

@@ -7,10 +7,10 @@ from collections import defaultdict
 from importlib import import_module
 from pathlib import Path
 
-from rooms import PACKAGES, House
+from rooms import PACKAGES, read_house
 
 ROOT = Path(__file__).parents[2]
-HOUSE = House(ROOT)
+HOUSE = read_house(ROOT)
 ORDINARY = frozenset(
     re.findall(
         r"\w+",

@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from lobes import Cut
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
@@ -133,15 +133,32 @@ def build_requested_program(machine: Machine, values: Mapping[str, Any]) -> Prog
     return table
 
 
-def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> tuple[ProgramTable, bool]:
-    """Build a cut whose speed and depth are requested, and tell whether it may be milled up or down.
+class OpenCut(NamedTuple):
+    """Cut whose speed and depth are requested."""
 
-    Values and errors as in `build_requested_program`. The default is a slot, in both directions.
+    table: ProgramTable
+    """Cut, with any speed and depth."""
+    is_any_direction: bool
+    """True if it may be milled up or down."""
+    is_reference: bool
+    """True if its material comes from [reference_cut]."""
+
+
+def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> OpenCut:
+    """Build a cut whose speed and depth are requested.
+
+    Values and errors as in `build_requested_program`. The default is a slot, in both directions. A material that
+    neither the values nor the programs of the tool give comes from [reference_cut], with its direction.
     """
     excluded = (*SETTING_KEYS, *ENGAGEMENT_KEYS)
     complete = {key: value for key, value in _complete_values(machine, values).items() if key not in excluded}
-    _reject_missing(machine, complete, [key for key in REQUIRED_CUT_KEYS if key not in excluded])
-    diameter, radial, direction = complete["tool_diameter_mm"], values.get("radial_depth_mm"), values.get("direction")
+    required = [key for key in REQUIRED_CUT_KEYS if key not in excluded]
+    is_only_material_missing = [key for key in required if key not in complete] == ["material"]
+    reference = _find_reference_material(machine, complete) if is_only_material_missing else {}
+    complete |= {key: value for key, value in reference.items() if key != "direction"}
+    _reject_missing(machine, complete, required)
+    diameter, radial = complete["tool_diameter_mm"], values.get("radial_depth_mm")
+    direction = values.get("direction") or reference.get("direction")
     engagement = {"radial_depth_mm": radial or diameter, "direction": direction or "down"}
     name = f"{complete['tool']}, " + (f"{radial:g} of {diameter:g} mm" if radial else f"slot of {diameter:g} mm")
     engagement |= {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
@@ -151,7 +168,17 @@ def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> tu
     if depth is not None and depth > deepest:
         of = "the flutes" if table.flute_length_mm else "one diameter, the limit without flute_length_mm"
         raise ValueError(f"ProgramTable.depth_mm {depth:g} is deeper than {of}. Give up to {deepest:g} mm.")
-    return table, direction is None
+    return OpenCut(table, direction is None, bool(reference))
+
+
+def _find_reference_material(machine: Machine, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return material and direction of [reference_cut]; empty without one or if the cut has its coefficients."""
+    cut = machine.reference_cut
+    if cut is None or values.keys() >= COEFFICIENT_KEYS:
+        return {}
+    material = {key: getattr(cut, key) for key in ("material", *COEFFICIENT_KEYS)}
+    known = {key: value for key, value in material.items() if value is not None}
+    return known | {"direction": cut.direction}
 
 
 def find_common_speed(machine: Machine, tool: str) -> float | None:

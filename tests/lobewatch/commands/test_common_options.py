@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from typer import BadParameter
 
-from lobewatch.commands.shared_options import present_time, rpm
+from lobewatch.commands.shared_options import local_time, present_time, rpm
 from lobewatch.commands.verbosity import apply_verbosity
 from lobewatch.show.terminal.output import notes
 from lobewatch.step_times import STEP_TIMES, time_step
@@ -147,6 +147,12 @@ def test_the_present_time_may_have_a_time_zone(text: str) -> None:
 @pytest.mark.parametrize("text", ["2026-03-02", "2026-03-02T08:30", "1970-01-01", "2199-12-31"])
 def test_the_present_time_without_a_zone_is_local(text: str) -> None:
     assert present_time(text) == datetime.fromisoformat(text).astimezone()
+
+
+@pytest.mark.parametrize("text", ["2026-11-01T10:00", "2026-11-01 10:00:00", "20261101T1000"])
+def test_a_local_time_needs_no_seconds(text: str) -> None:
+    assert local_time(text) == datetime(2026, 11, 1, 10)  # noqa: DTZ001 (local time)
+    assert local_time(f"{text}Z") == datetime(2026, 11, 1, 10, tzinfo=UTC).astimezone().replace(tzinfo=None)
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,17 @@ def toml(shop: Shop) -> str:
     return str((shop.path / "machine.toml").read_text("utf-8"))
 
 
+def test_a_tool_without_a_material_has_that_of_the_reference_cut(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    shop.put('[[tool]]\nname = "reference"\nteeth = 4\ndiameter_mm = 20\n')
+    code, out, _ = run("recommend", "--radial", "8", "--json")
+    given = json.loads(run("recommend", "--radial", "8", "--direction", "up", "--json")[1])
+    answer = json.loads(out)
+    assert (code, answer["recommended"]["direction"]) == (0, "down")
+    assert given["recommended"]["direction"] == "up"
+    assert "from-reference-cut" in {remark["code"] for remark in answer["remarks"]}
+
+
 def test_the_recommended_slot_is_saved_as_a_program_that_check_calls_stable(shop: Shop, run: Any) -> None:
     shop.tap_both()
     before = toml(shop)

@@ -122,7 +122,7 @@ def test_a_direction_that_was_not_tapped_is_not_rigid(run: Run, folder: MachineF
 
 
 def test_no_safe_speed_is_reported(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "tangential_n_per_mm2 = 1400\n", "tangential_n_per_mm2 = 1400000\n")
+    edit(folder, "tangential_n_per_mm2 = 1400\n", "tangential_n_per_mm2 = 140000\n")
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
     said = run("lobes", "m").out

@@ -39,7 +39,7 @@ N_START_POINTS = 3
 """Number of first points that define the start of a series without a fitted line; chosen."""
 HIGHEST_SQUARE = 1.0, 1.0, 1 + math.sqrt(3) / (2 * math.pi)
 """Mean square of the highest of one, two and three standard normal numbers."""
-STEADY_ODDS = 50.0
+STEADY_ODDS = 100.0
 """Factor on the weight of a steady series for its start: most spindles do not drop; chosen. In a forecast, where a
 missed drop costs more, it has none."""
 N_HALVINGS = 50
@@ -221,9 +221,12 @@ def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
 
 
 def _fit_effects(base: LevelModel, readings: Readings, fitted: Floats) -> tuple[ConditionEffects, float]:
-    """Fit the effects of the conditions to what the fitted line (n,) leaves, and return its mean too."""
-    columns, n_warm = base.columns[:, 1:], base.n_temperature_columns
-    left = base.y + readings.y[0] - fitted
+    """Fit the effects of the conditions to what the fitted line (n,) leaves, and return its mean too.
+
+    Without the newest point, which the line may not follow yet.
+    """
+    columns, n_warm = base.columns[:-1, 1:], base.n_temperature_columns
+    left = (base.y + readings.y[0] - fitted)[:-1]
     rest = float(left.mean())
     if not columns.size:
         return NO_EFFECTS, rest

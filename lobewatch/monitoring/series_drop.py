@@ -179,9 +179,9 @@ class DropModel:
         is_proven = self.scatter.tail(change, lever, alone) < scipy.special.ndtr(-PROVEN_DROP_SCORE)
         return SeriesDrop(value, std, ratio * self.scatter.half_width(lever, alone), bool(is_proven))
 
-    def half_width(self, error: float) -> float:
-        """Return half the width of the 95 % interval of one value (%), with the scatter of a point."""
-        return self.scatter.half_width(1.0, float(np.nan_to_num(error)))
+    def std(self, error: float) -> float:
+        """Return the standard error of one value with reclamping (%); error: from its tap test alone."""
+        return math.hypot(self.scatter.percent, float(np.nan_to_num(error)) if self.is_short else 0.0)
 
 
 def model_drop(readings: Readings, errors: Floats, past: PastFit | None) -> DropModel:

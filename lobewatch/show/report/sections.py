@@ -18,6 +18,7 @@ from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHA
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.status_rules import Alarm, is_early_alarm, sort_by_severity, worst_status
 from lobewatch.monitoring.threshold_dates import date_of_days
+from lobewatch.monitoring.trend import Trend
 from lobewatch.show import trend as trends
 from lobewatch.show.figures.lobe_figures import plot_lobes
 from lobewatch.show.figures.trend_figures import ValueTrend, plot_frf, plot_trend
@@ -299,16 +300,24 @@ NOT_DETECTED = (
     "Preload changes by heat and speed while the spindle rotates",
     "Damage since the newest tap test",
 )
-ALARM_CONFIDENCE = (
-    "two clampings in a row with a score that scatter reaches once in 2000. "
-    "False alarms: 5 of 100 healthy series within 60 clampings"
-)
-"""Confidence of the alarm, measured (docs/decay.md)."""
+ALARM_RULE = "two clampings in a row with a score that scatter reaches once in 2000"
+"""Rule of the alarm."""
+INDEPENDENT_CONFIDENCE = "False alarms: 5 of 100 healthy series within 60 clampings"
+"""Confidence of the alarm with independent scatter, measured (docs/decay.md)."""
+
+
+def _alarm_confidence(trend: Trend | None) -> str:
+    """Return rule and confidence of the alarm."""
+    if trend is None or len(trend.points) < MIN_MONITORED_POINTS:
+        return f"needs {MIN_MONITORED_POINTS} clampings"
+    check = trend.scatter_check
+    if check is None or not check.is_correlated:
+        return f"{ALARM_RULE}. {INDEPENDENT_CONFIDENCE}"
+    return f"{ALARM_RULE}. False alarms: {100 * check.false_alarm_share:.0f} of 100 series within 24 clampings"
 
 
 def make_sign_off(data: ReportData) -> list[Section]:
     """Make the last section: measurement chain, confidence, open alarms, and room for a signature."""
-    points = 0 if data.series.trend is None else len(data.series.trend.points)
     tap, circumstances = data.newest, data.newest.circumstances
     hits = f"{len(tap.accepted)} of {len(tap.hits)} averaged" if tap.hits else "unknown"
     hits += f" (by hand: {format_decisions(tap.decisions)})" if tap.decisions else ""
@@ -324,7 +333,7 @@ def make_sign_off(data: ReportData) -> list[Section]:
         *sensor_rows(tap.hits[0].channels or () if tap.hits else (), data.assembly.chain_checks),
         ("cutting coefficients", "machine.toml"),
         ("monitored failure", FAILURE_MODE),
-        ("alarm", ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else f"needs {MIN_MONITORED_POINTS} clampings"),
+        ("alarm", _alarm_confidence(data.series.trend)),
         ("forecast dates", "80 % intervals for unchanged use of the machine"),
         *(("open alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
         ("name, date, signature", ""),

@@ -121,7 +121,7 @@ def _fit_family(base: LevelModel, days: Floats, family: int) -> _ShapeFits:
     many = np.log(len(places) / odds) + columns.shape[1] / 2 * np.log(days.size)
     log_weight = -days.size / 2 * np.log(fits.rss) - many
     freedom, families = np.full(len(places), float(fits.freedom)), np.full(len(places), family)
-    accelerates = (fits.size < 0).all(axis=1) & (set(parts) == {"rate"})
+    accelerates = np.asarray((fits.size < 0).all(axis=1) & (set(parts) == {"rate"}))
     return _ShapeFits(log_weight, sizes, errors, freedom, families, places[:, 0], accelerates)
 
 

@@ -29,7 +29,7 @@ MIN_POINTS_WITH_PRIOR = 5
 """Smallest number of points for an evaluation if a scatter prior is known; chosen."""
 SURE_CHANGE_SCORE = 3.3
 """Score from which a change is certain; chance of 1 in 2000 if only the last point is checked."""
-SURE_FIRST_STEP_SCORE = 2.5
+SURE_FIRST_STEP_SCORE = 2.6
 """Score from which a step after the first point is certain; chosen.
 
 It is one comparison for the whole series and not one more with each point, so that its probability has a larger

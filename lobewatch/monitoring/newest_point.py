@@ -1,5 +1,7 @@
 """Newest point of a series: whether the one before it confirms it, and the fit of the past without it if not."""
 
+import math
+
 import numpy as np
 
 from lobewatch.arrays import Floats
@@ -36,12 +38,12 @@ def measure_newest_distance(y: Floats) -> float:
     """
     if y.size <= MIN_REFERENCE_POINTS:
         return 0.0
-    middle = np.median(y[-1 - N_REFERENCE_POINTS : -1])
-    away, before = float(y[-1] - middle), float(y[-2] - middle)
-    scatter = MAD_TO_STD / np.sqrt(2) * float(np.median(np.abs(np.diff(y[:-1]))))
+    middle = float(np.median(y[-1 - N_REFERENCE_POINTS : -1]))
+    away, before = float(y[-1]) - middle, float(y[-2]) - middle
+    scatter = MAD_TO_STD / math.sqrt(2) * float(np.median(np.abs(np.diff(y[:-1]))))
     if not away or before / away >= CONFIRMED_DISTANCE_SHARE:
         return 0.0
-    return away / max(scatter, MIN_POINT_VARIANCE**0.5)
+    return away / max(scatter, math.sqrt(MIN_POINT_VARIANCE))
 
 
 def fit_confirmed_past(days: Floats, readings: Readings) -> PastFit | None:

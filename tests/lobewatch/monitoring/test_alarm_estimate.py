@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as students
 
 from lobewatch.monitoring.alarm_estimate import SeriesChange, estimate_drop
-from lobewatch.monitoring.change_detection import detect_changes
+from lobewatch.monitoring.change_detection import detect_changes, monitor_drops
 from lobewatch.monitoring.series_points import Readings
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ def late(points: int, count: int = 40) -> Floats:
 
 
 DROPS: dict[str, tuple[Floats, str, int, float]] = {
-    "step": (1.0 * (late(20) >= 0), "step", 20, 1.0),
+    "step": ((late(20) >= 0).astype(np.float64), "step", 20, 1.0),
     "slope": (0.1 * np.maximum(late(20), 0), "slope", 20, 1.9),
     "line": (0.1 * late(0), "slope", 1, 3.9),
     "faster and faster": (np.maximum(late(12), 0) ** 2 / 100, "slope", 12, 7.29),
@@ -34,7 +34,7 @@ DROPS: dict[str, tuple[Floats, str, int, float]] = {
     "step, later slope": (2.0 * (late(10) >= 0) + 0.2 * np.maximum(late(25), 0), "mixed", 10, 4.8),
     "slope, then partly repaired": (0.2 * np.maximum(late(10), 0) - 2 * (late(24) >= 0), "mixed", 10, 3.8),
     "slope, then held": (0.2 * np.clip(late(10), 0, 10), "dropped", 10, 2.0),
-    "two steps": (1.0 * (late(12) >= 0) + 1.0 * (late(26) >= 0), "dropped", 12, 2.0),
+    "two steps": ((late(12) >= 0).astype(np.float64) + (late(26) >= 0), "dropped", 12, 2.0),
     "slope, repair, then held": (0.2 * np.clip(late(10), 0, 15) - 2 * (late(26) >= 0), "dropped", 10, 1.0),
 }
 """Drop (%), kind, point and present size of each."""
@@ -98,6 +98,12 @@ def test_an_alarm_follows_its_points_and_keeps_the_point_that_raised_it() -> Non
         assert drop.change.size == pytest.approx(size, abs=drop.change.half_width)
 
 
+def test_a_slope_of_the_monitor_begins_at_the_second_point_at_the_earliest() -> None:
+    watched = monitor_drops(Readings(SCATTER[:20] - 0.3 * late(0, 20)))
+    assert watched.first_alarm is not None
+    assert (watched.change_at(19).kind, watched.change_at(19).point) == ("slope", 1)
+
+
 def test_after_a_rise_the_beginning_counts_from_the_first_point_of_the_series() -> None:
     y = np.tile(SCATTER, 2)
     y[20:] += 3.0
@@ -111,8 +117,8 @@ COURSES: dict[str, Callable[[Floats], Floats]] = {
     "step": np.ones_like,
     "slope": lambda i: i / 12,
     "crash, then slope": lambda i: 0.6 + i / 24,
-    "slope, then held": lambda i: 1.5 * np.minimum(i / 6, 1),
-    "two steps": lambda i: 1 + 0.8 * (i > 5),
+    "slope, then held": lambda i: np.asarray(1.5 * np.minimum(i / 6, 1)),
+    "two steps": lambda i: np.where(i > 5, 1.8, 1.0),
     "slope, then repaired": lambda i: np.where(i <= 10, i / 6, 0.5),
 }
 """Drop at the points after the last healthy one, as a share of its size."""

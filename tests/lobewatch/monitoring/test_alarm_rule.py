@@ -140,10 +140,10 @@ def test_the_step_after_the_first_test_is_sure_from_its_own_score_on() -> None:
     """At 36 points the mean of 35 is far from one by t of its residuals."""
     n = MIN_FIRST_STEP_POINTS
     rest = np.tile([0.3, -0.3], 18)[1:]
-    for away, is_sure in ((0.7, False), (0.82, True)):
+    for away, is_sure in ((0.75, False), (0.9, True)):
         y = np.concatenate([[rest.mean() + away], rest])
         t = away / (np.std(rest) * np.sqrt(35 / 34) * np.sqrt(1 + 1 / 35))
-        assert (t > 2.62) == is_sure  # 2.5 is the normal quantile of 2.62 of Student's t with 34 degrees of freedom
+        assert (t > 2.74) == is_sure  # 2.6 is the normal quantile of 2.74 of Student's t with 34 degrees of freedom
         assert monitor_drops(Readings(y)).is_sure[n - 1] == is_sure
         assert not monitor_drops(Readings(y)).is_sure[: n - 1].any()
 

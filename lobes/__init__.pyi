@@ -17,6 +17,7 @@ from .history import SldHistory
 from .history_file import read_history, write_history
 from .materials import (
     all_cutting_coefficients,
+    explain_unknown_material,
     find_materials,
     fold_material_name,
     materials_by_name,
@@ -67,6 +68,7 @@ __all__ = [
     "classify_cut",
     "count_pieces",
     "equal_pitch",
+    "explain_unknown_material",
     "find_materials",
     "find_pockets",
     "fold_material_name",

@@ -6,6 +6,8 @@ specific_cutting_forces.csv, and the ratio Kr/Kt of force_ratios.csv of its VDI 
 
 import csv
 import difflib
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
@@ -117,6 +119,21 @@ def all_cutting_coefficients() -> tuple[CuttingCoefficients, ...]:
     return (*milling_tests(), *listed_materials())
 
 
+NUMBERED_NAME = re.compile(r"(?:AISI|AA) (\d\w+)")
+"""Name by a standard whose number is used alone, such as AISI 4140."""
+MATERIAL_GROUPS = {
+    "steel": ("P", ""),
+    "stainlesssteel": ("M", ""),
+    "castiron": ("K", ""),
+    "aluminium": ("N", "^EN A"),
+    "aluminum": ("N", "^EN A"),
+    "brass": ("N", "^CuZn"),
+    "titanium": ("S", "^Ti"),
+    "hardenedsteel": ("H", "hardened"),
+}
+"""ISO 513 group and pattern of the listed names of a group of materials, by its folded English name."""
+
+
 def fold_material_name(name: str) -> str:
     """Fold a material name: case and blanks do not count.
 
@@ -152,8 +169,38 @@ def materials_by_name() -> Mapping[str, CuttingCoefficients]:
     >>> materials_by_name()[fold_material_name("AA 7075")].names
     ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')
     """
-    known = ((name, material) for material in all_cutting_coefficients() for name in material.names)
-    return MappingProxyType({fold_material_name(name): material for name, material in known})
+    known = [(name, material) for material in all_cutting_coefficients() for name in material.names]
+    by_name = {fold_material_name(name): material for name, material in known}
+    short = [(match[1], material) for name, material in known if (match := NUMBERED_NAME.fullmatch(name))]
+    counts = Counter(number for number, _ in short)
+    unique = {fold_material_name(number): material for number, material in short if counts[number] == 1}
+    return MappingProxyType(unique | by_name)
+
+
+def explain_unknown_material(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
+    """Return the names to choose from for an unknown name, such as "steel", as a sentence.
+
+    Parameters
+    ----------
+    name : str
+        Unknown name.
+    by_name : mapping of str to CuttingCoefficients
+        Coefficients by folded names.
+
+    Returns
+    -------
+    str
+        Question with the nearest name, or the names of a group.
+
+    Examples
+    --------
+    >>> explain_unknown_material("titanium", materials_by_name())
+    'Choose one of Ti Grade 2, TiAl6V4.'
+    """
+    group, pattern = MATERIAL_GROUPS.get(fold_material_name(name), ("", ""))
+    listed = [material for material in listed_materials() if material.iso_group == group]
+    names = [material.material for material in listed if re.search(pattern, material.material)]
+    return f"Choose one of {', '.join(names)}." if names else f"Did you mean {nearest_material_name(name, by_name)!r}?"
 
 
 def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
@@ -177,7 +224,7 @@ def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients])
     'AA 7075'
     """
     nearest = difflib.get_close_matches(fold_material_name(name), by_name, n=1, cutoff=0.0)[0]
-    return next(known for known in by_name[nearest].names if fold_material_name(known) == nearest)
+    return next((known for known in by_name[nearest].names if fold_material_name(known) == nearest), nearest)
 
 
 def find_materials(word: str) -> list[CuttingCoefficients]:

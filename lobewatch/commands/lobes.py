@@ -1,20 +1,29 @@
 """Command `lobewatch lobes`: stability lobes and stable pockets of a tool."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Option
 
-from lobewatch.commands.shared_options import Now, TappedMachine
+from lobewatch.commands import shared_options as shared
+from lobewatch.commands.shared_options import Now
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
+
+if TYPE_CHECKING:
+    from acquisition import Remark
+    from lobewatch.logbook import LobeComparison
+    from lobewatch.tool import LobeMethod
 
 DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
 def lobes(
-    machine: TappedMachine,
+    machine: Annotated[
+        Path | None, shared.FolderArgument(help="Machine folder with at least one tap test. None with --mode.")
+    ] = None,
     cut: Annotated[str, Option(help="Name of a program, or the reference cut.")] = "reference cut",
     tool: Annotated[
         str | None, Option(help="Tool name. Default: tool of the program, or the last tapped tool.")
@@ -24,6 +33,30 @@ def lobes(
     figure: Annotated[Path | None, Option(help="Lobe diagram (.svg, .png, .pdf).")] = None,
     radial: Annotated[Path | None, Option(help="Figure of the limit over speed and radial depth ae.")] = None,
     waterfall: Annotated[Path | None, Option(help="Figure of the limit over speed and time.")] = None,
+    mode: Annotated[
+        list[str] | None,
+        Option(help='Mode at the tool tip in place of a machine folder: "600 Hz 3% 10 N/um". Repeatable.'),
+    ] = None,
+    mode_y: Annotated[list[str] | None, Option(help="Mode in y, repeatable. Default: as in x.")] = None,
+    teeth: Annotated[int | None, Option(help="Number of flutes, with --mode.")] = None,
+    material: Annotated[str | None, Option(help="Material of lobewatch materials, with --mode.")] = None,
+    diameter: Annotated[
+        float | None, Option(parser=shared.number, help="Tool diameter (mm), with --mode. Default: 10.")
+    ] = None,
+    radial_depth: Annotated[
+        float | None,
+        Option(parser=shared.number, help="Radial depth of cut ae (mm), with --mode. Default: full slot."),
+    ] = None,
+    direction: shared.MillingDirection = None,
+    speeds: Annotated[
+        str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000 24000".')
+    ] = "",
+    speed: Annotated[
+        float | None, Option(parser=shared.rpm, help="Spindle speed of a cut to check (rpm), with --mode.")
+    ] = None,
+    depth: Annotated[
+        float | None, Option(parser=shared.number, help="Axial depth ap of that cut (mm), with --mode.")
+    ] = None,
     now: Now = None,
     as_json: Json = False,
 ) -> None:
@@ -32,17 +65,30 @@ def lobes(
     Each stable pocket has the verdict stable in lobewatch check. A tool without a tap test is predicted by the
     spindle model. Tap tests without a force sensor give pocket speeds, but no depths.
 
+    --mode needs no machine folder: it takes natural frequency, damping ratio and stiffness at the tool tip, with the
+    default uncertainties. --speed and --depth add a verdict.
+
     Examples
     --------
       lobewatch lobes trial --figure lobes.png
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
+      lobewatch lobes --mode "600 Hz 3% 10 N/um" --teeth 4 --material 6061
+      lobewatch lobes --mode "600 Hz 3% 10 N/um" --teeth 4 --material 4140 --speed 8000 --depth 0.5
     """
     from lobewatch.logbook import Logbook, compare_lobes
     from lobewatch.logbook.chart_data import chart_speed_pockets
     from lobewatch.show.cuts.recorded_cuts import speed_pockets_json, speed_pockets_texts
-    from lobewatch.show.programs.advice import comparison_json, comparison_texts
     from lobewatch.tool import DynamicsSource, LobeMethod
 
+    stated: dict[str, Any] = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
+    stated |= {"direction": direction, "speed": speed, "depth": depth, "mode-y": mode_y, "speeds": speeds}
+    if mode:
+        _reject_options({"tool": tool, "radial": radial, "waterfall": waterfall, "MACHINE": machine}, "with --mode")
+        _show_stated(mode, stated, LobeMethod(method), figure, as_json)
+        return
+    _reject_options(stated, "without --mode")
+    if machine is None:
+        raise ValueError("neither a machine folder nor --mode is given. Give one of them.")
     logbook = Logbook.open(machine, now)
     drawn = figure or radial or waterfall
     alone = None if drawn else chart_speed_pockets(logbook, tool, cut)
@@ -59,4 +105,43 @@ def lobes(
 
         with time_step("figures"):
             remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
+    _show(comparison, remarks, as_json)
+
+
+def _show(comparison: "LobeComparison", remarks: "Sequence[Remark]", as_json: bool) -> None:
+    from lobewatch.show.programs.advice import comparison_json, comparison_texts
+
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))
+
+
+def _reject_options(options: Mapping[str, Any], problem: str) -> None:
+    """Raise ValueError for any option that is given."""
+    for name, value in options.items():
+        if value not in (None, "", []):
+            option = name if name.isupper() else f"--{name}"
+            raise ValueError(f"{option} cannot be used {problem}. Leave out this option.")
+
+
+def _show_stated(
+    modes: Sequence[str], stated: Mapping[str, Any], method: "LobeMethod", figure: Path | None, as_json: bool
+) -> None:
+    """Show lobes, pockets and a verdict for stated modes."""
+    from lobewatch.logbook.stated_modes import StatedCut, build_stated_machine, compare_stated_modes, parse_mode
+
+    if missing := [f"--{name}" for name in ("teeth", "material") if stated[name] is None]:
+        raise ValueError(f"--mode needs {' and '.join(missing)}. Give {'both' if len(missing) > 1 else 'it'}.")
+    cut = StatedCut(*(stated[name] for name in ("teeth", "material", "diameter", "radial-depth")))
+    if stated["direction"]:
+        cut = cut._replace(direction=stated["direction"])
+    if stated["speeds"]:
+        cut = cut.with_speeds(stated["speeds"])
+    machine = build_stated_machine(cut)
+    x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
+    with show_progress("searching stable pockets"), time_step("lobes"):
+        comparison = compare_stated_modes(machine, x, y, stated["speed"], stated["depth"], method)
+    if figure is not None:
+        from lobewatch.show.figures.drawing import save_figure  # brings matplotlib
+        from lobewatch.show.figures.lobe_figures import plot_comparison
+
+        save_figure(plot_comparison(machine, comparison, ()), figure)
+    _show(comparison, comparison.remarks, as_json)

@@ -80,7 +80,7 @@ def compare_lobes(
     at_speed = learn_spindle(now.table, assembly, logbook.machine, logbook.cuts)
     pockets = find_stable_pockets(now.table, assembly, logbook.machine, at_speed)
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
-    remarks += [] if pockets else [_no_pocket_remark(now, logbook.machine)]
+    remarks += [] if pockets else [no_pocket_remark(now, logbook.machine)]
     return LobeComparison(now, then, pockets, _find_pocket_shifts(then, now), same, remarks)
 
 
@@ -144,7 +144,8 @@ def _read_assembly_frf(logbook: Logbook, assembly: Assembly, direction: str) -> 
     return replace(frf, frequency=ratio * frf.frequency, usable_band=band)
 
 
-def _no_pocket_remark(now: lobe_chart.LobeChart, machine: Machine) -> Remark:
+def no_pocket_remark(now: lobe_chart.LobeChart, machine: Machine) -> Remark:
+    """Return the reason for missing pockets as a remark."""
     if open_question := find_open_question(now.table, now.assembly):
         gap, cure = open_question
         return Remark(NO_POCKET_CODE, now.name, f"no stable pocket, because {gap}", cure)

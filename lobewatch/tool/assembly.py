@@ -170,6 +170,11 @@ class Assembly:
         return len(self.directions) == 2 and not (self.questions or self.uncovered or self.unchecked)
 
     @property
+    def is_stated(self) -> bool:
+        """True if a person stated the modes and no tap test is behind them."""
+        return not self.taps and not self.predicted
+
+    @property
     def missing_direction(self) -> tuple[str, str]:
         """Text on the missing direction, and its remedy."""
         missing = "y" if "x" in self.directions else "x"
@@ -181,7 +186,8 @@ class Assembly:
     @property
     def label(self) -> str:
         """Name in a legend."""
-        return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
+        date = f"{self.time:%Y-%m-%d}"
+        return self.tap_id if self.is_stated else f"predicted, bearings of {date}" if self.predicted else date
 
     @cached_property
     def principal_directions(self) -> PrincipalDirections:

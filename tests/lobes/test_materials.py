@@ -15,6 +15,7 @@ from lobes import (
     CuttingCoefficients,
     SpecificForce,
     all_cutting_coefficients,
+    explain_unknown_material,
     find_materials,
     fold_material_name,
     materials_by_name,
@@ -171,3 +172,13 @@ def as_row(known: CuttingCoefficients) -> list[str]:
         f"{known.radial / known.tangential:.2f} ({least:.2f}..{most:.2f})",
         f"{known.tangential_edge / 1e3:.0f}",
     ]
+
+
+@pytest.mark.parametrize(("short", "name"), [("6061", "AA 6061"), ("4140", "AISI 4140"), ("316L", "AISI 316L")])
+def test_the_number_of_a_standard_names_a_material(short: str, name: str) -> None:
+    assert named(short) is named(name)
+
+
+@pytest.mark.parametrize(("group", "name"), [("steel", "42CrMo4"), ("Titanium", "TiAl6V4"), ("aluminum", "EN AW-7075")])
+def test_a_group_of_materials_is_answered_with_their_names(group: str, name: str) -> None:
+    assert name in explain_unknown_material(group, materials_by_name())

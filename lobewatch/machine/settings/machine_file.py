@@ -14,7 +14,7 @@ import msgspec
 from acquisition import DataError
 from acquisition.errors import join_sentences
 from dsm import Spindle, change_tool
-from lobes import Cut, CuttingCoefficients, fold_material_name, materials_by_name, nearest_material_name
+from lobes import Cut, CuttingCoefficients, explain_unknown_material, fold_material_name, materials_by_name
 from lobewatch.machine.settings import cut_tables as cutting
 from lobewatch.machine.settings import toml
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
@@ -119,9 +119,9 @@ class Machine(toml.TomlTable, frozen=True):
         own = {fold_material_name(material.name): material.build() for material in self.material}
         by_name, name = {**materials_by_name(), **own}, fold_material_name(table.material)
         if name not in by_name:
-            near = nearest_material_name(table.material, by_name)
-            cure = f"Did you mean {near!r}? List all names with lobes.materials_by_name, or add a [[material]]."
-            raise ValueError(f"unknown material {table.material!r}. {cure}")
+            cure = "List all names with lobes.materials_by_name, or add a [[material]]."
+            near = explain_unknown_material(table.material, by_name)
+            raise ValueError(f"unknown material {table.material!r}. {near} {cure}")
         known = by_name[name]
         if table.tangential_n_per_mm2 is None:
             return known

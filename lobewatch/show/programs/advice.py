@@ -262,10 +262,10 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     """Return the newest diagram in words, its pockets, and the verdicts on the programs with this cut."""
     now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
+    origin = [f"computed from the {now.source} of {now.assembly.tap_id}", tap_age_text(now.assembly)]
     texts: Texts = [
         f"{now.name}: {now.lobes.method_text}",
-        f"computed from the {now.source} of {now.assembly.tap_id}",
-        tap_age_text(now.assembly),
+        *(["computed from stated modes"] if now.assembly.is_stated else origin),
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)
         else f"no stability limit in this speed range ({now.lobes.method_text})",

@@ -70,7 +70,7 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
             "material, or both tangential_n_per_mm2 and radial_n_per_mm2",
         ),
         ('material = "ours"', 'material = "42CrMo5"', "'42CrMo5'.* '42CrMo4'.*lobes.materials_by_name"),
-        ('material = "ours"', 'material = "4140"', "'4140'.* 'AISI 4140'"),
+        ('material = "ours"', 'material = "AISI 4141"', "'AISI 4141'.* 'AISI 4140'"),
         ("tangential_n_per_mm2 = 800\n", "", "tangential_n_per_mm2 and radial_n_per_mm2, or specific"),
         (
             "radial_n_per_mm2 = 200",

@@ -102,13 +102,14 @@ def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine for the template."""
     left, last, change = row["days_left"], row["last_tap"], change_cell(row)
     due = "never tapped" if left is None else due_text(left)
+    warn, alarm = row["limits"][:2] or (math.nan, math.nan)
     is_good, has_changed = row["light"] is StatusLevel.GOOD, change.endswith("%")
     return {
         **row,
         "kind": status_css_class(row["light"], row["is_early"]),
         "reasons": row["reasons"] or ["no finding" if is_good else "-"],
         "change": change or "first test",
-        "gauge": make_gauge(row["fall"], *row["limits"][:2], half_width_of(row)) if has_changed else None,
+        "gauge": make_gauge(row["fall"], warn, alarm, half_width_of(row)) if has_changed else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
         "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,

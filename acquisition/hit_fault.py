@@ -223,7 +223,10 @@ HIT_FAULTS: Mapping[HitFlags, HitFault] = {
     HitFlags.NARROW_BAND: HitFault(
         "narrow band",
         "Use a harder hammer tip.",
-        {"": "The force spectrum reaches {reach:.0f} Hz (-20 dB) of the required {end:g} Hz"},
+        {
+            "": "The force spectrum reaches {reach:.0f} Hz (-20 dB) of the required {end:g} Hz",
+            "long": "The force pulse lasts {length:.2g} ms, as of a soft tip, and gives no response above its noise",
+        },
     ),
     HitFlags.INCONSISTENT: HitFault(
         "inconsistent",

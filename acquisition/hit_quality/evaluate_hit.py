@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.arrays import Floats, find_median
+from acquisition.arrays import Floats
 from acquisition.errors import DataError, join_sentences
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
@@ -18,15 +18,18 @@ from acquisition.hit_fault import HIT_FAULTS, TOUCH_TEXT, HitFlags
 from acquisition.hit_quality.double_hit import find_force_hole, find_highest_touch, find_second_input
 from acquisition.hit_quality.missing_response import is_saturated, is_steady, measure_levels
 from acquisition.hit_quality.overload_and_hum import find_overload, fit_mains_hum, is_like_hum
+from acquisition.hit_quality.swapped_channels import is_swapped, measure_swings
 from acquisition.hits.force_window import window_force
 from acquisition.hits.free_decay import MAX_CONTACT_TIME, extract_free_decay, measure_rest_noise
-from acquisition.hits.pulse import Pulse, count_pre_hit_samples, extract_baseline, find_pulse
+from acquisition.hits.pulse import Pulse, count_pre_hit_samples, find_pulse
 from acquisition.hits.touches import Touch
 
 Findings = dict[HitFlags, str]
 """Finding with its figures for each fault of a hit, without the remedy."""
 MIN_LINE_SCATTER = 0.05
 """Lowest relative scatter assumed for a line, which bounds its weight."""
+MIN_LONG_PULSE = 2e-3
+"""Length of a force pulse from which a missing response is laid to a soft tip (s); chosen, steel has 0.2 to 1 ms."""
 MIN_QUIET_SAMPLES = 8
 """Smallest number of samples before the hit that give the noise of the response; chosen."""
 
@@ -101,7 +104,7 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
         findings |= _state(HitFlags.LOST_SCANS, count=hit.lost_scans)
     if not hit.has_force:
         return HitVerdict.from_findings(findings | ({} if findings else _evaluate_response(hit)) | _evaluate_decay(hit))
-    if _is_swapped(hit):
+    if is_swapped(hit):
         return HitVerdict.from_findings(findings | _state(HitFlags.SWAPPED_CHANNELS))
     if is_saturated(hit):
         return HitVerdict.from_findings(_state(HitFlags.NO_RESPONSE, "saturated"))
@@ -109,8 +112,8 @@ def evaluate_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | 
     if pulse is None:
         return HitVerdict.from_findings(findings | _state(HitFlags.NO_HIT))
     findings |= _evaluate_strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
-    missing = _evaluate_response_level(hit)
-    findings |= missing | _evaluate_touches(hit, band) | ({} if missing else _evaluate_decay(hit))
+    missing = _evaluate_response_level(hit, pulse)
+    findings |= missing | ({} if HitFlags.NARROW_BAND in missing else _evaluate_times(hit, missing, band))
     if HitFlags.DOUBLE_HIT in findings:
         band = None  # the hole, not the tip, ends the band
     if band is not None or (mean is not None and not findings):
@@ -260,35 +263,6 @@ def _evaluate_overloads(hit: Hit) -> Findings:
     return findings
 
 
-def _is_swapped(hit: Hit) -> bool:
-    """Return whether the response is one short pulse of one sign while the force swings through both signs."""
-    noise = float(np.std(extract_baseline(hit.acceleration, hit.pre_trigger)))
-    smaller, larger = _measure_swings(hit.acceleration)
-    small = max(0.1 * larger, 6 * noise)
-    if smaller >= small:
-        return False
-    smaller, larger = _measure_swings(hit.force)
-    if smaller <= 0.3 * larger:
-        return False
-    force, response = (signal - find_median(signal) for signal in (hit.force, hit.acceleration))
-    pulse = np.where(np.abs(response) < small, 0.0, response)
-    return _measure_energy_duration(force) > 3 * _measure_energy_duration(pulse)
-
-
-def _measure_swings(signal: Floats) -> tuple[float, float]:
-    """Return the smaller and the larger of the greatest distances from the median to either side."""
-    middle = find_median(signal)
-    smaller, larger = sorted((float(signal.max()) - middle, middle - float(signal.min())))
-    return smaller, larger
-
-
-def _measure_energy_duration(signal: Floats) -> int:
-    """Count the samples that hold the central 90 % of the energy."""
-    energy = np.cumsum(signal**2)
-    low, high = np.searchsorted(energy, [0.05 * energy[-1], 0.95 * energy[-1]])
-    return int(high - low) + 1
-
-
 def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
     full = hit.channels[0].full_scale / abs(hit.channels[0].sensitivity) if hit.channels else np.inf
     soft, hard = HIT_FAULTS[HitFlags.TOO_SOFT].limits, HIT_FAULTS[HitFlags.TOO_HARD].limits
@@ -301,7 +275,11 @@ def _evaluate_strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> Findings:
     return {}
 
 
-def _evaluate_response_level(hit: Hit) -> Findings:
+def _evaluate_times(hit: Hit, missing: Findings, band: tuple[float, float] | None) -> Findings:
+    return _evaluate_touches(hit, band) | ({} if missing else _evaluate_decay(hit))
+
+
+def _evaluate_response_level(hit: Hit, pulse: Pulse) -> Findings:
     """Compare the response with its noise before the hit, and find hum and drift; a constant one is none either.
 
     The noise in a few samples before the hit is uncertain. The median of all tenths then confirms it.
@@ -314,6 +292,8 @@ def _evaluate_response_level(hit: Hit) -> Findings:
     ratio = levels.max() / noise if noise else np.inf
     if levels.max() < limit * np.median(levels):
         ratio /= 1 + 2 / np.sqrt(2 * max(quiet.size, 1))
+    if ratio < limit and pulse.width > MIN_LONG_PULSE * hit.sample_rate:
+        return _state(HitFlags.NARROW_BAND, "long", length=1e3 * pulse.width / hit.sample_rate)
     if ratio < limit:
         return _state(HitFlags.NO_RESPONSE, ratio=ratio)
     is_missing = is_steady(response, quiet.size)
@@ -365,7 +345,7 @@ def _is_too_late(hit: Hit, touch: Touch) -> bool:
 def _evaluate_response(hit: Hit) -> Findings:
     """Evaluate only the response: its strength, and whether its decay was hit again."""
     decay, noise = extract_free_decay(hit), measure_rest_noise(hit)
-    peak = _measure_swings(hit.acceleration)[1]
+    peak = measure_swings(hit.acceleration)[1]
     if peak < HIT_FAULTS[HitFlags.TOO_SOFT].limits["noise_ratio"] * noise:
         return _state(HitFlags.TOO_SOFT, "response", peak=peak, noise=noise)
     second = find_second_input(decay, hit.sample_rate, noise)

@@ -99,14 +99,26 @@ class StreamRate:
 
     @property
     def is_verified(self) -> bool:
-        """True if the stream was long and even enough to show a deviation of 0.2 %."""
+        """True if the stream was long and even enough to show or to exclude a deviation of more than 0.2 %."""
         measured = self.measure()
-        return measured is not None and _uncertainty(measured) <= RATE_TOLERANCE
+        if measured is None:
+            return False
+        is_right = self._deviation(measured) + _uncertainty(measured) <= RATE_TOLERANCE
+        return is_right or self.find_deviation() is not None
+
+    @property
+    def seconds(self) -> float:
+        """Length of the stream (s)."""
+        return self._arrived[-1] - self._arrived[0] if self._arrived else 0.0
 
     def _is_off(self, measured: MeasuredRate) -> bool:
         if measured.std > MAX_RATE_STD * measured.rate:
             return False
-        return abs(measured.rate / self.sample_rate - 1) > RATE_TOLERANCE + _uncertainty(measured)
+        return self._deviation(measured) > RATE_TOLERANCE + _uncertainty(measured)
+
+    def _deviation(self, measured: MeasuredRate) -> float:
+        """Return the relative deviation of a measured rate from that in use."""
+        return abs(measured.rate / self.sample_rate - 1)
 
 
 def _uncertainty(measured: MeasuredRate) -> float:

@@ -10,17 +10,17 @@ from lobewatch.step_times import time_step
 
 
 def check(
-    machine: shared.TappedMachine,
+    machine: shared.Machine,
     program: Annotated[list[str] | None, Option(help="Program name, repeatable. Default: all programs.")] = None,
     speed: Annotated[
         float | None, Option(parser=shared.rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
     ] = None,
-    depth: Annotated[float | None, Option(parser=shared.number, help="Axial depth of cut ap (mm).")] = None,
+    depth: Annotated[float | None, Option(parser=shared.length, help="Axial depth of cut ap (mm).")] = None,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: shared.Material = None,
     teeth: shared.Flutes = None,
     diameter: shared.Diameter = None,
-    radial: Annotated[float | None, Option(parser=shared.number, help="Radial depth of cut ae (mm).")] = None,
+    radial: Annotated[float | None, Option(parser=shared.length, help="Radial depth of cut ae (mm).")] = None,
     direction: shared.MillingDirection = None,
     accept: Annotated[
         list[str] | None,
@@ -33,7 +33,7 @@ def check(
 
     Verdicts (stable, doubtful, not stable, unknown) include all uncertainties. A program without speed or depth gets a
     recommendation. Missing values of a cut that is not in machine.toml come from the programs of its tool if all these
-    programs agree.
+    programs agree. Without a tap test, only test cuts at the speed of a program decide.
 
     Exit code 1: not all cuts are stable.
 

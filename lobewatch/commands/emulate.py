@@ -14,7 +14,7 @@ from typer import Option
 
 import acquisition
 from lobewatch.commands import COMMANDS
-from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName, number, rpm
+from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName, length, rpm
 from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help=COMMANDS["emulate"], no_args_is_help=True)
@@ -89,7 +89,7 @@ class EmulateOptions:
     """Name of the program to cut. None for tap tests."""
     speed: Annotated[float | None, Option(parser=rpm, help="Spindle speed of the cut (rpm).")] = None
     """Spindle speed of the cut (rpm). None for that of the program."""
-    depth: Annotated[float | None, Option(parser=number, help="Axial depth of the cut ap (mm).")] = None
+    depth: Annotated[float | None, Option(parser=length, help="Axial depth of the cut ap (mm).")] = None
     """Axial depth of cut (mm). None for that of the program."""
     as_json: Json = False
     """True to print the result as JSON."""

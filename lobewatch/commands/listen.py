@@ -2,27 +2,50 @@
 
 import contextlib
 import itertools
-from collections.abc import Sequence
-from datetime import datetime
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from lobewatch.commands.shared_options import CutDate, CutDepth, CutPower, FileOptions, Machine, add_file_options, rpm
-from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, emit, notes, print_remarks, show_address
+from lobewatch.commands.shared_options import (
+    CutDate,
+    CutDepth,
+    CutPower,
+    FileOptions,
+    Flutes,
+    FolderArgument,
+    add_file_options,
+    rpm,
+)
+from lobewatch.show.terminal.output import (
+    Json,
+    JsonObject,
+    Listen,
+    Texts,
+    Token,
+    WatchToken,
+    emit,
+    notes,
+    print_remarks,
+    show_address,
+)
 
 if TYPE_CHECKING:
+    from acquisition import Description
     from acquisition.files.cut_file import CutSignal
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
+    from lobewatch.logbook.heard_cuts import CutFileRequest
+    from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
 
 
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
-    machine: Machine,
+    machine: Annotated[Path, FolderArgument(help="Machine folder, or a recorded cut of any machine.")],
     program: Annotated[str, Option(help="Program name.")] = "",
     cut: Annotated[str, Option(help='Cut instead of a program: "reference cut", or the cut of a program.')] = "",
     speed: Annotated[
@@ -30,6 +53,10 @@ def listen(
     ] = None,
     depth: CutDepth = None,
     power: CutPower = None,
+    teeth: Flutes = None,
+    speeds: Annotated[
+        str, Option(help='Speeds of the machine (rpm): "8000 24000". Default: 0.5 to 1.5 times --speed.')
+    ] = "",
     file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,
     date: CutDate = None,
     sensor: Annotated[str, Option(help="Sensor of --file: accelerometer or microphone (no unit).")] = ("accelerometer"),
@@ -54,8 +81,11 @@ def listen(
     Start with the spindle running in air, then cut for at least one second. The recording and its result are stored.
     lobewatch exclude takes the cut out of all results.
 
+    A recorded cut instead of a machine folder needs --teeth and --speed. The result is not stored.
+
     Examples
     --------
+      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds "8000 24000" --depth 1
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
@@ -64,10 +94,18 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
     """
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
     from lobewatch.tap import cut_recording as recorder
 
+    if _is_recording(machine):
+        others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
+        _reject_options(others | {"date": date}, "needs a machine folder")
+        description = file_options.description(tacho=tacho, pulses=pulses)
+        _listen_to_file(machine, description, CutFileRequest(teeth, speed, depth, speeds), out, as_json)
+        return
+    _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
     if not dry_run:
@@ -91,9 +129,59 @@ def listen(
 
             save_cut_spectrum(comparisons, out)
         if dry_run:
-            emit(recording_json(comparisons), as_json, *recording_texts(comparisons))
+            payload, texts = _suggest_untapped(logbook, comparisons)
+            emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
         else:
             _store(logbook, comparisons, signal, date, publisher, as_json)
+
+
+def _is_recording(path: Path) -> bool:
+    """Return whether the first argument is a recorded cut, or the name of one that does not exist."""
+    return path.is_file() or (bool(path.suffix) and not path.exists())
+
+
+def _reject_options(options: Mapping[str, Any], problem: str) -> None:
+    """Raise ValueError for any option that is given."""
+    for name, value in options.items():
+        if value not in (None, "", False):
+            raise ValueError(f"--{name} {problem}. Leave out this option.")
+
+
+def _listen_to_file(
+    path: Path, description: "Description", request: "CutFileRequest", out: Path | None, as_json: bool
+) -> None:
+    """Evaluate a recorded cut of an unknown machine, and show the next speeds."""
+    from lobewatch.logbook.heard_cuts import hear_file
+    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+
+    comparisons, found = hear_file(path, description, request)
+    if out is not None:
+        from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
+
+        save_cut_spectrum(comparisons, out)
+    payload = recording_json(comparisons) | next_speeds_json(found)
+    emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
+
+
+def _suggest_untapped(
+    logbook: "Logbook", comparisons: "Sequence[CutComparison]", stored: "Sequence[CutEntry] | None" = None
+) -> tuple[JsonObject, Texts]:
+    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was.
+
+    stored: all cuts of the journal. None to add these cuts to those of the logbook.
+    """
+    from acquisition import DataError
+    from lobewatch.logbook import Analysis
+    from lobewatch.logbook.heard_cuts import suggest_by_sound
+    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+
+    setting = comparisons[-1].setting
+    if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
+        return {}, []
+    made = [comparison.to_recorded_cut(datetime.now(UTC)) for comparison in comparisons]
+    found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
+    return next_speeds_json(found), next_speeds_texts(found)
 
 
 def _store(
@@ -116,5 +204,7 @@ def _store(
         remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
         codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
         rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
-        emit(recording_json(comparisons, rows), as_json, *recording_texts(comparisons, [cut.id for cut in stored]))
+        payload, texts = _suggest_untapped(logbook, comparisons, [*earlier, *stored])
+        saved = recording_texts(comparisons, [cut.id for cut in stored])
+        emit(recording_json(comparisons, rows) | payload, as_json, *saved, *texts)
     print_remarks(itertools.chain.from_iterable(remarks))

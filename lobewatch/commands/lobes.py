@@ -41,11 +41,11 @@ def lobes(
     teeth: Annotated[int | None, Option(help="Number of flutes, with --mode.")] = None,
     material: Annotated[str | None, Option(help="Material of lobewatch materials, with --mode.")] = None,
     diameter: Annotated[
-        float | None, Option(parser=shared.number, help="Tool diameter (mm), with --mode. Default: 10.")
+        float | None, Option(parser=shared.length, help="Tool diameter (mm), with --mode. Default: 10.")
     ] = None,
     radial_depth: Annotated[
         float | None,
-        Option(parser=shared.number, help="Radial depth of cut ae (mm), with --mode. Default: full slot."),
+        Option(parser=shared.length, help="Radial depth of cut ae (mm), with --mode. Default: full slot."),
     ] = None,
     direction: shared.MillingDirection = None,
     speeds: Annotated[
@@ -55,7 +55,7 @@ def lobes(
         float | None, Option(parser=shared.rpm, help="Spindle speed of a cut to check (rpm), with --mode.")
     ] = None,
     depth: Annotated[
-        float | None, Option(parser=shared.number, help="Axial depth ap of that cut (mm), with --mode.")
+        float | None, Option(parser=shared.length, help="Axial depth ap of that cut (mm), with --mode.")
     ] = None,
     now: Now = None,
     as_json: Json = False,

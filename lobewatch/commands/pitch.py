@@ -11,7 +11,7 @@ from lobewatch.commands.shared_options import (
     Now,
     TappedMachine,
     cut_fields,
-    number,
+    length,
     rpm,
 )
 from lobewatch.show.terminal.output import Json, emit, show_progress
@@ -23,12 +23,12 @@ def pitch(
     speed: Annotated[float, Option(parser=rpm, help="Spindle speed (rpm).")],
     tool: Annotated[str | None, Option(help="Name of the cutter.")] = None,
     depth: Annotated[
-        float | None, Option(parser=number, help="Axial depth of cut ap (mm) to give verdicts for.")
+        float | None, Option(parser=length, help="Axial depth of cut ap (mm) to give verdicts for.")
     ] = None,
     material: Material = None,
     teeth: Flutes = None,
-    diameter: Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")] = None,
-    radial: Annotated[float | None, Option(parser=number, help="Radial depth of cut ae (mm).")] = None,
+    diameter: Annotated[float | None, Option(parser=length, help="Tool diameter (mm).")] = None,
+    radial: Annotated[float | None, Option(parser=length, help="Radial depth of cut ae (mm).")] = None,
     direction: MillingDirection = None,
     now: Now = None,
     as_json: Json = False,

@@ -4,7 +4,17 @@ from typing import Annotated, Literal
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import Diameter, Flutes, Material, Now, TappedMachine, cut_fields, number, rpm
+from lobewatch.commands.shared_options import (
+    Diameter,
+    Flutes,
+    Material,
+    Now,
+    TappedMachine,
+    cut_fields,
+    feed,
+    length,
+    rpm,
+)
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
@@ -14,16 +24,16 @@ def recommend(
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: Material = None,
     radial: Annotated[
-        float | None, Option(parser=number, help="Radial depth of cut ae (mm). Default: full slot.")
+        float | None, Option(parser=length, help="Radial depth of cut ae (mm). Default: full slot.")
     ] = None,
     direction: Annotated[
         Literal["up", "down"] | None, Option(help="Up or down milling. Default: the direction with the lower limit.")
     ] = None,
-    depth: Annotated[float | None, Option(parser=number, help="Required axial depth of cut ap (mm).")] = None,
+    depth: Annotated[float | None, Option(parser=length, help="Required axial depth of cut ap (mm).")] = None,
     speed: Annotated[float | None, Option(parser=rpm, help="Present spindle speed (rpm).")] = None,
     teeth: Flutes = None,
     diameter: Diameter = None,
-    feed_per_tooth: Annotated[float | None, Option(parser=number, help="Feed per tooth (mm).")] = None,
+    feed_per_tooth: Annotated[float | None, Option(parser=feed, help="Feed per tooth (mm).")] = None,
     save: Annotated[str | None, Option(help="Name of a new program in machine.toml.")] = None,
     now: Now = None,
     as_json: Json = False,

@@ -31,6 +31,32 @@ def number(text: str | float) -> float:
         raise BadParameter(f"{text!r} is not a number{hint}") from None
 
 
+def length(text: str | float) -> float:
+    """Parse a length (mm), also with a unit: 12.5, 0.5in, 1/2"."""
+    return _quantity(text, "_mm")
+
+
+def feed(text: str | float) -> float:
+    """Parse a feed per tooth (mm), also with a unit: 0.05, 0.002 ipt."""
+    return _quantity(text, "feed_per_tooth_mm")
+
+
+def power(text: str | float) -> float:
+    """Parse a power (kW), also with a unit: 1.4, 1400 W, 2 hp."""
+    return _quantity(text, "_kw")
+
+
+def _quantity(text: str | float, kind: str) -> float:
+    if not isinstance(text, str) or (text.strip()[-1:] in {*"0123456789."} and "/" not in text):
+        return number(text)
+    from lobewatch.machine.settings.unit_text import UNITS_BY_KEY_END, read_quantity
+
+    try:
+        return read_quantity(text, UNITS_BY_KEY_END[kind])
+    except ValueError as error:
+        raise BadParameter(str(error)) from None
+
+
 def rpm(text: str | float) -> float:
     """Parse a spindle speed, whose point before three digits may separate thousands."""
     if len(list_readings(str(text))) < 2:
@@ -85,9 +111,9 @@ ExcludableEntry = Annotated[
     str, Argument(help="Tap test (ID, file name or a unique part of the ID), test cut (c1) or mass check (m1).")
 ]
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
-Diameter = Annotated[float | None, Option(parser=number, help="Tool diameter (mm).")]
+Diameter = Annotated[float | None, Option(parser=length, help="Tool diameter (mm).")]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
-CutDepth = Annotated[float | None, Option(parser=number, help="Axial depth of cut ap (mm). Default: from the program.")]
+CutDepth = Annotated[float | None, Option(parser=length, help="Axial depth of cut ap (mm). Default: from the program.")]
 Now = Annotated[
     datetime | None,
     Option(
@@ -105,7 +131,7 @@ Flutes = Annotated[int | None, Option(help="Number of flutes.")]
 CutPower = Annotated[
     float | None,
     Option(
-        parser=number, help="Cutting power (kW): drive display in the cut minus drive display in air at the same speed."
+        parser=power, help="Cutting power (kW): drive display in the cut minus drive display in air at the same speed."
     ),
 ]
 AddedModes = Annotated[list[str] | None, Option(help="Fit another mode near this frequency (Hz), repeatable.")]

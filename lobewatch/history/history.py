@@ -220,7 +220,7 @@ def make_row(m: Measurement, assembly: Assembly, place: TapPlace) -> HistoryRow:
     values |= {"conditions": place.entry.conditions, "operator": place.entry.operator}
     values |= {"tip_compliance": sum_compliance(m.at_tip), "highest_frequency": _usable_end(m.frf)}
     modes = {"modes": m.modes[:MAX_STORED_MODES], "x": assembly.x or (), "y": assembly.y or ()}
-    values |= {name: _mode_values(part) for name, part in modes.items()}
+    values |= {name: to_mode_values(part) for name, part in modes.items()}
     return HistoryRow(m.tap_id, m.time, m.tool, m.direction, **values)
 
 
@@ -231,7 +231,8 @@ def _usable_end(frf: Frf | None) -> float:
     return float(frf.frequency[-1] if frf.usable_band is None else frf.usable_band[1])
 
 
-def _mode_values(modes: Sequence[Mode]) -> tuple[ModeValues, ...]:
+def to_mode_values(modes: Sequence[Mode]) -> tuple[ModeValues, ...]:
+    """Return frequency, damping ratio, stiffness and phase of modes."""
     return tuple((mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg) for mode in modes)
 
 

@@ -8,15 +8,15 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.history.history import HistoryRow
+from lobewatch.measurement.series_modes import find_series_questions
 from lobewatch.measurement.series_questions import (
     MAX_DAY,
     NEW_LEVEL_CODES,
     EarlierTest,
     SeriesReference,
-    check_same_direction,
-    check_series,
 )
 from lobewatch.tool.tap_series import TapPlace
+from modal import Mode
 
 
 class EarlierTestIndex:
@@ -55,16 +55,22 @@ def find_earlier_tests(rows: Sequence[HistoryRow]) -> tuple[EarlierTest, ...]:
     """Return the tests of rows in order of time that later tests are compared with."""
     known = [row for row in rows if row.frequency.is_known and not row.questions]
     return tuple(
-        EarlierTest(row.time, row.frequency.value, row.stiffness.value, not NEW_LEVEL_CODES.isdisjoint(row.accepted))
+        EarlierTest(
+            row.time,
+            row.frequency.value,
+            row.stiffness.value,
+            not NEW_LEVEL_CODES.isdisjoint(row.accepted),
+            row.modes,
+        )
         for row in known
     )
 
 
-def find_series_questions(row: HistoryRow, reference: SeriesReference) -> tuple[Remark, ...]:
-    """Return the questions that the followed mode of a row raises in its series."""
+def find_row_questions(row: HistoryRow, reference: SeriesReference) -> tuple[Remark, ...]:
+    """Return the questions that the modes of a row raise in its series."""
     if row.mode is None:
         return ()
     errors = [value.std for value in (row.frequency, row.damping_ratio, row.stiffness)]
-    mode = replace(row.mode, covariance=np.diag(np.square(errors)))
-    same = check_same_direction(mode, [mode], reference)
-    return (*check_series(mode, reference), *(() if same is None else (same,)))
+    followed = replace(row.mode, covariance=np.diag(np.square(errors)))
+    others = [Mode(*values[:3], phase_deg=values[3]) for values in row.modes if values[2] > 0]
+    return find_series_questions(followed, [followed, *(mode for mode in others if mode != row.mode)], reference)

@@ -13,13 +13,13 @@ from datetime import UTC, datetime
 from acquisition import CROSS_TAP, DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.history.history import HistoryRow, ModeValues, encode_row, keep_older_row, make_row
-from lobewatch.history.series_reference import EarlierTestIndex, find_series_questions
+from lobewatch.history.series_reference import EarlierTestIndex, find_row_questions
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.folder import FolderContents
 from lobewatch.machine.journal.alarm_entries import FleetScatter
 from lobewatch.machine.journal.journal import format_command
+from lobewatch.measurement import recording_questions as questions
 from lobewatch.measurement.hit_choice import format_decisions
-from lobewatch.measurement.recording_questions import find_open_questions, mark_accepted
 from lobewatch.measurement.series_questions import MAX_DAY
 from lobewatch.measurement.tap_measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.tool.assembly import Assembly, assemble, predict_assembly
@@ -192,8 +192,10 @@ class FollowedModeIndex:
 
 
 def is_row_of(row: HistoryRow, place: TapPlace) -> bool:
-    """Tell whether a row is of this tap test with the same baseline, answers, mode edits and decisions on hits."""
-    tap = place.entry
+    """Tell whether a row is of this tap test with the same baseline, answers, mode edits, hits and mass check."""
+    tap, codes = place.entry, {remark.code for remark in row.remarks}
+    if (questions.TOOL_COMPLIANCE.code if tap.is_mass_checked else questions.TOOL_MISMATCH_CODE) in codes:
+        return False
     ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand, row.hit_decisions
     by_person = frozenset(tap.accepted), str(tap.by_hand), format_decisions(tap.hit_decisions)
     return ground_of_row == (tap.id, place.baseline, place.series, *by_person)
@@ -216,7 +218,7 @@ class _RowArchive:
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
         cross = "" if place.cross is None else self.places[place.cross].entry.id
         reference = self._earlier.find_reference(place, self.places, self.rows)
-        remarks = (*place.remarks, *find_series_questions(row, reference))
+        remarks = (*place.remarks, *find_row_questions(row, reference))
         if place.other_direction is None:
             return "", cross, last, remarks, ()
         other = self.places[place.other_direction].entry
@@ -309,7 +311,7 @@ class TapMeasurements:
             else:
                 measurement = interpret_fit(fit, machine, last, reference)
             measurement = replace(
-                measurement, remarks=mark_accepted((*measurement.remarks, *place.remarks), place.entry)
+                measurement, remarks=questions.mark_accepted((*measurement.remarks, *place.remarks), place.entry)
             )
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > MAX_MEASUREMENTS_IN_MEMORY:
@@ -324,7 +326,7 @@ class TapMeasurements:
         newest = self.measurement(place, rows)
         other = None if place.other_direction is None else self.measurement(self._places[place.other_direction], rows)
         series, mode = self._followed.before(place, rows), newest.followed
-        if mode is not None and not find_open_questions(newest.remarks):
+        if mode is not None and not questions.find_open_questions(newest.remarks):
             values = mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg
             series.setdefault(newest.direction, []).append(FollowedMode(newest.time, *values))
         return assemble(newest, other, series, cross)

@@ -11,6 +11,7 @@ from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
 from lobewatch.cuts.chatter_detection.spectrum import sideband_distance
+from lobewatch.cuts.chatter_detection.without_air import evaluate_with_or_without_air
 from lobewatch.cuts.learning.cut_likelihood import ExpectedChatter, predict_chatter
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
@@ -98,7 +99,8 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     tool = logbook.query(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
     sensor: CutSensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
-    evaluated = evaluate_recording(recording)
+    evaluate = evaluate_with_or_without_air if isinstance(tool, DataError) else evaluate_recording
+    evaluated = evaluate(recording)
     comparisons = [CutComparison(setting, detected, assembly, sensor, None) for detected in evaluated]
     if assembly is None:
         return comparisons

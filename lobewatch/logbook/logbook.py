@@ -214,7 +214,9 @@ class Logbook:
     status = answered_by(Analysis.status)
     chain_check = answered_by(Analysis.chain_check)
 
-    def commit(self, tap: TapTest, now: datetime | None = None, answered: Sequence[str] = ()) -> None:
+    def commit(
+        self, tap: TapTest, now: datetime | None = None, asked: Sequence[str] = (), answered: Sequence[str] = ()
+    ) -> None:
         """Store a tap test permanently.
 
         Parameters
@@ -223,15 +225,17 @@ class Logbook:
             Tap test to store.
         now
             Time of a live test, which is checked against the clock. None for a recorded test.
+        asked
+            Codes of questions that the live test leaves open.
         answered
             Codes of questions that a person has answered before the first hit.
         """
         if not self.is_current:
             self._invalidate()
-        codes = find_clock_questions(tap.circumstances.created, now, (place.entry for place in self.files.places[-1:]))
+        newest = (place.entry for place in self.files.places[-1:])
+        codes = *find_clock_questions(tap.circumstances.created, now, newest), *asked
         codes += find_device_questions(self.folder, tap.circumstances)
-        entry, analysis = self.folder.commit(tap, codes, answered), self._current_analysis
-        is_newest = self.files.add(entry)
+        analysis, is_newest = self._current_analysis, self.files.add(self.folder.commit(tap, codes, answered))
         self._current_analysis = self._make_analysis(analysis.measurements) if is_newest and analysis else None
         self._mark = self.folder.change_mark
 

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import Circumstances, Description, Recording, TapTest
+from lobewatch.history.history import to_mode_values
 from lobewatch.history.series_reference import find_earlier_tests
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.prepare_taps import (
@@ -112,7 +113,8 @@ class _EarlierTests:
             return
         self.mode = followed
         if not find_open_questions(measurement.remarks):
-            self.tests.append(EarlierTest(measurement.time, followed.frequency, followed.stiffness))
+            values = followed.frequency, followed.stiffness
+            self.tests.append(EarlierTest(measurement.time, *values, modes=to_mode_values(measurement.modes)))
 
 
 def _measure_preview(

@@ -10,7 +10,9 @@ import msgspec
 from acquisition import DataError, Remark
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.cuts.learning.program_learning import learn_spindle
+from lobewatch.cuts.learning.verdict_by_sound import evaluate_by_sound
 from lobewatch.logbook.analysis import Analysis
+from lobewatch.logbook.heard_cuts import is_untapped
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings import requested_cut
@@ -78,7 +80,8 @@ class RequestedVerdicts(NamedTuple):
 def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str, Any]) -> RequestedVerdicts:
     """Evaluate a requested cut (see `build_requested_program`), else the named programs, else all programs.
 
-    ValueError for an unknown name or an invalid cut, DataError without a program or a tap test.
+    Test cuts decide on a machine without a tap test. ValueError for an unknown name or an invalid cut, DataError
+    without a program.
     """
     machine = logbook.machine
     if any(value is not None for value in cut.values()):
@@ -86,19 +89,26 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
             cure = "Give either evaluate_requested.names or the options of a cut."
             raise ValueError(f"evaluate_requested.names already sets speed, depth and tool. {cure}")
         requested = requested_cut.build_requested_program(machine, cut)
-        logbook.newest_tap()
-        return RequestedVerdicts([logbook.verdict_for(requested)], [])
+        return RequestedVerdicts(_evaluate_untapped(logbook, [logbook.verdict_for(requested)]), [])
     if not machine.all_programs:
         fields = "ProgramTable.speed_rpm, ProgramTable.depth_mm, ProgramTable.tool and ProgramTable.material"
         text = f"no [[program]] to check. Add a [[program]] for each of your cuts, or give {fields}."
         raise DataError(f"{logbook.folder.toml}: {text}")
     by_name = {table.name: table for table in machine.all_programs}
     chosen = [requested_cut.find_by_name(by_name, name).name for name in names] or list(by_name)
-    logbook.newest_tap()
     incomplete = [table for table in machine.all_programs if table.is_incomplete and table.name in chosen]
     has_complete = any(table.name in chosen for table in machine.program)
     verdicts = logbook.verdicts(names=chosen if names else None) if has_complete else []
+    verdicts = _evaluate_untapped(logbook, verdicts)
     return RequestedVerdicts(verdicts, [_recommend_for_program(logbook, table) for table in incomplete])
+
+
+def _evaluate_untapped(logbook: Logbook, verdicts: list[Verdict]) -> list[Verdict]:
+    """Evaluate verdicts by test cuts if the machine has no tap test; else return them unchanged."""
+    if not is_untapped(logbook):
+        return verdicts
+    since = logbook.files.baseline
+    return [evaluate_by_sound(verdict, logbook.machine, logbook.cuts, since) for verdict in verdicts]
 
 
 def propose_requested_pitch(logbook: Logbook, cut: Mapping[str, Any]) -> PitchProposal:

@@ -63,6 +63,7 @@ class FolderContents:
 
     def with_tap(self, entry: TapEntry) -> Self:
         """Return the contents with a newly committed tap test."""
+        entry = entry.with_mass_checks(self.mass_checks)
         is_newest = not self.taps or self.taps[-1].created <= entry.created
         taps = (*self.taps, entry) if is_newest else _sort_by_time([*self.taps, entry])
         return replace(self, taps=taps, line_count=self.line_count + 1)
@@ -104,8 +105,8 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     acknowledged = tuple(msgspec.convert(line, Acknowledgement) for line in lines if line["kind"] == "ack")
     scatters = tuple(msgspec.convert(line, FleetScatter) for line in lines if line["kind"] == "scatter")
     cuts, events = journal_entries.read_committed_cuts(reading), journal_entries.read_events(lines)
-    tests = tuple(taps), _sort_by_time(lost), tuple(remarks)
     checks = journal_entries.read_mass_checks(lines)
+    tests = tuple(tap.with_mass_checks(checks) for tap in taps), _sort_by_time(lost), tuple(remarks)
     return FolderContents(*tests, events, len(reading.lines), cuts, acknowledged, scatters, checks)
 
 

@@ -20,6 +20,8 @@ from modal import Mode
 
 ACCEPTED_CODE = "accepted"
 """Code of the remark on an accepted question."""
+TOOL_MISMATCH_CODE = "tool-mismatch"
+"""Code of the remark on a tool whose question a check with a known mass has answered."""
 MAX_RESUME_AGE = timedelta(hours=12)
 """Age up to which an interrupted test may be resumed although others were taken since."""
 
@@ -93,6 +95,26 @@ SAME_DIRECTION = RecordingQuestion(
     "were hammer and sensor turned?",
 )
 """Limit: likelihood of one direction over that of two (`series_questions`); chosen."""
+MODE_JUMP = RecordingQuestion(
+    "mode-jump",
+    0.05,
+    "mode at {now:.0f} Hz is new, and the mode at {before:.0f} Hz of the last {count} test{s} is gone, although the "
+    "followed mode is the same: wrong machine?",
+)
+"""Limit: smallest relative rise of a mode that makes it another one, as of FREQUENCY_RISE; chosen."""
+EXCHANGED_DIRECTIONS = RecordingQuestion(
+    "exchanged-directions",
+    1000.0,
+    "frequency {now:.2f} Hz differs by {percent:+.2g} % from the other direction, and by {usual:+.2g} % on {days} "
+    "earlier days: were x and y exchanged?",
+)
+"""Limit: likelihood of exchanged over right names (`series_modes`); chosen, about one of 10 000 honest tests."""
+DAMPING_JUMP = RecordingQuestion(
+    "damping-jump",
+    sentence="damping zeta is {percent:.0f} % above the {count} earlier tests, and all modes decay faster by "
+    "{rise:.2g} 1/s, as with an exponential window of {time:.3g} ms: is a window on?",
+)
+"""Asked if the decay rates of all modes rose by one constant (`series_modes`)."""
 STIFFNESS_OFF_MODEL = RecordingQuestion(
     "stiffness-off-model",
     4.0,
@@ -122,9 +144,15 @@ EMULATED_DEVICE = RecordingQuestion(
 )
 """Asked of an emulated tap test in a machine with real ones."""
 SPINDLE_TURNING = RecordingQuestion(
-    "spindle-turning", sentence="steady vibration before the first hit: did the spindle turn, or was it mains hum?"
+    "spindle-turning", sentence="steady vibration before or after the hits: did the spindle turn, or was it mains hum?"
 )
-"""Asked of a live test before its first hit."""
+"""Asked of a live test before its first hit and after its last one."""
+RATE_NOT_VERIFIED = RecordingQuestion(
+    "rate-not-verified", sentence="the sample rate could not be verified to 0.2 %: was the computer busy?"
+)
+"""Asked of a live test whose stream showed neither a right nor a wrong rate within 20 s."""
+AT_COMMIT = (EMULATED_DEVICE, ONE_HIT, SPINDLE_TURNING, RATE_NOT_VERIFIED)
+"""Questions with a code in the journal line of the tap test."""
 MODE_QUESTIONS = (
     FREQUENCY_JUMP,
     NO_MODE_IN_BAND,
@@ -134,12 +162,15 @@ MODE_QUESTIONS = (
     STIFFNESS_OFF_MODEL,
     DIRECTION_STIFFNESS,
     SAME_DIRECTION,
+    MODE_JUMP,
+    EXCHANGED_DIRECTIONS,
+    DAMPING_JUMP,
     TOOL_COMPLIANCE,
     WRONG_QUANTITY,
     WRONG_UNIT,
 )
 RECORDING_QUESTIONS = tuple(question.code for question in MODE_QUESTIONS)
-RECORDING_QUESTIONS += (*clock.CLOCK_QUESTIONS, EMULATED_DEVICE.code, ONE_HIT.code, SPINDLE_TURNING.code)
+RECORDING_QUESTIONS += (*clock.CLOCK_QUESTIONS, *(question.code for question in AT_COMMIT))
 """Codes of all questions: until each is accepted the test is no reference, and no status is good."""
 
 
@@ -196,14 +227,23 @@ def check_band_coverage(frf: Frf, machine: Machine) -> Remark | None:
 def mark_accepted(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
     """Return the remarks on a test and its time, with accepted questions replaced by remarks on the answers."""
     remarks = (*remarks, *filter(None, (_question_at_commit(code, tap) for code in (*tap.asked, *tap.asked_live))))
+    remarks = [_answer_by_mass(remark) if tap.is_mass_checked else remark for remark in remarks]
     texts = {remark.code: str(remark) for remark in remarks}
     answers = [Remark(ACCEPTED_CODE, code, texts.get(code, "no longer asked")) for code in tap.accepted]
     return (*(remark for remark in remarks if remark.code not in tap.accepted), *answers)
 
 
+def _answer_by_mass(remark: Remark) -> Remark:
+    """Return the question about the compliance of a tool as the remark that a passed mass check leaves of it."""
+    if remark.code != TOOL_COMPLIANCE.code:
+        return remark
+    text = "static stiffness at the tip does not fit this tool, and a mass check shows that the sensitivities are right"
+    return Remark(TOOL_MISMATCH_CODE, remark.about, text, "Correct diameter, stick-out and material in [[tool]]")
+
+
 def _question_at_commit(code: str, tap: TapEntry) -> Remark | None:
     """Return the question of a code, None for one of a newer version."""
-    asked = {question.code: question.ask() for question in (EMULATED_DEVICE, ONE_HIT, SPINDLE_TURNING)}
+    asked = {question.code: question.ask() for question in AT_COMMIT}
     return clock.clock_question(code, tap.time) if code in clock.CLOCK_QUESTIONS else asked.get(code)
 
 

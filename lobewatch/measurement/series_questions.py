@@ -13,7 +13,9 @@ from acquisition import Remark
 from dsm import format_rounded
 from lobewatch.arrays import Floats
 from lobewatch.measurement.recording_questions import (
+    DAMPING_JUMP,
     DIRECTION_STIFFNESS,
+    EXCHANGED_DIRECTIONS,
     FREQUENCY_JUMP,
     FREQUENCY_RISE,
     NO_MODE_TO_FOLLOW,
@@ -24,7 +26,8 @@ from lobewatch.measurement.recording_questions import (
 from modal import Mode
 
 NEW_LEVEL_CODES = frozenset((FREQUENCY_JUMP.code, STIFFNESS_JUMP.code, NO_MODE_TO_FOLLOW.code))
-"""Codes of accepted questions with which a new level of a series begins: earlier tests are no reference for K and f."""
+NEW_LEVEL_CODES |= {EXCHANGED_DIRECTIONS.code, DAMPING_JUMP.code}
+"""Codes of accepted questions with which a new level of a series begins: earlier tests are no reference for it."""
 STIFFNESS_EXPONENT, STIFFNESS_EXPONENT_STD = 2.0, 1.0
 """Exponent b of K ~ f^b as bearings wear, and its standard deviation between machines.
 
@@ -57,7 +60,8 @@ ALIKE_FREQUENCY_CHANGE = 0.05
 DIRECTION_DIFFERENCE = 0.05
 """Typical relative difference of the frequencies of a mode in x and in y, before a series shows its own; chosen."""
 MAX_PAIRS, MIN_PAIRS_FOR_MEDIAN = 24, 3
-"""Largest number of days whose differences of x and y count, and smallest number for their median; chosen."""
+"""Largest number of days whose differences of x and y count, or of tests whose damping counts, and
+smallest number for their median; chosen."""
 N_PRIOR_PAIRS = 2
 """Number of days for which the mean square of the differences counts next to their scatter; chosen."""
 MAX_COMMON_DIFFERENCE, N_STD_COMMON = 0.0005, 5.0
@@ -82,6 +86,8 @@ class EarlierTest(NamedTuple):
     """Stiffness K (N/m); NaN without force."""
     is_new_level: bool = False
     """True if a new level begins with it, because a person accepted a jump."""
+    modes: tuple[tuple[float, float, float, float], ...] = ()
+    """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of all its modes."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +152,7 @@ def _check_rise(now: Mode, reference: SeriesReference) -> Remark | None:
     recent = np.array([test.frequency for test in reference.level[-N_RECENT_TESTS:]])
     if not recent.size:
         return None
-    std = _robust_std([[test.frequency for test in level] for level in reference.levels], FREQUENCY_STD)
+    std = estimate_scatter([[test.frequency for test in level] for level in reference.levels], FREQUENCY_STD)
     limit = max(math.log1p(FREQUENCY_RISE.limit), N_STD_ASKED * std * math.sqrt(1 + math.pi / 2 / recent.size))
     before = float(np.median(recent))
     if math.log(now.frequency / before) <= limit:
@@ -231,7 +237,7 @@ def _log_masses(tests: Sequence[EarlierTest]) -> Floats:
 def _stiffness_std(reference: SeriesReference) -> float:
     """Return the relative standard deviation of K of a series."""
     masses = [_log_masses(level) for level in reference.levels]
-    std = _robust_std([np.exp(mass) for mass in masses], STIFFNESS_STD)
+    std = estimate_scatter([np.exp(mass) for mass in masses], STIFFNESS_STD)
     is_young = sum(max(mass.size - 1, 0) for mass in masses) < N_YOUNG_CHANGES
     return min(std, MAX_YOUNG_STD) if is_young else std
 
@@ -241,10 +247,15 @@ def _median_variance(count: int) -> float:
     return math.pi / (2 * count + math.pi - 2)
 
 
-def _robust_std(series: Sequence[Sequence[float] | Floats], prior: float) -> float:
+def estimate_scatter(series: Sequence[Sequence[float] | Floats], prior: float) -> float:
     """Return the relative standard deviation of values about slow trends, from the median of successive changes.
 
-    prior: relative standard deviation that counts as STIFFNESS_STD_TESTS changes.
+    Parameters
+    ----------
+    series
+        Values of each level, in order of time.
+    prior
+        Relative standard deviation that counts as STIFFNESS_STD_TESTS changes.
     """
     changes = np.concatenate([np.abs(np.diff(np.log(values))) for values in series])
     if not changes.size:
@@ -327,7 +338,8 @@ def expect_direction_difference(reference: SeriesReference) -> tuple[float, floa
     reference
         Earlier tests of the series.
     """
-    changes = np.array([*_day_changes(reference)])
+    pairs = iterate_day_pairs(reference.own, reference.across)
+    changes = np.array([math.log(own.frequency / other.frequency) for own, other in pairs])
     if not changes.size:
         return 0.0, DIRECTION_DIFFERENCE
     centre = float(np.median(changes)) if changes.size >= MIN_PAIRS_FOR_MEDIAN else 0.0
@@ -336,10 +348,20 @@ def expect_direction_difference(reference: SeriesReference) -> tuple[float, floa
     return centre, math.sqrt(square / (N_PRIOR_PAIRS + changes.size))
 
 
-def _day_changes(reference: SeriesReference) -> Iterator[float]:
-    """Yield ln of the frequency over that of the other direction of the same day."""
-    across = reference.across[-2 * MAX_PAIRS :]
-    for test in reference.own[-MAX_PAIRS:]:
+def iterate_day_pairs(
+    own: Sequence[EarlierTest], across: Sequence[EarlierTest]
+) -> Iterator[tuple[EarlierTest, EarlierTest]]:
+    """Yield the newest tests of one direction, each with that of the other direction of the same day.
+
+    Parameters
+    ----------
+    own
+        Tests of one direction, oldest first.
+    across
+        Tests of the other direction, oldest first.
+    """
+    across = across[-2 * MAX_PAIRS :]
+    for test in own[-MAX_PAIRS:]:
         near = min(across, key=lambda other: abs(other.time - test.time), default=None)
         if near is not None and abs(near.time - test.time) <= MAX_DAY:
-            yield math.log(test.frequency / near.frequency)
+            yield test, near

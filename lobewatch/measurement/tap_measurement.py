@@ -25,7 +25,8 @@ from lobewatch.measurement.hit_remarks import (
     select_uncovered_changes,
 )
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
-from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference, check_same_direction, check_series
+from lobewatch.measurement.series_modes import find_series_questions
+from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference
 from lobewatch.measurement.tool_compliance import check_tool_compliance
 from lobewatch.measurement.touch_remarks import touch_remarks
 from lobewatch.step_times import time_step
@@ -190,7 +191,8 @@ def interpret_fit(
         trusted = modal.select_credible_modes(_select_in_band(modes, machine))
         remarks += trusted.remarks
         followed = _follow_mode(trusted, modes, machine, remarks, last)
-        remarks += _find_series_questions(followed, trusted.modes, reference, remarks)
+        if followed is not None and not any(remark.code in LOST_MODE_CODES for remark in remarks):
+            remarks += find_series_questions(followed, trusted.modes, reference)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _transfer_to_tip(trusted, followed, calibration, machine, remarks)
         is_at_tip = machine.tap.position_mm == 0
@@ -246,16 +248,6 @@ def _follow_mode(
     cure = "For a rebuilt spindle, set [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode
-
-
-def _find_series_questions(
-    followed: Mode | None, modes: Sequence[Mode], reference: SeriesReference, remarks: Sequence[Remark]
-) -> list[Remark]:
-    """Return the questions from the numbers of the series; none if the mode of the series was lost."""
-    if followed is None or any(remark.code in LOST_MODE_CODES for remark in remarks):
-        return []
-    same = check_same_direction(followed, modes, reference)
-    return [*check_series(followed, reference), *filter(None, [same])]
 
 
 def _calibrate(

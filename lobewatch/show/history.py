@@ -97,7 +97,7 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
     """Return a remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
-    text = "no tap test of this tool yet, so the test cut does not count"
+    text = "no tap test of this tool yet, so only its test cuts count"
     return [Remark("tool-not-tapped", cut.tool, text, f"Tap the tool with lobewatch tap {logbook.folder.path}")]
 
 

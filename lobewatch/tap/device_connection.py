@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -142,6 +143,11 @@ class DeviceConnection:
         """Return the next blocks of this duration (s) as one record."""
         codes, lost = collect_codes(blocks, duration * self.device.sample_rate)
         return self.inputs.make_hit(codes[list(self.inputs.rows)], self.device.sample_rate, lost_scans=lost)
+
+    def read_on(self, blocks: Iterator[Block], duration: float) -> Hit | None:
+        """Return the next blocks of this duration (s) as one record, None if the samples have ended."""
+        first = next(blocks, None)
+        return None if first is None else self.record(chain([first], blocks), duration)
 
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks that the device sends from now on."""

@@ -14,6 +14,7 @@ from acquisition.errors import join_sentences
 from lobewatch.machine.daq_rates import check_device_rate, find_stored_rate, has_clock
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.measurement.hit_remarks import find_hit_remarks
+from lobewatch.measurement.recording_questions import RATE_NOT_VERIFIED
 from lobewatch.tap.device_connection import (
     LEVEL_WINDOW,
     DeviceConnection,
@@ -48,6 +49,14 @@ class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
 
 SELF_CHECK_DURATION = 1.0
 """Length of the record of the self-check (s)."""
+REST_AFTER_DURATION = 2.0
+"""Length of the record at rest after the last hit (s), chosen: it shows lines of 0.7 times the rms."""
+MAX_RATE_TIME = 20.0
+"""Length of the stream up to which it is read on after the last hit to verify its rate (s), chosen.
+
+A buffer of 5 ms is then 0.025 % of it."""
+RATE_STEP = 0.5
+"""Time after which the rate is computed again (s)."""
 RECONNECT_INTERVAL = 0.5
 """Time between two attempts to find the device again (s)."""
 
@@ -95,7 +104,9 @@ class TapPhases:
                 with closing(connection.device):
                     self._check(connection)
                     self._try(connection)
-                    self._take_hits(connection)
+                    while self._tap.missing:
+                        self._take_hits(connection)
+                        self._check_after(connection)
                 return self._check_stream_rate(connection)
             except DeviceError as error:
                 self._check_stream_rate(connection)
@@ -156,6 +167,23 @@ class TapPhases:
         self.remarks = rate_remarks(stream)
         others = [check for check in self._publisher.state.checks if check.name != "sample rate"]
         self._publisher.show(checks=(*others, check_stream_rate(stream)))
+
+    def _check_after(self, connection: DeviceConnection) -> None:
+        """Read on until the sample rate is verified, and record the signals at rest again.
+
+        A spindle that began to turn slowly during the test is seen only there.
+        """
+        blocks, stream = self._blocks(connection), connection.rate
+        while stream is not None and stream.seconds < MAX_RATE_TIME and not stream.is_verified:
+            if not connection.read_on(blocks, RATE_STEP):
+                break
+        if stream is not None and stream.seconds >= MAX_RATE_TIME and not stream.is_verified:
+            self.questions.leave_open(RATE_NOT_VERIFIED.code)
+        if self._tap.baseline is None or not self._guided or connection.device.identity.is_recording:
+            return
+        record = connection.read_on(blocks, REST_AFTER_DURATION)
+        if record is not None:
+            self.questions.check_after(find_quiet_part(record))
 
     def _check(self, connection: DeviceConnection) -> None:
         """Run the self-check, once per session."""

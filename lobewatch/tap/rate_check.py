@@ -4,6 +4,7 @@ from acquisition import DataError, Device, Remark
 from acquisition.errors import join_sentences
 from acquisition.sensors.stream_rate import RECENT_TIME, StreamRate
 from lobewatch.machine.daq_rates import replace_stored_rate
+from lobewatch.measurement.recording_questions import RATE_NOT_VERIFIED
 from lobewatch.tap.kept_rate import agrees_with, write_rate
 from lobewatch.tap.state import Check
 from lobewatch.tap.tap_in_progress import TapInProgress
@@ -34,7 +35,7 @@ def rate_remarks(stream: StreamRate) -> tuple[Remark, ...]:
     if stream.is_verified:
         return ()
     text = f"the sample rate of {stream.sample_rate:g} Hz could not be verified{_format_rate(stream)}"
-    return (Remark("rate-not-verified", "", text, "Close other programs, and take more hits in the next test"),)
+    return (Remark(RATE_NOT_VERIFIED.code, "", text, "Close other programs, and take more hits in the next test"),)
 
 
 def check_stream_rate(stream: StreamRate) -> Check:

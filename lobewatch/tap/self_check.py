@@ -53,7 +53,7 @@ def find_quiet_part(record: Hit) -> Hit:
     if not starts.size or np.max(ends - starts) * QUIET_PIECE_TIME < MIN_QUIET_TIME:
         return record
     best = int(np.argmax(ends - starts))
-    return _slice_record(record, int(starts[best]) * size, int(ends[best]) * size)
+    return slice_record(record, int(starts[best]) * size, int(ends[best]) * size)
 
 
 def run_self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
@@ -167,11 +167,12 @@ def _check_disk(free: int) -> Check:
     return Check("disk", enough, join_sentences(f"{free / 1e9:.1f} GB free", "" if enough else "Make room soon"))
 
 
-def _slice_record(record: Hit, start: int, end: int) -> Hit:
+def slice_record(record: Hit, start: int, end: int) -> Hit:
+    """Return the samples of a record from one number to another."""
     if record.codes is None or record.channels is None:
         return Hit(record.force[start:end], record.acceleration[start:end], record.sample_rate)
     part = record.codes[:, start:end]
-    beside = None if record.cross_hit is None else _slice_record(record.cross_hit, start, end)
+    beside = None if record.cross_hit is None else slice_record(record.cross_hit, start, end)
     return Hit.from_codes(part, record.channels, record.sample_rate, lost_scans=record.lost_scans, cross_hit=beside)
 
 

@@ -6,13 +6,17 @@ from collections.abc import Callable, Sequence
 from acquisition import DataError, Hit
 from acquisition.errors import join_sentences
 from lobewatch.measurement.recording_questions import SPINDLE_TURNING
+from lobewatch.tap.self_check import slice_record
 from lobewatch.tap.state import Choice, StatePublisher, TapState, TapStep
-from lobewatch.tap.steady_line import find_steady_line
+from lobewatch.tap.steady_line import find_steady_line, measure_line
 
 START_CHOICE = Choice("start", "Yes, start")
 """Answer that begins a test."""
 STILL_CHOICE = Choice("still", "It stands still, continue")
 """Answer to a steady vibration."""
+
+MIN_STEADY_RATIO = 0.8
+"""Smallest rms of a steady line in the second half of a record over that in the first; chosen."""
 
 
 class StartQuestions:
@@ -26,6 +30,8 @@ class StartQuestions:
         """Codes of accepted questions."""
         self.asked: list[str] = []
         """Codes of questions that the measurement raised."""
+        self.left_open: list[str] = []
+        """Codes of questions that the signals after the last hit raised. The finished test asks them."""
         self.is_confirmed = not asks
         """True if the person has confirmed tool and spindle in this session, or nobody can."""
 
@@ -64,6 +70,24 @@ class StartQuestions:
         self.asked = []
         self._publisher.show(choices=())
         return baseline
+
+    def check_after(self, record: Hit) -> None:
+        """Leave the question about the spindle open if a record at rest after the last hit has a steady line.
+
+        The response to the last hit may still decay, so the line must be as strong in the second half of the record.
+        """
+        line, middle = find_steady_line(record), record.acceleration.size // 2
+        if line is None or not line.is_asked:
+            return
+        halves = slice_record(record, 0, middle), slice_record(record, middle, record.acceleration.size)
+        first, second = (measure_line(half, line.frequency) for half in halves)
+        if second >= MIN_STEADY_RATIO * first:
+            self.leave_open(SPINDLE_TURNING.code)
+
+    def leave_open(self, code: str) -> None:
+        """Leave a question open that is not accepted: the finished test asks it."""
+        if code not in (*self.accepted, *self.left_open):
+            self.left_open.append(code)
 
     def _show(self, reason: str, choice: Choice) -> None:
         """Show a question. An answer to the one before does not count."""

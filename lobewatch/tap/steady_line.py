@@ -18,7 +18,14 @@ MIN_LINE_POWER_SHARE = 0.5
 MIN_HUM_CODES = 3.0
 """RMS of such hum (converter steps) below which it is ignored, chosen."""
 MIN_LINE_CODES = 1.0
-"""RMS of a line (converter steps) below which it is ignored: a signal that alternates between two steps has 0.5."""
+"""RMS of a line (converter steps) below which it is ignored: a signal that alternates between two steps has 0.5.
+
+Noise of MIN_DITHER_CODES spreads the signal over more steps, so that averages show smaller lines, too."""
+MIN_DITHER_CODES = 0.55
+"""RMS of the rest (converter steps) from which a converter is linear on average: two alternating steps have 0.5.
+
+A signal that stays within one step is a constant. No average shows a vibration there (Wannamaker et al. 2000, A theory
+of nonsubtractive dither, IEEE Trans. Signal Process. 48)."""
 DRIFT_LINES = 5
 """Number of lowest lines of a record, which a drift fills, chosen."""
 MIN_LINE_VELOCITY = 0.28e-3
@@ -79,15 +86,23 @@ def find_steady_line(record: Hit) -> SteadyLine | None:
     frequency, power = compute_power_spectrum(record.acceleration, record.sample_rate)
     prominent = power > MIN_LINE_PROMINENCE * _find_local_medians(power)
     prominent[:DRIFT_LINES] = False
-    least = MIN_LINE_CODES * abs(record.channels[-1].scale) if record.channels else 0.0
+    step = abs(record.channels[-1].scale) if record.channels else 0.0
     lines = [mains for mains in MAINS if is_electrical_hum(frequency, power, mains)]
     hum = _select_lines(frequency, *(line for mains in lines for line in list_harmonics(mains)))
     for is_hum, usable in ((False, prominent & ~hum), (True, prominent & hum)):
         line = _find_fastest_line(frequency, power, usable)
         rms = 0.0 if line is None else float(np.sqrt(sum_lines(frequency, power, *list_harmonics(line))))
-        if line is not None and rms > least:
-            return SteadyLine(line, rms, rms**2 / float(np.sum(power)), is_hum)
+        total = float(np.sum(power))
+        is_dithered = total - rms**2 >= (MIN_DITHER_CODES * step) ** 2
+        if line is not None and (is_dithered or rms > MIN_LINE_CODES * step):
+            return SteadyLine(line, rms, rms**2 / total, is_hum)
     return None
+
+
+def measure_line(record: Hit, frequency: float) -> float:
+    """Return the rms of the response at a frequency (Hz) and its harmonics (m/s^2)."""
+    lines = compute_power_spectrum(record.acceleration, record.sample_rate)
+    return float(np.sqrt(sum_lines(*lines, *list_harmonics(frequency))))
 
 
 def is_electrical_hum(frequency: Floats, power: Floats, mains: float) -> bool:

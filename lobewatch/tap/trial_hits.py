@@ -32,7 +32,8 @@ RANGE_HEADROOM = 2
 MAX_TRIAL_HITS = 3
 """Largest number of trial hits."""
 CHANNEL_UNITS = {"force": "N", "acceleration": "m/s^2"}
-_RANGE_FLAGS = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_OVERLOAD_FLAGS = HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_RANGE_FLAGS = HitFlags.TOO_SOFT | _OVERLOAD_FLAGS
 _USABLE_FLAGS = HitFlags.NOT_DECAYED | _RANGE_FLAGS
 """Flags that a trial hit may have: trial hits are there to find them."""
 
@@ -51,6 +52,8 @@ class TrialHits:
         """Begin without hits. baseline: a record at rest."""
         self._setup, self._baseline = setup, baseline
         self._hits: list[Hit] = []
+        self._in_range: list[Hit] = []
+        """Those within both input ranges. Only they show how hard the next ones will be."""
         self._offset = float(np.mean(baseline.acceleration)) if setup.quantity == "acceleration" else 0.0
         """Value at rest from which the trigger level counts. The acceleration may include gravity."""
         self._record = setup.record_s or MIN_RECORD_TIME
@@ -88,12 +91,14 @@ class TrialHits:
 
     def add(self, hit: Hit) -> HitFlags:
         """Add a trial hit and return why it is unusable, falsy if it is usable."""
-        flags = check_hit(hit) & ~_USABLE_FLAGS
+        found = check_hit(hit)
+        flags = found & ~_USABLE_FLAGS
         if flags:
             return flags
         needed = self._setup.pre_trigger_s + RECORD_TIME_CONSTANTS * estimate_decay_time(hit)
         steps = math.ceil(min(needed, MAX_RECORD_TIME) / RECORD_TIME_STEP - 1e-9)
         self._hits.append(hit)
+        self._in_range += [] if found & _OVERLOAD_FLAGS else [hit]
         if self._setup.record_s is None:
             self._record = max(self._record, MIN_RECORD_TIME, RECORD_TIME_STEP * steps)
         return flags
@@ -102,10 +107,10 @@ class TrialHits:
         if self._setup.trigger_n is not None:
             return self._setup.trigger_n
         noise = TRIGGER_NOISE_RATIO * float(np.std(self._baseline.signals[0]))
-        if not self._hits:
+        if not self._in_range:
             channels = self._baseline.channels
             return max(noise, FIRST_TRIGGER_RANGE_SHARE * (_get_full_scale(channels[0]) if channels else math.inf))
-        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset) for hit in self._hits]
+        signals = [hit.force if hit.has_force else np.abs(hit.acceleration - self._offset) for hit in self._in_range]
         peaks = [float(np.max(signal)) for signal in signals]
         level = min(max(TRIGGER_PEAK_SHARE * float(np.median(peaks)), noise), MAX_TRIGGER_PEAK_SHARE * min(peaks))
         return float(f"{level:.2g}")

@@ -51,6 +51,11 @@ SPEED_DROP = Cause(
 QUESTION = Cause("question", "a tap test has an open question ({questions})", "Answer the question, or tap again")
 COVERAGE = Cause("coverage", "the modes do not cover the measurement ({uncovered})", "{uncovered_remedy}")
 UNCHECKED = Cause("unchecked", "{unchecked}", "{unchecked_remedy}")
+NO_TAP_TEST = Cause(
+    "no-tap-test",
+    "no tap test yet, and no test cut at this speed decides",
+    "Tap tool {tool}, or make test cuts for {program} with cut_recording.acquire_cut",
+)
 WORKPIECE = Cause(
     "workpiece",
     "the thin wall deflects and its modes are unknown",

@@ -20,7 +20,7 @@ from lobewatch.verdicts.monte_carlo import MonteCarloResult, estimate_chatter_ri
 from lobewatch.verdicts.program_case import NO_TEST_CUTS, ProgramCase, SpindleAtSpeed
 from lobewatch.verdicts.program_samples import N_PROGRAM_SAMPLES, ProgramSamples
 from lobewatch.verdicts.speed_pockets import speed_pocket_remarks
-from lobewatch.verdicts.uncertainty_causes import COVERAGE, QUESTION, UNCHECKED, UNTAPPED, WORKPIECE
+from lobewatch.verdicts.uncertainty_causes import COVERAGE, NO_TAP_TEST, QUESTION, UNCHECKED, UNTAPPED, WORKPIECE
 
 NOT_CHECKED_CODE = "not-checked"
 """Code of the remark that says why a program could not be checked."""
@@ -112,7 +112,7 @@ class Verdict:
     @property
     def is_stable(self) -> bool | None:
         """True if the program is stable in the median estimate; None if unknown."""
-        return self.stored.is_stable
+        return None if self.decisive_cause == NO_TAP_TEST.name else self.stored.is_stable
 
     @property
     def is_measured(self) -> bool:

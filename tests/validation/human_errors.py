@@ -1,4 +1,4 @@
-"""Human errors on random machines, from the bytes of an emulated board to what `check` and `status` say."""
+"""Human errors on random machines, each made through the bytes of an emulated board."""
 
 from __future__ import annotations
 
@@ -7,84 +7,30 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from emulated_workshop import (
+import scipy
+from emulated_board import (
+    RATE,
+    RIGHT,
     Array,
     Disturbance,
-    Said,
-    Workshop,
     Wrong,
-    ask,
+    peak_response,
     random_truth,
     resting_rms,
     scale,
     spread,
 )
+from emulated_workshop import Workshop
 
 from acquisition import Structure
 from lobewatch.fleet.fleet import Fleet, find_machines
-from lobewatch.logbook import Logbook
-from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS
 
-N_EARLIER = 6
-"""Months with honest tests before an error."""
 Codes = frozenset[str]
 Rng = np.random.Generator
-
-
-class Seen(NamedTuple):
-    """Outcome of one error on one machine."""
-
-    tap: Codes
-    """Codes of the tap tests with the error, or why they were refused."""
-    said: Said
-    """Outputs of `check` and `status` after it."""
-
-    @property
-    def codes(self) -> Codes:
-        """All codes."""
-        return self.tap | self.said.check | self.said.status
-
-    @property
-    def is_false(self) -> bool:
-        """True if a program that chatters is called stable."""
-        return any(share > 1 for share in self.said.stable)
-
-
-@dataclass(frozen=True)
-class HumanError:
-    """Kind of human error."""
-
-    make: Callable[[Workshop], Codes]
-    """Function that makes it on a machine, and returns the codes of its tap tests."""
-    right: Codes
-    """Codes that name the right cause."""
-    earlier: int = N_EARLIER
-    """Months with honest tests before it, 0 for an error in the first tests."""
-    asks_programs: bool = False
-    """True if only the verdict on a program can show it."""
-
-
-@dataclass
-class Count:
-    """Outcome of one kind on some machines."""
-
-    machines: int = 0
-    silent: int = 0
-    """Machines without a code that names the right cause."""
-    false_stable: int = 0
-    """Machines with `stable` for a cut that chatters."""
-    silent_and_false: int = 0
-    """Machines with both."""
-    said: Counter[str] = field(default_factory=Counter)
-    """New codes, compared with the machine before the error."""
 
 
 def either(rng: Rng, ratio: float) -> float:
@@ -171,7 +117,7 @@ def spindle_turns(shop: Workshop) -> Codes:
 def spindle_starts(shop: Workshop) -> Codes:
     """Tap a spindle that begins to turn after the first hits."""
     rpm, rms = spread(shop.rng, 600, 24000), resting_rms(shop) * spread(shop.rng, 5, 40)
-    return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=2.5)))
+    return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=2.5), guided=True))
 
 
 def mains_hum(shop: Workshop) -> Codes:
@@ -315,6 +261,106 @@ def exponential_window(shop: Workshop) -> Codes:
     return tap_structures(shop, *windowed)
 
 
+def spindle_starts_slowly(shop: Workshop) -> Codes:
+    """Tap a spindle that begins to turn at 600 to 1500 rpm after the first hits."""
+    rpm, rms = spread(shop.rng, 600, 1500), resting_rms(shop) * spread(shop.rng, 5, 40)
+    return shop.tap_both(Wrong(disturb=tone(shop, rpm / 60, rms, begin=2.5), guided=True))
+
+
+def rate_off_slightly(shop: Workshop) -> Codes:
+    """Sample at another rate than the one once measured, by 0.3 to 0.5 %."""
+    shop.know_rate()
+    found = shop.tap("x", Wrong(rate_ratio=1 + spread(shop.rng, 0.003, 0.005) * shop.rng.choice([-1, 1])))
+    shop.month += 1
+    return found.codes
+
+
+def unit_thousand(shop: Workshop) -> Codes:
+    """Read mm/s^2 as m/s^2, or mN as N, from one test to the next."""
+    ratio = either(shop.rng, 1e3)
+    return shop.tap_both(Wrong(gains=(ratio, 1.0) if shop.rng.random() < 0.5 else (1.0, ratio)))
+
+
+def acceleration_in_g(shop: Workshop) -> Codes:
+    """Read g as m/s^2 from one test to the next."""
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, 9.80665))))
+
+
+def hammer_amplifier_switched(shop: Workshop) -> Codes:
+    """Turn the gain of the hammer by a factor of 10."""
+    return shop.tap_both(Wrong(gains=(either(shop.rng, 10.0), 1.0)))
+
+
+def other_sheet(shop: Workshop) -> Codes:
+    """Enter the calibration sheet of another sensor of the type in the first tests: 5 to 25 % off."""
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, spread(shop.rng, 1.05, 1.25)))))
+
+
+def other_sheet_later(shop: Workshop) -> Codes:
+    """Exchange the accelerometer for one of 15 to 40 % more or less, and keep the old sheet."""
+    return shop.tap_both(Wrong(gains=(1.0, either(shop.rng, spread(shop.rng, 1.15, 1.4)))))
+
+
+def gain_in_y_only(shop: Workshop) -> Codes:
+    """Turn a gain by 1.4 to 5 between x and y."""
+    found = shop.tap("x").codes | shop.tap("y", Wrong(gains=(1.0, either(shop.rng, spread(shop.rng, 1.4, 5))))).codes
+    shop.month += 1
+    return found
+
+
+def y_of_another_tool(shop: Workshop) -> Codes:
+    """Change the tool between x and y."""
+    return tap_structures(shop, shop.truth.x, random_truth(shop.rng).x)
+
+
+def tools_mixed_up(shop: Workshop) -> Codes:
+    """Follow two tools for two months, then exchange their names."""
+    other = random_truth(shop.rng)
+    for _ in range(2):
+        shop.tap("x", Wrong(structure=other.x, tool="other"))
+        shop.tap("y", Wrong(structure=other.y, tool="other"))
+        shop.tap_both()
+    found = tap_structures(shop, other.x, other.y)
+    return found | shop.tap("x", Wrong(structure=shop.truth.x, tool="other")).codes
+
+
+def microphonic_cable(shop: Workshop) -> Codes:
+    """Let the cable of the accelerometer swing: every hit adds a slow swing of 2 to 20 % of the response."""
+    root = np.exp((-3.0 + 2j * np.pi * shop.rng.uniform(5, 30)) / RATE)
+    size = spread(shop.rng, 0.02, 0.2) * peak_response(shop.truth.x) / (0.5 * RIGHT.width * RATE)
+    state = np.zeros(1, complex)
+
+    def disturb(signals: Array, _: Array) -> Array:
+        nonlocal state
+        moved, state = scipy.signal.lfilter([1.0], [1.0, -root], np.maximum(signals[0], 0.0), zi=state)
+        return np.stack([signals[0], signals[1] + size * moved.real])
+
+    return shop.tap_both(Wrong(disturb=disturb), only=["x"])
+
+
+def sensor_on_wax(shop: Workshop) -> Codes:
+    """Mount the accelerometer on something soft: a resonance at 1 to 3 times the mode of the tool."""
+    contact = float(shop.rng.uniform(1.0, 3.0) * shop.truth.x.frequency[-1])
+    soft = [with_mounting(shop.truth.of(name), contact) for name in "xy"]
+    return tap_structures(shop, *soft)
+
+
+def with_mounting(structure: Structure, contact: float) -> Structure:
+    """Return a structure with its modes amplified by a mounting resonance (Hz), which is added as a weak mode."""
+    gain = 1 / np.abs(1 - (structure.frequency / contact) ** 2 + 0.1j * structure.frequency / contact)
+    return replace(structure, stiffness=structure.stiffness / gain)
+
+
+def harder_tip(shop: Workshop) -> Codes:
+    """Change to a harder or softer tip that still excites the modes: no error, but another band."""
+    return shop.tap_both(Wrong(width=float(shop.rng.choice([0.35e-3, 1.1e-3]))))
+
+
+def clock_a_year_late(shop: Workshop) -> Codes:
+    """Let the clock of the computer be one year late."""
+    return shop.tap_both(Wrong(created=shop.time - timedelta(days=365), guided=True), only=["x"])
+
+
 def force_unit_wrong(shop: Workshop) -> Codes:
     """Enter Kt and Kr in kN/mm^2, kgf/mm^2, MPa times ten, or psi."""
     shop.ratio = float(shop.rng.choice([1e-3, 1 / 9.80665, 0.1, 145.0]))
@@ -332,114 +378,3 @@ def speeds_with_thousands(shop: Workshop) -> Codes:
         return frozenset({"refused"})
     speed = tomllib.loads((path / "machine.toml").read_text("utf-8"))["speed"]
     return frozenset({"right"} if (speed["low_rpm"], speed["high_rpm"]) == (low, high) else ())
-
-
-def codes(*names: str) -> Codes:
-    return frozenset(names)
-
-
-CHAIN = codes("chain-not-checked", "tool-compliance", "stiffness-off-model", "wrong-unit", "direction-stiffness")
-TOOL = codes("stiffness-jump", "frequency-jump", "no-mode-to-follow", "tool-compliance", "no-mode-in-band")
-TURNING = codes("refused:spindle-turning", "hit:steady-vibration")
-SETTING = codes("setting-not-plausible", "settings-contradict", "not-checked")
-NO_RESPONSE = codes("hit:no-response", "check:acceleration sensor", "hit:missing-response")
-LOOSE = codes("hit:inconsistent", "stiffness-jump", "tool-compliance")
-ERRORS = {
-    "gain changed at once": HumanError(gain_at_once, codes("stiffness-jump")),
-    "amplifier switched by ten": HumanError(amplifier_switched, codes("stiffness-jump")),
-    "gain changed in two steps": HumanError(gain_in_two_steps, codes("stiffness-jump")),
-    "first tests, accelerometer 2.5 to 4 times wrong": HumanError(accelerometer_entered_wrong, CHAIN, 0),
-    "first tests, hammer 2.5 to 4 times wrong": HumanError(hammer_entered_wrong, CHAIN, 0),
-    "first tests, mV/g entered as mV/(m/s^2)": HumanError(accelerometer_unit_wrong, CHAIN, 0),
-    "first tests, mV/lbf entered as mV/N": HumanError(hammer_unit_wrong, CHAIN, 0),
-    "mass check with a wrong mass": HumanError(wrong_mass, codes("chain-not-checked")),
-    "channels swapped": HumanError(swap_channels, codes("hit:swapped-channels")),
-    "sample rate off by 0.3 to 8 %": HumanError(rate_off, codes("refused:rate", "rate-not-verified")),
-    "spindle turns from the start": HumanError(spindle_turns, TURNING),
-    "spindle turns after the first hits": HumanError(spindle_starts, TURNING),
-    "strong mains hum": HumanError(mains_hum, TURNING | {"check:hum"}),
-    "cable of the accelerometer broken": HumanError(accelerometer_cable, NO_RESPONSE | TURNING),
-    "cable of the hammer broken": HumanError(hammer_cable, codes("check:force sensor", "screen:unfelt-hit")),
-    "accelerometer comes loose": HumanError(
-        sensor_falls, NO_RESPONSE | {"hit:inconsistent", "stiffness-jump", "tool-compliance"}
-    ),
-    "sensor left in x for y": HumanError(sensor_left, codes("same-direction")),
-    "names x and y exchanged": HumanError(directions_exchanged, TOOL),
-    "shorter tool under the old name": HumanError(shorter_tool, TOOL),
-    "longer tool under the old name": HumanError(longer_tool, TOOL),
-    "another tool under the old name": HumanError(wrong_tool_name, TOOL),
-    "same tool in another machine": HumanError(wrong_folder, TOOL),
-    "newest test 7 to 16 months old": HumanError(old_test, codes("tap-old", "tap-too-old", "overdue")),
-    "folder copied": HumanError(copied_folder, codes("folder-copied")),
-    "soft tip": HumanError(soft_tip, codes("other-band", "no-mode-in-band", "no-mode-to-follow", "modes-incomplete")),
-    "hits away from the tip": HumanError(other_point, codes("stiffness-jump", "tool-compliance")),
-    "accelerometer on the other side": HumanError(sensor_upside_down, codes("no-mode-in-band", "sign")),
-    "clock behind": HumanError(clock_behind, codes("clock-behind", "clock-before-release")),
-    "clock ahead in one test": HumanError(clock_ahead, codes("clock-behind", "clock-ahead")),
-    "exponential window not stated": HumanError(exponential_window, codes("damping-jump")),
-    "Kt and Kr in another unit": HumanError(force_unit_wrong, SETTING, asks_programs=True),
-    "speeds with separators of thousands": HumanError(speeds_with_thousands, codes("right", "refused"), 0),
-}
-"""Kinds of human errors."""
-
-
-def machines(
-    count: int, path: Path, earlier: int, stiffness_std: float = 0.03, *, first: int = 0
-) -> Iterator[Workshop]:
-    """Yield random machines with honest tests, from a number on.
-
-    Half of them know their tool. Half of those with tests have a mass check, so that a quarter has both.
-    """
-    for number, rng in list(enumerate(np.random.default_rng(52).spawn(first + count)))[first:]:
-        shop = Workshop(path / f"{earlier}-{number}" / "m", rng, stiffness_std, knows_tool=number % 4 < 2)
-        if earlier and number % 2:
-            shop.check_mass()
-        for _ in range(earlier):
-            shop.tap_both()
-        yield shop
-
-
-def commit(error: HumanError, shop: Workshop, path: Path, seed: int) -> Seen:
-    """Make an error on a copy of a machine, and ask a day after its last test."""
-    other = shop.copy(path / "m", seed)
-    found = error.make(other)
-    other.write("just")
-    return Seen(found, ask(other, other.time - timedelta(days=29)))
-
-
-def measure(kinds: dict[str, HumanError], count: int, path: Path) -> dict[str, Count]:
-    """Return the outcome of kinds of errors on random machines."""
-    counts = {name: Count() for name in kinds}
-    for earlier in {error.earlier for error in kinds.values()}:
-        for number, shop in enumerate(machines(count, path, earlier)):
-            before = commit(HumanError(Workshop.tap_both, codes()), shop, path / f"{earlier}-{number}-none", number)
-            for place, (name, error) in enumerate(kinds.items()):
-                if error.earlier == earlier:
-                    seen = commit(error, shop, path / f"{earlier}-{number}-{place}", 1000 * number + place)
-                    add(counts[name], error, seen, before)
-    return counts
-
-
-def add(count: Count, error: HumanError, seen: Seen, before: Seen) -> None:
-    """Count one outcome."""
-    is_silent = not seen.codes & error.right
-    count.machines += 1
-    count.silent += is_silent
-    count.false_stable += seen.is_false
-    count.silent_and_false += is_silent and seen.is_false
-    count.said.update(seen.codes - before.codes)
-
-
-def count_questions(count: int, stiffness_std: float, path: Path) -> list[int]:
-    """Return the number of questions in each honest series of 24 months in x and y, each answered."""
-    numbers = []
-    for shop in machines(count, path, 0, stiffness_std):
-        numbers.append(0)
-        for _ in range(24):
-            for direction in ("x", "y"):
-                tapped = shop.tap(direction)
-                asked = sorted(tapped.codes & set(RECORDING_QUESTIONS))
-                numbers[-1] += len(asked) + (not tapped.tap_id)
-                Logbook.open(shop.path).accept([tapped.tap_id], asked)
-            shop.month += 1
-    return numbers

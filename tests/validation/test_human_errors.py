@@ -8,16 +8,42 @@ from pathlib import Path
 
 import pytest
 from emulated_workshop import Workshop, ask
-from human_errors import ERRORS, HumanError, count_questions, machines, measure
+from human_error_study import ERRORS, HumanError, count_questions, machines, measure
 
 from lobewatch.machine.folder import MachineFolder
 
 FULL_MARKS = [pytest.mark.long, pytest.mark.timeout(14_400)]
-NOT_NAMED = {"names x and y exchanged", "same tool in another machine", "exponential window not stated"}
-"""Kinds that only some machines show (docs/studies/human-errors.md)."""
-
-OTHER_FACTORS = {"first tests, mV/lbf entered as mV/N", "gain changed at once"}
-"""Kinds that differ from others in a factor only: left out of the fast tests."""
+SOMETIMES_SILENT = {
+    "first tests, sheet of another sensor",
+    "sensor left in x for y",
+    "same tool in another machine",
+    "hits away from the tip",
+    "soft tip",
+    "accelerometer comes loose",
+    "spindle starts slowly after the first hits",
+    "spindle turns after the first hits",
+    "exponential window not stated",
+    "cable of the accelerometer swings",
+    "another hammer tip",
+}
+"""Kinds that not every machine shows (docs/studies/human-errors.md)."""
+NEEDS_MORE_TESTS = {"names x and y exchanged", "exponential window not stated"}
+"""Kinds that three earlier tests show at least."""
+OTHER_FACTORS = {
+    "first tests, mV/lbf entered as mV/N",
+    "gain changed at once",
+    "g for m/s^2",
+    "sensor of another sensitivity",
+}
+OTHER_FACTORS |= {"hammer amplifier switched by ten", "mm/s^2 or mN for m/s^2 or N", "sample rate off by 0.3 to 0.5 %"}
+OTHER_FACTORS |= {"gain changed between x and y", "tool changed between x and y", "names of two tools exchanged"}
+OTHER_FACTORS |= {"clock a year late", "first tests, sheet of another sensor", "accelerometer on a soft mounting"}
+OTHER_FACTORS |= {
+    "cable of the accelerometer swings",
+    "another hammer tip",
+    "spindle starts slowly after the first hits",
+}
+"""Kinds that resemble others: left out of the fast tests."""
 
 
 def say(what: str, *values: object) -> None:
@@ -45,7 +71,7 @@ def test_an_honest_test_asks_nothing(shop: Workshop, tmp_path: Path) -> None:
     assert not named & frozenset().union(*(error.right for error in ERRORS.values()))
 
 
-@pytest.mark.parametrize("kind", sorted(ERRORS.keys() - NOT_NAMED - OTHER_FACTORS))
+@pytest.mark.parametrize("kind", sorted(ERRORS.keys() - NEEDS_MORE_TESTS - OTHER_FACTORS))
 def test_an_error_is_named(kind: str, shop: Workshop, new_shop: Workshop, tmp_path: Path) -> None:
     error: HumanError = ERRORS[kind]
     other = (shop if error.earlier else new_shop).copy(tmp_path / "m", 2)
@@ -59,15 +85,16 @@ def test_an_error_is_named(kind: str, shop: Workshop, new_shop: Workshop, tmp_pa
 
 @pytest.mark.parametrize("kind", [pytest.param(kind, marks=FULL_MARKS) for kind in ERRORS])
 def test_on_many_machines_no_error_is_silent_and_stable(kind: str, tmp_path: Path) -> None:
-    (count,) = measure({kind: ERRORS[kind]}, 40, tmp_path).values()
-    say(kind, count)
-    assert count.false_stable <= (1 if kind in NOT_NAMED else 0)
-    assert kind in NOT_NAMED or count.silent <= 2
+    counts = [count for _, count in measure({kind: ERRORS[kind]}, 40, tmp_path)]
+    silent, false = sum(count.silent for count in counts), sum(count.false_stable for count in counts)
+    say(kind, silent, false, *(count.said for count in counts))
+    assert false <= (1 if kind in SOMETIMES_SILENT else 0)
+    assert kind in SOMETIMES_SILENT or silent <= 2
 
 
 @pytest.mark.parametrize("stiffness_std", [pytest.param(std, marks=FULL_MARKS) for std in (0.03, 0.06)])
 def test_honest_series_ask_at_most_once(stiffness_std: float, tmp_path: Path) -> None:
-    numbers = count_questions(40, stiffness_std, tmp_path)
+    numbers = [count_questions(shop) for shop in machines(40, tmp_path, 0, stiffness_std)]
     say(f"K scatter {stiffness_std}", numbers)
     assert sum(number <= 1 for number in numbers) >= 0.9 * len(numbers)
 

@@ -95,3 +95,16 @@ def find_deciding_check(chain: SensorChain, time: datetime, checks: Sequence[Mas
     later = [check for check in same if check.date >= time]
     repeated = [check for check in later if check.date - later[0].date < MAX_REPEAT_TIME]
     return next(reversed(repeated or same), None)
+
+
+def proves_sensitivities(chain: SensorChain | None, time: datetime, checks: Sequence[MassCheckEntry]) -> bool:
+    """Tell whether a passed check with a known mass is the one that decides, later than a tap test or of its day.
+
+    An older check shows no amplifier that was switched since.
+    """
+    decides = None if chain is None else find_deciding_check(chain, time, checks)
+    return decides is not None and decides.passed and decides.mass_kg is not None and _is_of_day(decides, time)
+
+
+def _is_of_day(check: MassCheckEntry, time: datetime) -> bool:
+    return check.date >= time - MAX_REPEAT_TIME

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Self
@@ -11,7 +11,7 @@ from typing import Any, Self
 import msgspec
 
 from acquisition import UNKNOWN_CONDITIONS, Conditions, DataError, HitDecision, Remark, TapTest
-from lobewatch.machine.journal.mass_checks import SensorChain
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, proves_sensitivities
 from modal import ModeEdits
 
 NO_MODE_EDITS = ModeEdits()
@@ -78,6 +78,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Mode edits, from other lines."""
     hit_decisions: tuple[HitDecision, ...] = ()
     """Decisions on its hits that count, from other lines."""
+    is_mass_checked: bool = False
+    """True if a check with a known mass shows that its sensitivities are right, from other lines."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
@@ -109,6 +111,18 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         """
         return msgspec.convert({key: line[key] for key in line if key != "conditions" or line[key]}, cls)
 
+    def with_mass_checks(self, checks: Sequence[MassCheckEntry]) -> TapEntry:
+        """Return the entry with whether a check shows that its sensitivities are right.
+
+        Parameters
+        ----------
+        checks
+            Checks with a known mass, oldest first.
+        """
+        if not proves_sensitivities(self.chain, self.created, checks):
+            return self
+        return msgspec.structs.replace(self, is_mass_checked=True)
+
     @property
     def created(self) -> datetime:
         """Time of the tap test."""
@@ -117,7 +131,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     @property
     def line(self) -> dict[str, Any]:
         """Journal line."""
-        left_out = (*FIELDS_OF_OTHER_LINES, "chain", "asked_live")
+        left_out = (*FIELDS_OF_OTHER_LINES, "chain", "asked_live", "is_mass_checked")
         fields = {name: getattr(self, name) for name in self.__struct_fields__ if name not in left_out}
         fields |= {"conditions": self.conditions.specified, "asked": list(self.asked)}
         fields |= {} if self.chain is None else {"chain": msgspec.to_builtins(self.chain)}

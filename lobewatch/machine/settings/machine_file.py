@@ -21,6 +21,7 @@ from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import DaqTable, LimitsTable, MachineTable, ModeTable, SpeedTable, TapTable
 from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
+from lobewatch.machine.settings.unit_text import convert_unit_texts
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] among the names of programs."""
@@ -335,7 +336,7 @@ def parse_machine_file(text: str, name: str = "machine.toml") -> Machine:
     try:
         tables = toml.parse_toml_tables(text)
         toml.check_control_characters(tables)
-        return msgspec.convert(tables, Machine)
+        return msgspec.convert(convert_unit_texts(tables), Machine)
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{name}: {join_sentences(str(error), toml.suggest_plain_number(text))}") from error
     except msgspec.ValidationError as error:

@@ -278,7 +278,7 @@ def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first
         speed, depth = following
         number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the nearest pocket"
         yield f"{table.name}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm ({number})"
-        yield _observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
+        yield observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
     stable = [tried for tried in depths if tried.stable_depth]
     for tried in stable:
         chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
@@ -288,7 +288,8 @@ def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first
         yield "No recommended depth yet: no test cut in a pocket was stable"
 
 
-def _observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
+def observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
+    """Return the command that enters the result of a test cut."""
     observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
     return f"Enter the result: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
 
@@ -332,7 +333,7 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm ({number})"
         risk = chance_text(cut.chatter_probability)
         yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, learning)}"
-        yield _observe_text(folder, program.name, cut.speed_rpm, depth)
+        yield observe_text(folder, program.name, cut.speed_rpm, depth)
         if program.feed_per_tooth_mm is not None:
             yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."
     best = _best_stable_cut(learning)

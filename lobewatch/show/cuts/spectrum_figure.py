@@ -1,5 +1,6 @@
 """Plot the spectrum of recorded cuts."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -34,7 +35,8 @@ def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
 def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
-    named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
+    depth = f", {1e3 * setting.depth:.3g} mm" if math.isfinite(setting.depth) else ""
+    named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm{depth}"
     axis.set_title(f"{named}: {cut_verdict_label(comparison)}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
     if spectrum is None:

@@ -32,7 +32,7 @@ from lobewatch.verdicts import Advice, Setting, Stability, Verdict
 from lobewatch.verdicts.setting_robustness import CHECKED_DROPS
 from lobewatch.verdicts.verdict import StoredVerdict, find_open_question, is_compliance_known
 
-NO_LIMIT_CODES = ("not-checked", "heard-alone")
+NO_LIMIT_CODES = ("not-checked", "heard-alone", "no-tap-test")
 """Codes of remarks that replace a limit."""
 LINE_REMARK_CODES = ("doubt-decides", *NO_LIMIT_CODES)
 """Codes of remarks that the advice lines contain."""

@@ -333,7 +333,8 @@ def margin_text(verdict: Verdict) -> str:
 
 def verdict_text(verdict: Verdict) -> str:
     """Return the verdict, with "beyond the drive" and "(predicted)" if they apply."""
-    predicted = verdict.stability is not Stability.UNKNOWN and not verdict.is_measured
+    is_evaluated = verdict.stability is not Stability.UNKNOWN and verdict.assembly is not None
+    predicted = is_evaluated and not verdict.is_measured
     words = [verdict.stability.value, *(["beyond the drive"] if verdict.is_beyond_drive else [])]
     return ", ".join(words) + (" (predicted)" if predicted else "")
 

@@ -70,6 +70,24 @@ def test_swapped_cables_are_reported() -> None:
     assert check_hit(Hit(right.acceleration, right.force, RATE, 512)) == HitFlags.SWAPPED_CHANNELS
 
 
+@pytest.mark.parametrize("delay", [0, 60, 400])
+def test_swapped_cables_are_named_though_the_hammer_rings_or_hits_twice(delay: int) -> None:
+    right = hit(pulse(200))
+    ringing = 30 * np.exp(-800 * TIME) * np.sin(2 * np.pi * 4000 * TIME) * (TIME > 0)
+    force, response = (
+        signal + 0.9 * np.roll(signal, delay) * bool(delay) for signal in (right.force + ringing, right.acceleration)
+    )
+    assert HitFlags.SWAPPED_CHANNELS in check_hit(Hit(response, force, RATE, 512))
+    assert HitFlags.SWAPPED_CHANNELS not in check_hit(Hit(force, response, RATE, 512))
+
+
+def test_a_missing_response_to_a_long_pulse_is_a_soft_tip() -> None:
+    noise = np.random.default_rng(1).normal(size=(2, TIME.size))
+    long, short = (200 * np.where((TIME >= 0) & (w >= TIME), np.sin(np.pi * TIME / w) ** 2, 0.0) for w in (6e-3, 1e-3))
+    flags = [check_hit(Hit(force + 0.1 * noise[0], noise[1], RATE, 512)) for force in (long, short)]
+    assert flags == [HitFlags.NARROW_BAND, HitFlags.NO_RESPONSE]
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_rails_of_the_converter_make_an_overload(channels: tuple[Channel, Channel], sign: int) -> None:
     force, response = channels

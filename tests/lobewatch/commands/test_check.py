@@ -403,8 +403,7 @@ def test_no_longer_is_reported_of_the_same_directions_only(shop: Shop, check: Ch
 
 
 def test_check_without_anything_to_check_is_rejected(shop: Shop, check: Check, tmp_path: Path) -> None:
-    shop_path, said = shop.path, check()
-    assert (said.code, str(shop_path) in said.err) == (2, True)
+    assert check().code == 1  # without a tap test, programs are at best doubtful
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     said = check(folder=tmp_path / "plain")
     assert (said.code, "[[program]]" in said.err) == (2, True)

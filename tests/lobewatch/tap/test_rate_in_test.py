@@ -138,3 +138,15 @@ def test_hits_of_an_unknown_rate_are_not_resumed(tapped: Callable[[float], Any],
     tap = begin_tap(MachineFolder(folder.path), about)
     assert tap.hits == []
     assert any(spool.name in text for text in tap.not_resumed)
+
+
+@pytest.mark.parametrize(("error", "is_refused"), [(0.0036, True), (-0.0036, True), (0.001, False)])
+def test_a_short_test_reads_on_until_a_small_error_is_known(
+    tapped: Callable[[float], Any], folder: MachineFolder, error: float, is_refused: bool
+) -> None:
+    if is_refused:
+        with pytest.raises(DataError, match="measure_rate"):
+            tapped(error)
+    else:
+        assert tapped(error).remarks == ()
+    assert len(folder.taps()) == (not is_refused)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition import DataError, HammeredStructure, Hammering, Hit, HitFlags, SensorInput
+from acquisition import DataError, HammeredStructure, Hammering, Hit, HitFlags, SensorInput, Structure
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -223,3 +223,69 @@ def test_a_hit_that_the_hammer_does_not_show_is_named(folder: MachineFolder, ses
     run(session, until=lambda state: "hammer cable" in state.reason)
     assert "20 N" in session.state.reason
     assert session.state.hits == ()
+
+
+@pytest.mark.parametrize(("rpm", "is_left_open"), [(964.0, True), (3000.0, True), (0.0, False)])
+def test_a_spindle_that_turns_after_the_last_hit_leaves_its_question_open(rpm: float, is_left_open: bool) -> None:
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    for _ in range(2):
+        questions.check_after(record_at_rest({rpm / 60: 2.0} if rpm else {}))
+    assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
+
+
+@pytest.mark.parametrize(("half_life", "is_left_open"), [(10.0, True), (0.5, False)])
+def test_a_response_that_still_decays_is_no_turning_spindle(half_life: float, is_left_open: bool) -> None:
+    record, time = record_at_rest({}), np.arange(round(RATE)) / RATE
+    line = 3.0 * 0.5 ** (time / half_life) * np.sin(2 * np.pi * 20.0 * time)
+    codes = np.stack([INPUTS[0].channel.encode(record.force), INPUTS[1].channel.encode(record.acceleration + line)])
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    questions.check_after(Hit.from_codes(codes, EMULATED_CHANNELS, RATE))
+    assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
+
+
+def test_an_accepted_line_after_the_last_hit_asks_nothing() -> None:
+    questions = StartQuestions(
+        StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", [SPINDLE_TURNING.code], asks=False
+    )
+    questions.check_after(record_at_rest({16.0: 2.0}))
+    assert questions.left_open == []
+
+
+def test_noise_shows_a_line_below_one_converter_step() -> None:
+    step = abs(EMULATED_CHANNELS[-1].scale)
+    quiet, noisy = (record_at_rest({25.0: 0.6 * step}, noise * step) for noise in (0.02, 0.8))
+    assert find_steady_line(quiet) is None
+    assert find_steady_line(noisy) is not None
+
+
+class SlowHands(Simulated):
+    """Hits every 4 s on a spindle that turns at 15 Hz from a time (s) on."""
+
+    def __init__(self, begin: float) -> None:
+        structure = Structure(np.array([800.0]), np.array([0.03]), np.array([2e7]))
+        hitting = Hammering(interval_range=(4.0, 4.0), double_hits=0.0, overloads=0.0)
+        hammered = HammeredStructure(structure, RATE, np.random.default_rng(1), hitting)
+
+        scan = 0
+
+        def signal(_: int, n_scans: int) -> Any:
+            """Go on where the last stream has ended."""
+            nonlocal scan
+            scan += n_scans
+            time = (scan - n_scans + np.arange(n_scans)) / RATE
+            return hammered(scan - n_scans, n_scans) + np.outer(
+                [0, 1], np.sin(2 * np.pi * 15.0 * time) * (time >= begin)
+            )
+
+        super().__init__(signal, EMULATED_CHANNELS)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("begin", "is_left_open"), [(6.0, True), (np.inf, False)])
+def test_a_spindle_that_starts_slowly_during_the_test_leaves_a_question(
+    folder: MachineFolder, session_of: Callable[..., Any], begin: float, is_left_open: bool
+) -> None:
+    session_of(folder, lambda: SlowHands(begin)).run()
+    (entry,) = MachineFolder(folder.path).taps()
+    assert (entry.asked, entry.accepted) == ((SPINDLE_TURNING.code,) * is_left_open, ())
+    asked = Logbook.open(folder.path).history.questions.get(entry.id, ())
+    assert (SPINDLE_TURNING.code in asked) == is_left_open

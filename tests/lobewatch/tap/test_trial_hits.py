@@ -133,3 +133,20 @@ def test_a_double_hit_is_no_trial_hit(channels: Pair) -> None:
     trial = TrialHits(TapTable(), baseline(channels))
     assert trial.add(hit(channels, 0.03, second=1.0)) & HitFlags.DOUBLE_HIT
     assert "Trial hit 1" in trial.text
+
+
+@pytest.mark.parametrize("peaks", [(1e5, 1e5), (2100.0, 2100.0)])
+def test_two_overloaded_hits_leave_the_low_level_of_the_first(channels: Pair, peaks: tuple[float, ...]) -> None:
+    trial = TrialHits(TapTable(), baseline(channels))
+    first = trial.trigger.level
+    for peak in peaks:
+        assert not trial.add(hit(channels, peak=peak))
+    assert trial.trigger.level == first < 20.0
+    assert "range-too-small" in [remark.code for remark in trial.remarks]
+
+
+def test_the_hit_within_the_range_sets_the_level(channels: Pair) -> None:
+    trial = TrialHits(TapTable(), baseline(channels))
+    for peak in (1e5, 40.0):
+        trial.add(hit(channels, peak=peak))
+    assert trial.trigger.level == pytest.approx(0.1 * 40.0, rel=0.05)

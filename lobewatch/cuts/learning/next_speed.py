@@ -1,0 +1,246 @@
+"""Next speed and depth to try by the sound of cuts only, without a tap test.
+
+Each chatter frequency stands for a mode a little below it. Each mode has the lobes of a slot by the zero-order
+approximation with a typical damping ratio, and all modes the same lowest limit. The deepest speed of the lowest of
+these lobes is near the classic rule, tooth passing at f_c / k. Source: Altintas & Budak, CIRP Annals 44 (1995) 357-362;
+Schmitz & Smith, Machining Dynamics, ch. 4. How often it succeeds: docs/studies/cuts.md.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lobes import Cut, zero_order_lobes
+from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
+from lobewatch.machine.journal.entries import CutVerdict
+from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, round_down_depth_mm
+from modal import Mode
+
+SAME_MODE_TOLERANCE, SIDEBAND_TOLERANCE = 0.15, 0.02
+"""Logarithmic distances within which a chatter frequency, or a side band of it, belongs to a known mode; chosen."""
+CHATTER_OVER_NATURAL = 1.015
+"""Mean chatter frequency over natural frequency; chosen on simulated cuts (docs/studies/cuts.md)."""
+TYPICAL_DAMPING = 0.03
+"""Damping ratio assumed for each mode; chosen."""
+SLOT_FORCES = (1e9, 3e8)
+"""Kt and Kr (Pa) of the lobes; only their ratio matters, chosen."""
+MAX_LOBE_GAIN = 20.0
+"""Largest limit over the lowest one that counts."""
+N_GRID_SPEEDS = 500
+"""Number of speeds in the range."""
+SPEED_UNCERTAINTY = 0.01
+"""Relative standard deviation of the pocket speeds, over which limits are averaged; chosen."""
+TRIED_TOLERANCE = 0.02
+"""Relative distance in speed within which chatter at the same depth, or a smaller one, excludes a speed; chosen."""
+N_SPEEDS = 3
+"""Largest number of suggested speeds."""
+WINDOW_SHARE = 0.8
+"""Share of the largest limit that the window of a pocket holds."""
+MAX_CUTS_AT_DEPTH = 3
+"""Number of chattering cuts at a depth after which no speed is deep enough; chosen."""
+NEXT_DEPTH_FACTOR = 0.7
+"""Next depth over one at which no speed was stable; chosen."""
+
+
+class HeardCut(NamedTuple):
+    """Cut as it was heard."""
+
+    speed_rpm: float
+    """Spindle speed (rpm)."""
+    verdict: CutVerdict
+    """Verdict on the cut."""
+    frequency: float = math.nan
+    """Chatter frequency (Hz); NaN if unknown or stable."""
+    depth: float = math.nan
+    """Axial depth of cut (m); NaN if unknown, as for all cuts."""
+
+    @property
+    def has_chatter(self) -> bool:
+        """True if the cut was not stable."""
+        return self.verdict in ("chatter", "flip")
+
+    def contradicts(self, other: "HeardCut") -> bool:
+        """Return whether one of two cuts at a speed was stable, and the other chatters no deeper."""
+        chatter, stable = (self, other) if self.has_chatter else (other, self)
+        is_same_speed = abs(self.speed_rpm / other.speed_rpm - 1) <= PROGRAM_SPEED_TOLERANCE
+        return self.has_chatter != other.has_chatter and is_same_speed and not chatter.depth > stable.depth
+
+
+class NextSpeed(NamedTuple):
+    """Speed to try next, with what to expect."""
+
+    speed_rpm: float
+    """Spindle speed (rpm)."""
+    depth: float
+    """Axial depth of cut to try there (m); NaN if the depth of the cuts is unknown."""
+    lobe: int
+    """Number k of whole waves of the nearest mode between two teeth."""
+    frequency: float
+    """Natural frequency of that mode (Hz), estimated from the chatter frequencies."""
+    relative_depth: float
+    """Estimated stable depth over that at the speed of the newest chattering cut."""
+    window_rpm: tuple[float, float]
+    """Slowest and fastest speed (rpm) with at least `WINDOW_SHARE` of the stable depth."""
+
+
+class NextSpeeds(NamedTuple):
+    """Speeds to try next, best first, or the reason why there are none."""
+
+    reason: str
+    """Code of the reason. Empty, or "no-deep-speed" with a smaller depth: there are speeds. Without speeds: "stable"
+    (nothing left to try), "no-chatter-frequency", "no-speed-in-range" (no pocket inside)."""
+    range_rpm: tuple[float, float]
+    """Slowest and fastest speed (rpm) searched."""
+    speeds: tuple[NextSpeed, ...] = ()
+    """Speeds to try."""
+    contradicting: tuple[HeardCut, ...] = ()
+    """Earlier cuts that a later one contradicts; they do not count."""
+
+
+def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float, float]) -> NextSpeeds:
+    """Suggest the next speeds and their depth from all cuts so far.
+
+    Parameters
+    ----------
+    cuts
+        Cuts of one tool, material and radial depth, oldest first.
+    teeth
+        Number of teeth N.
+    range_rpm
+        Slowest and fastest speed (rpm).
+
+    Examples
+    --------
+    >>> heard = HeardCut(speed_rpm=18000.0, verdict="chatter", frequency=1370.0, depth=1e-3)
+    >>> best = suggest_speeds([heard], 2, (8000.0, 24000.0)).speeds[0]
+    >>> best.lobe, round(best.speed_rpm, -3), best.depth  # classic rule: 60 x 1370 / (2 x 2) = 20 550 rpm
+    (2, 20000.0, 0.001)
+    """
+    low, high = range_rpm
+    if not (teeth >= 1 and 0 < low < high < math.inf):
+        raise ValueError(f"teeth={teeth}, range_rpm={low:g}..{high:g} are invalid. Give teeth >= 1 and a rising range.")
+    valid, contradicting = _drop_contradicted(cuts)
+    modes = _find_modes(valid, teeth)
+    reason = _find_reason(valid, modes, teeth, range_rpm)
+    if reason:
+        return NextSpeeds(reason, range_rpm, (), contradicting)
+    depth, is_deep = _choose_depth(valid)
+    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, depth)
+    return NextSpeeds("" if is_deep else "no-deep-speed", range_rpm, speeds, contradicting)
+
+
+def _drop_contradicted(cuts: Sequence[HeardCut]) -> tuple[list[HeardCut], tuple[HeardCut, ...]]:
+    """Return the cuts that no later one contradicts, and the others."""
+    contradicting = [cut for place, cut in enumerate(cuts) if any(map(cut.contradicts, cuts[place + 1 :]))]
+    return [cut for cut in cuts if cut not in contradicting], tuple(contradicting)
+
+
+def _find_modes(cuts: Sequence[HeardCut], teeth: int) -> list[float]:
+    """Return the natural frequencies (Hz) that the chatter frequencies stand for."""
+    groups: list[list[float]] = []
+    for cut in cuts:
+        if cut.has_chatter and math.isfinite(cut.frequency):
+            tooth = teeth * cut.speed_rpm / 60
+            for group in groups:
+                distance, near = min(_distances(cut.frequency, tooth, float(np.mean(group))))
+                if distance < 1:
+                    group.append(near)
+                    break
+            else:
+                groups.append([cut.frequency])
+    return [float(np.mean(group)) / CHATTER_OVER_NATURAL for group in groups]
+
+
+def _distances(frequency: float, tooth: float, known: float) -> list[tuple[float, float]]:
+    """Return the distances of a chatter frequency and its side bands from a known one, over the tolerance."""
+    sidebands = [value for value in (abs(frequency - tooth), frequency + tooth) if value > 0]
+    own = abs(math.log(frequency / known)) / SAME_MODE_TOLERANCE, frequency
+    return [own, *((abs(math.log(value / known)) / SIDEBAND_TOLERANCE, value) for value in sidebands)]
+
+
+def _find_reason(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
+    """Return the code of why there is no speed to try; empty if there is one."""
+    if cuts and not cuts[-1].has_chatter:
+        return "stable"
+    if not modes:
+        return "no-chatter-frequency"
+    bases = [60 * frequency / teeth for frequency in modes]
+    has_pocket = any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases)
+    return "" if has_pocket else "no-speed-in-range"
+
+
+def _choose_depth(cuts: Sequence[HeardCut]) -> tuple[float, bool]:
+    """Return the depth to try (m), and whether some speed may be stable at the depth of the newest cut."""
+    depth = cuts[-1].depth
+    n_tries = sum(cut.has_chatter and not cut.depth > depth for cut in cuts)
+    if not math.isfinite(depth) or n_tries < MAX_CUTS_AT_DEPTH:
+        return depth, n_tries < MAX_CUTS_AT_DEPTH
+    return round_down_depth_mm(1e3 * NEXT_DEPTH_FACTOR * depth) / 1e3, False
+
+
+def _find_deepest_speeds(
+    cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float], depth: float
+) -> tuple[NextSpeed, ...]:
+    """Find the speeds with the largest estimated limits that were not tried at this depth."""
+    speeds = np.geomspace(*range_rpm, N_GRID_SPEEDS)
+    level = _average_log_limits(modes, teeth, speeds)
+    score = level.copy()
+    for cut in cuts:
+        if cut.has_chatter and not cut.depth > depth * (1 + TRIED_TOLERANCE):
+            score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
+    newest = next(cut for cut in reversed(cuts) if cut.has_chatter)
+    here, found = float(np.interp(newest.speed_rpm, speeds, level)), list[NextSpeed]()
+    while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
+        place = int(np.argmax(score))
+        found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
+        score[_find_pocket(level, place)] = -np.inf
+    return tuple(found)
+
+
+def _average_log_limits(modes: Sequence[float], teeth: int, speeds: Floats) -> Floats:
+    """Return the logarithm of the lowest lobe of all modes over its lowest limit, averaged over the uncertainty."""
+    slot, limits = Cut(teeth, 1.0, "up", *SLOT_FORCES), np.full(speeds.shape, MAX_LOBE_GAIN)
+    for frequency in modes:
+        sides = [Mode(frequency, TYPICAL_DAMPING, 1.0)]
+        depth = zero_order_lobes(sides, sides, slot, speeds).depth
+        limits = np.minimum(limits, depth / np.min(depth))
+    reach = math.ceil(2 * SPEED_UNCERTAINTY / math.log(speeds[1] / speeds[0]))
+    weights = np.exp(-(np.linspace(-2, 2, 2 * reach + 1) ** 2) / 2)
+    padded = np.pad(np.log(limits), reach, mode="edge")
+    return np.asarray(np.convolve(padded, weights / np.sum(weights), "valid"))
+
+
+def _find_pocket(level: Floats, place: int) -> slice:
+    """Return the places from the valley on one side of a speed to that on the other."""
+    rises = np.diff(level) > 0
+    left, right = np.flatnonzero(~rises[:place]), np.flatnonzero(rises[place:])
+    return slice(int(left.max(initial=-1)) + 1, place + int(right.min(initial=level.size - 1 - place)) + 1)
+
+
+def _find_window(level: Floats, place: int) -> tuple[int, int]:
+    """Return the first and last place around a speed with at least `WINDOW_SHARE` of its limit."""
+    below = np.flatnonzero(level < level[place] + math.log(WINDOW_SHARE))
+    first = below[below < place].max(initial=-1) + 1
+    return int(first), int(below[below > place].min(initial=level.size)) - 1
+
+
+def _describe(
+    speeds: Floats,
+    place: int,
+    level: Floats,
+    modes: Sequence[float],
+    teeth: int,
+    depth: float,
+    relative_depth: float,
+) -> NextSpeed:
+    """Describe a speed to try."""
+    tooth = teeth * float(speeds[place]) / 60
+    frequency = min(modes, key=lambda mode: abs(mode / tooth - max(round(mode / tooth), 1)))
+    low, high = float(speeds[0]), float(speeds[-1])
+    speed = min(max(round(float(speeds[place]) / SPEED_STEP_RPM) * SPEED_STEP_RPM, low), high)
+    first, last = _find_window(level, place)
+    window = float(speeds[first]), float(speeds[last])
+    return NextSpeed(speed, depth, max(round(frequency / tooth), 1), frequency, relative_depth, window)

@@ -1,0 +1,241 @@
+"""Questions on a tap test from all modes of its series: another spindle, exchanged directions, unstated window."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.arrays import Floats
+from lobewatch.measurement.recording_questions import DAMPING_JUMP, EXCHANGED_DIRECTIONS, MODE_JUMP
+from lobewatch.measurement.series_questions import (
+    MAX_PAIRS,
+    MIN_PAIRS_FOR_MEDIAN,
+    N_PRIOR_PAIRS,
+    N_RECENT_TESTS,
+    N_STD_ASKED,
+    EarlierTest,
+    SeriesReference,
+    check_same_direction,
+    check_series,
+    estimate_scatter,
+    iterate_day_pairs,
+)
+from modal import Mode
+
+MIN_PEAK_RATIO = 0.05
+"""Peak of a mode over the largest one, from which it is compared; chosen."""
+MAX_MATCH_CHANGE = 0.2
+"""Largest ln of a frequency ratio within which two modes can be one; chosen, below the spacing of most strong modes."""
+MAX_MODE_FALL = 0.10
+"""Relative fall of a mode since any recent test that wear or a crash explains; chosen. Beyond it is another mode."""
+DIRECTION_STD = 0.001
+"""Relative standard deviation of the frequency difference of x and y of one day, before a series shows its own.
+
+Both are tapped in one clamping, so it is below FREQUENCY_STD; chosen."""
+MAX_EXCHANGED_STD = 4.0
+"""Largest distance from the exchanged directions in standard deviations; chosen. Farther away it is another tool."""
+DAMPING_STD = 0.1
+"""Relative standard deviation of a damping ratio from test to test, before a series shows its own; chosen."""
+MIN_DAMPING_TESTS = 3
+"""Smallest number of earlier tests that show the damping of a series; chosen."""
+MAX_WINDOW_FREQUENCY_CHANGE = 0.02
+"""Largest relative frequency change with a raised damping that a window explains: a window changes none; chosen."""
+MAX_WINDOW_DISTANCE = 2.0
+"""Largest distance of each mode from the common rise, in standard deviations; chosen."""
+
+
+def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: SeriesReference) -> tuple[Remark, ...]:
+    """Return the questions about a tap test that does not fit the earlier tests of its series.
+
+    Parameters
+    ----------
+    followed
+        Followed mode.
+    modes
+        All modes of the test that count.
+    reference
+        Earlier tests of the series.
+
+    Returns
+    -------
+    tuple of Remark
+        Questions. One about all modes is asked only if the followed mode raises none.
+    """
+    same = check_same_direction(followed, modes, reference)
+    asked = (*check_series(followed, reference), *filter(None, [same]))
+    change = followed.frequency / reference.level[-1].frequency if reference.level else 1.0
+    checks: Sequence[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
+    others = partial(check_other_modes, change=change)
+    checks = () if asked else (others, check_exchanged_directions, check_common_damping)
+    further = filter(None, (check(modes, reference) for check in checks))
+    return (*asked, *filter(None, [next(further, None)]))
+
+
+def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change: float = 1.0) -> Remark | None:
+    """Return the question about a strong mode of all recent tests that is elsewhere now, or None.
+
+    Wear lowers modes slowly and raises none. So a strong mode that is gone, with a strong one that no recent test has,
+    is another spindle, although the followed mode of the tool is the same.
+
+    Parameters
+    ----------
+    modes
+        Modes of the test that count.
+    reference
+        Earlier tests of the series.
+    change
+        Frequency of the followed mode over that of the newest test. The others may move as far.
+    """
+    recent = [_tabulate_test(test) for test in reference.level[-N_RECENT_TESTS:]]
+    now = _tabulate(modes)
+    if not recent:
+        return None
+    lost = [f for f in _select_strong(recent[-1])[:, 0] if not _has_become(f, now[:, 0], change)]
+    lost = [f for f in lost if all(_is_among(f, test, 1.0) for test in recent)]
+    new = [f for f in _select_strong(now)[:, 0] if not any(_is_among(f, test, change) for test in recent)]
+    if not lost or not new:
+        return None
+    then = min(lost, key=lambda f: abs(math.log(f / new[0])))
+    return MODE_JUMP.ask(f"{new[0]:.0f} Hz", now=new[0], before=then, count=len(recent), s="s" * (len(recent) > 1))
+
+
+def _has_become(before: float, now: Floats, change: float) -> bool:
+    """Tell whether an earlier frequency can be any of those now, shape (n,), as another mode changed by a ratio."""
+    ratios = now / before
+    low, high = (1 - MAX_MODE_FALL) * min(change, 1.0), (1 + MODE_JUMP.limit) * max(change, 1.0)
+    return bool(np.any((ratios >= low) & (ratios <= high)))
+
+
+def _is_among(frequency: float, test: Floats, change: float) -> bool:
+    """Tell whether a frequency can be any of those of the table of an earlier test."""
+    return any(_has_become(before, np.array([frequency]), change) for before in test[:, 0])
+
+
+def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
+    """Return the question about x and y of one day that differ the other way round than on earlier days, or None.
+
+    Both directions are tapped in one clamping, so its scatter cancels in their difference.
+
+    Parameters
+    ----------
+    modes
+        Modes of the test that count.
+    reference
+        Earlier tests of the series.
+    """
+    days = [(_tabulate_test(own), _tabulate_test(other)) for own, other in _level_pairs(reference)]
+    now, other = _select_strong(_tabulate(modes))[:, 0], np.array(reference.same_day)
+    if not other.size or len(days) < MIN_PAIRS_FOR_MEDIAN:
+        return None
+    earlier = [np.log(own / _find(own, y)[:, 0]) for x, y in days for own in [_find(now, x)[:, 0]]]
+    changes = np.array([np.log(now / _find(now, other[:, np.newaxis])[:, 0]), *earlier])
+    changes, now = changes[:, np.all(np.isfinite(changes), axis=0)], now[np.all(np.isfinite(changes), axis=0)]
+    if not now.size:
+        return None
+    likelihood, farthest = _compare_names(changes[0], changes[1:])
+    if likelihood <= math.log(EXCHANGED_DIRECTIONS.limit):
+        return None
+    values = now[farthest], 100 * changes[0, farthest], 100 * float(np.mean(changes[1:, farthest]))
+    asked = dict(zip(("now", "percent", "usual"), values, strict=True))
+    return EXCHANGED_DIRECTIONS.ask(f"{now[farthest]:.0f} Hz", days=len(days), **asked)
+
+
+def _compare_names(change: Floats, earlier: Floats) -> tuple[float, int]:
+    """Return ln of the likelihood of exchanged over right names, and the mode that shows it best.
+
+    Student's distribution of one further value, as the scatter of a few days is uncertain. Reclamping moves all modes
+    together, so only one mode counts. The others can contradict.
+
+    change: ln of the frequencies over those of the other direction, shape (modes,); earlier: shape (days, modes).
+    """
+    centre, freedom = np.mean(earlier, axis=0), len(earlier) - 1 + N_PRIOR_PAIRS
+    squares = np.sum((earlier - centre) ** 2, axis=0) + N_PRIOR_PAIRS * DIRECTION_STD**2
+    variance = squares / freedom * (1 + 1 / len(earlier))
+    right, exchanged = (change - centre) ** 2 / variance, (change + centre) ** 2 / variance
+    farthest = int(np.argmax(centre**2 / variance))
+    likelihood = (freedom + 1) / 2 * np.log((freedom + right) / (freedom + exchanged))
+    is_exchanged = np.max(exchanged) <= MAX_EXCHANGED_STD**2
+    return float(likelihood[farthest]) if is_exchanged else -math.inf, farthest
+
+
+def _level_pairs(reference: SeriesReference) -> list[tuple[EarlierTest, EarlierTest]]:
+    """Return the earlier days of the level on which both directions have modes."""
+    pairs = iterate_day_pairs(reference.level, reference.across)
+    return [(own, other) for own, other in pairs if own.modes and other.modes]
+
+
+def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
+    """Return the question about decay rates zeta 2 pi f that rose by one constant in all modes, or None.
+
+    An exponential window of time constant T raises each by 1 / T and changes no frequency. Damping of joints and
+    bearings changes by a share of its own in each mode.
+
+    Parameters
+    ----------
+    modes
+        Modes of the test that count.
+    reference
+        Earlier tests of the series.
+
+    References
+    ----------
+    Fladung & Rost (1997), Application and correction of the exponential window for frequency response functions,
+    Mechanical Systems and Signal Processing 11(1).
+    """
+    now, tests = _select_strong(_tabulate(modes)), reference.level[-MAX_PAIRS:]
+    if len(tests) < MIN_DAMPING_TESTS or len(now) < 2:
+        return None
+    then = _trace(now, tests)
+    if not np.all(np.isfinite(then)):
+        return None
+    usual = np.median(then, axis=0)
+    if np.any(np.abs(now[:, 0] / usual[:, 0] - 1) > MAX_WINDOW_FREQUENCY_CHANGE):
+        return None
+    both = [*then[:, :, 1].T, *_trace(now, reference.across[-MAX_PAIRS:])[:, :, 1].T]
+    spread = estimate_scatter([rates[np.isfinite(rates)] for rates in both], DAMPING_STD)
+    std = usual[:, 1] * spread * math.sqrt(1 + math.pi / 2 / len(tests))
+    rise, weight = now[:, 1] - usual[:, 1], std**-2
+    common = float(np.sum(rise * weight) / np.sum(weight))
+    is_common = np.all((rise > 0) & (np.abs(rise - common) <= MAX_WINDOW_DISTANCE * std))
+    if not is_common or common * math.sqrt(float(np.sum(weight))) <= N_STD_ASKED:
+        return None
+    asked = {"percent": 100 * rise[0] / usual[0, 1], "rise": common, "time": 1e3 / common, "count": len(tests)}
+    return DAMPING_JUMP.ask(f"{now[0, 0]:.0f} Hz", **asked)
+
+
+def _trace(now: Floats, tests: Sequence[EarlierTest]) -> Floats:
+    """Return the rows of the modes of tests that are nearest to those of a table; shape (tests, modes, 3)."""
+    return np.array([_find(now[:, 0], _tabulate_test(test)) for test in tests]).reshape(-1, len(now), 3)
+
+
+def _tabulate(modes: Sequence[Mode]) -> Floats:
+    """Return frequency (Hz), decay rate (1/s) and peak of modes, the highest peak first; shape (n, 3)."""
+    return _sort_table([(mode.frequency, mode.damping_ratio, mode.peak) for mode in modes])
+
+
+def _tabulate_test(test: EarlierTest) -> Floats:
+    """Return the table of the modes of an earlier test with a positive stiffness."""
+    return _sort_table([(f, zeta, 1 / (2 * stiffness * zeta)) for f, zeta, stiffness, _ in test.modes if stiffness > 0])
+
+
+def _sort_table(rows: Sequence[tuple[float, float, float]]) -> Floats:
+    """Return the table of rows of frequency (Hz), damping ratio and peak."""
+    table = [(f, 2 * math.pi * zeta * f, peak) for f, zeta, peak in rows]
+    return np.array(sorted(table, key=lambda row: -row[2])).reshape(-1, 3)
+
+
+def _select_strong(table: Floats) -> Floats:
+    """Return the rows of the modes whose peak is near the highest."""
+    return table[table[:, 2] >= MIN_PEAK_RATIO * table[:1, 2]] if table.size else table
+
+
+def _find(frequencies: Floats, table: Floats) -> Floats:
+    """Return the row of the mode nearest to each frequency, NaN without one near it; shape (n, columns of table)."""
+    if not table.size:
+        return np.full((frequencies.size, table.shape[1]), np.nan)
+    distance = np.abs(np.log(frequencies[:, np.newaxis] / table[:, 0]))
+    is_near = np.min(np.nan_to_num(distance, nan=np.inf), axis=1) <= MAX_MATCH_CHANGE
+    nearest = table[np.argmin(np.nan_to_num(distance, nan=np.inf), axis=1)]
+    return np.where(is_near[:, np.newaxis], nearest, np.nan)

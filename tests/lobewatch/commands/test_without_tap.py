@@ -1,0 +1,165 @@
+"""`listen FILE` without a machine, and `listen`, `suggest` and `check` on a machine without a tap test."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io.wavfile
+from typer.testing import CliRunner, Result
+
+from lobewatch.cli import app
+from lobewatch.machine.folder_updates import add_event
+from lobewatch.show.terminal.option_names import with_option_names
+
+Shop = Any
+"""Machine fixture of tests/lobewatch/conftest.py."""
+RATE, RPM, CHATTER = 12800, 18000.0, 1370.0
+
+
+def sound(path: Path, chatter: float | None = CHATTER, *, flutes: int = 2, tone: float = 0.0) -> Path:
+    """Write a sound file of nothing but a cut: 1.5 s without air."""
+    random, time = np.random.default_rng(0), np.arange(round(1.5 * RATE)) / RATE
+    tooth = flutes * RPM / 60
+    lines = [(tooth * k, 20.0 / k) for k in range(1, 10)] + [(tone, 3.0 * bool(tone))]
+    if chatter is not None:
+        lines += [(chatter + k * tooth, 30.0 * 0.3 ** abs(k)) for k in range(-1, 4)]
+    signal = random.normal(scale=0.05, size=time.size)
+    signal += sum(size * np.sin(2 * np.pi * f * time + random.uniform(0, 6)) for f, size in lines)
+    scipy.io.wavfile.write(path, RATE, (signal / 200).astype(np.float32))
+    return path
+
+
+def run(*arguments: object) -> Result:
+    result = CliRunner().invoke(app, [*map(str, arguments)])
+    if isinstance(result.exception, ValueError | OSError):
+        result.exception.args = (with_option_names(str(result.exception)),)
+    return result
+
+
+@pytest.fixture
+def untapped(shop: Shop) -> Shop:
+    """Machine with program A of two flutes at 18 000 rpm, 1 mm."""
+    shop.run(("A", RPM, 1.0), more='feed = "x"')
+    shop.edit("teeth = 4", "teeth = 2")
+    return shop
+
+
+def check(shop: Shop, *arguments: object) -> dict[str, Any]:
+    result = run("check", shop.path, "--json", *arguments)
+    (program,) = json.loads(result.stdout)["programs"]
+    assert result.exit_code == (0 if program["verdict"] == "stable" else 1)
+    return dict(program)
+
+
+def test_a_file_without_a_machine_gives_chatter_and_the_next_speeds(tmp_path: Path) -> None:
+    file, picture = sound(tmp_path / "cut.wav"), tmp_path / "cut.svg"
+    arguments = ("listen", file, "--teeth", 2, "--speed", RPM)
+    told = json.loads(run(*arguments, "--speeds", "8000 24000", "--depth", 1, "--out", picture, "--json").stdout)
+    assert (told["word"], told["next_reason"], told["range_rpm"]) == ("chatter", "", [8000, 24000])
+    assert told["chatter_frequency_hz"] == pytest.approx(CHATTER, abs=0.2)
+    assert [speed["lobe"] for speed in told["next_speeds"]] == [2, 3, 4]
+    assert told["next_speeds"][0]["speed_rpm"] == pytest.approx(60 * CHATTER / 4, rel=0.025)
+    assert told["next_speeds"][0]["depth_mm"] == 1.0
+    assert "chatter at 1370" in picture.read_text("utf-8")
+    unknown = json.loads(run(*arguments, "--json").stdout)
+    assert unknown["range_rpm"] == [0.5 * RPM, 1.5 * RPM]
+    assert unknown["next_speeds"][0]["depth_mm"] is None
+    assert run(*arguments).exit_code == 0
+
+
+def test_air_is_missed_only_where_it_matters(tmp_path: Path) -> None:
+    arguments = ("--teeth", 2, "--speed", RPM, "--json")
+    stable = json.loads(run("listen", sound(tmp_path / "a.wav", None), *arguments).stdout)
+    assert (stable["word"], stable["next_reason"]) == ("stable", "stable")
+    tone = json.loads(run("listen", sound(tmp_path / "b.wav", None, tone=1234.0), *arguments).stdout)
+    assert (tone["word"], tone["reason"], tone["next_reason"]) == ("cannot tell", "no-air", "no-chatter-frequency")
+
+
+def test_a_motion_needs_no_sensor_option(tmp_path: Path) -> None:
+    rate, values = scipy.io.wavfile.read(sound(tmp_path / "cut.wav"))
+    rows = "\n".join(f"{n / rate:.7f},{200 * value:.4f}" for n, value in enumerate(values))
+    for heading, sensor in (("acceleration [m/s^2]", "accelerometer"), ("ch1", "microphone")):
+        (tmp_path / "cut.csv").write_text(f"time [s],{heading}\n{rows}\n")
+        told = json.loads(run("listen", tmp_path / "cut.csv", "--teeth", 2, "--speed", RPM, "--json").stdout)
+        assert (told["word"], told["sensor"]) == ("chatter", sensor)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--speed", RPM), ["--teeth"]),
+        (("--teeth", 2), ["--speed"]),
+        (("--teeth", 2, "--speed", 0), ["--speed 0", "above 0"]),
+        (("--teeth", 0, "--speed", RPM), ["--teeth 0", "above 0"]),
+        (("--teeth", 2, "--speed", RPM, "--depth", -1), ["--depth -1", "above 0"]),
+        (("--teeth", 2, "--speed", RPM, "--speeds", "8000"), ["--speeds '8000'"]),
+        (("--teeth", 2, "--speed", RPM, "--speeds", "9000 8000"), ["--speeds '9000 8000'"]),
+        (("--teeth", 2, "--speed", RPM, "--speeds", "8000 9000"), ["--speed 18000", "--speeds 8000..9000"]),
+        (("--teeth", 2, "--speed", RPM, "--program", "A"), ["--program", "machine folder"]),
+    ],
+)
+def test_a_bad_request_is_one_sentence(tmp_path: Path, arguments: tuple[object, ...], said: list[str]) -> None:
+    file = tmp_path / "cut.wav"
+    file.write_bytes(b"")
+    result = run("listen", file, *arguments)
+    assert result.exit_code != 0
+    assert [fact for fact in said if fact not in str(result.exception)] == []
+
+
+def test_a_missing_file_is_named_and_a_folder_takes_no_flutes(untapped: Shop, tmp_path: Path) -> None:
+    assert "none.wav" in str(run("listen", tmp_path / "none.wav", "--teeth", 2, "--speed", RPM).exception)
+    assert "--teeth" in str(run("listen", untapped.path, "--program", "A", "--teeth", 2).exception)
+
+
+def test_cuts_are_kept_until_one_is_stable(untapped: Shop, tmp_path: Path) -> None:
+    start = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
+    assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-chatter-frequency")
+    file = sound(tmp_path / "cut.wav")
+    dry, kept = (
+        json.loads(run("listen", untapped.path, *arguments, "--json").stdout)
+        for common in [("--program", "A", "--file", file, "--sensor", "microphone")]
+        for arguments in [(*common, "--dry-run"), common]
+    )
+    assert (kept["word"], kept["id"], kept["next_reason"]) == ("chatter", "c1", "")
+    assert dry["next_speeds"] == kept["next_speeds"]
+    following = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
+    best = following["suggested"]
+    assert following["next_speeds"] == kept["next_speeds"]
+    assert best["speed_rpm"] == kept["next_speeds"][0]["speed_rpm"]
+    place = ("--program", "A", "--speed", best["speed_rpm"], "--depth", best["depth_mm"])
+    assert run("observe", untapped.path, *place, "--stable").exit_code == 0
+    done = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
+    assert (done["suggested"], done["next_reason"], done["next_speeds"]) == (None, "stable", [])
+    assert run("suggest", untapped.path, "--program", "A").exit_code == 0
+
+
+def test_without_a_tap_test_only_the_cut_at_that_speed_decides(untapped: Shop) -> None:
+    program = check(untapped)
+    assert (program["verdict"], program["decided_by"]) == ("doubtful", "no-tap-test")
+    assert (program["limit_mm"], program["stable"]) == (None, None)
+    assert [remark["code"] for remark in program["remarks"]] == ["no-tap-test"]
+    assert run("observe", untapped.path, "--program", "A", "--depth", 1.2, "--stable").exit_code == 0
+    assert (check(untapped)["verdict"], check(untapped)["decided_by"]) == ("stable", None)
+    for value in (("--depth", 1.3), ("--speed", 18100, "--depth", 1), ("--direction", "up"), ("--radial", 15)):
+        given = dict(zip(("--speed", "--depth"), (RPM, 1.0), strict=True)) | {str(value[0]): value[1]}
+        given |= dict(zip(map(str, value[::2]), value[1::2], strict=True))
+        asked = [word for pair in given.items() for word in pair]
+        assert check(untapped, *asked)["verdict"] == "doubtful", value
+    assert run("observe", untapped.path, "--program", "A", "--speed", 18100, "--chatter").exit_code == 0
+    assert check(untapped)["verdict"] == "not stable"
+    assert run("exclude", untapped.path, "c2", "--reason", "x").exit_code == 0
+    assert check(untapped)["verdict"] == "stable"
+    add_event(untapped.folder, "new bearings", datetime.now(UTC) + timedelta(seconds=1), new_baseline=True)
+    assert check(untapped)["verdict"] == "doubtful"
+
+
+@pytest.mark.parametrize("more", ["feed_per_tooth_mm = 0.1", "thin = true", "corner_radius_mm = 11", 'wear = "worn"'])
+def test_a_cut_of_another_kind_proves_nothing(untapped: Shop, more: str) -> None:
+    assert run("observe", untapped.path, "--program", "A", "--stable").exit_code == 0
+    untapped.edit('name = "A"', f'name = "B"\n{more}')
+    assert check(untapped)["verdict"] == "doubtful"

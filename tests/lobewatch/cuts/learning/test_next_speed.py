@@ -1,0 +1,115 @@
+"""Next speeds by sound: the classic rule, several modes, depth, contradictions and bad input."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lobewatch.cuts.learning.next_speed import HeardCut, suggest_speeds
+
+RANGE = (8000.0, 24000.0)
+
+
+def chatter(speed: float, frequency: float, depth: float = 1e-3) -> HeardCut:
+    return HeardCut(speed, "chatter", frequency, depth)
+
+
+def test_the_first_speeds_are_tooth_passing_at_a_whole_share_of_the_chatter_frequency() -> None:
+    found = suggest_speeds([chatter(18000, 1370)], 2, RANGE)
+    assert found.reason == ""
+    assert [speed.lobe for speed in found.speeds] == [2, 3, 4]
+    for speed in found.speeds:
+        assert speed.speed_rpm == pytest.approx(60 * 1370 / (2 * speed.lobe), rel=0.025)
+        assert speed.speed_rpm <= 60 * 1370 / (2 * speed.lobe)  # f_c is above the natural frequency
+        assert speed.window_rpm[0] <= speed.speed_rpm <= speed.window_rpm[1]
+        assert speed.depth == 1e-3
+    gains = [speed.relative_depth for speed in found.speeds]
+    assert gains == sorted(gains, reverse=True)
+    assert gains[0] > 1.5
+
+
+@settings(max_examples=15, deadline=None)
+@given(scale=st.floats(0.3, 3.0), teeth=st.integers(2, 4))
+def test_speeds_scale_with_the_chatter_frequency(scale: float, teeth: int) -> None:
+    low, high = RANGE
+    one = suggest_speeds([chatter(18000, 1370)], 2, RANGE).speeds[0]
+    factor = scale * 2 / teeth
+    scaled = [chatter(18000 * factor, 1370 * scale)]
+    other = suggest_speeds(scaled, teeth, (low * factor, high * factor)).speeds[0]
+    assert other.speed_rpm == pytest.approx(one.speed_rpm * factor, rel=3e-3)
+    assert other.relative_depth == pytest.approx(one.relative_depth, rel=1e-6)
+
+
+def test_a_second_frequency_of_the_same_mode_moves_the_speed_between_both() -> None:
+    first = suggest_speeds([chatter(18000, 1370)], 2, RANGE).speeds[0]
+    second = suggest_speeds([chatter(18000, 1370), chatter(22000, 1310)], 2, RANGE).speeds[0]
+    assert second.lobe == first.lobe
+    assert second.frequency == pytest.approx(first.frequency * 1340 / 1370, rel=1e-6)
+
+
+def test_a_side_band_counts_as_its_mode() -> None:
+    """At 15 000 rpm and two flutes, 870 Hz is the side band of 1370 Hz."""
+    found = suggest_speeds([chatter(18000, 1370), chatter(15000, 870)], 2, RANGE)
+    assert [speed.frequency for speed in found.speeds] == pytest.approx([1370 / 1.015] * 3)
+
+
+def test_a_second_mode_excludes_speeds_that_are_bad_for_it() -> None:
+    """At 20 200 rpm, a mode at 1010 Hz is half a tooth passing off a pocket."""
+    alone = suggest_speeds([chatter(18000, 1370)], 2, RANGE).speeds[0]
+    both = suggest_speeds([chatter(18000, 1370), chatter(alone.speed_rpm, 1010)], 2, RANGE).speeds[0]
+    assert abs(both.speed_rpm / alone.speed_rpm - 1) > 0.02
+
+
+def test_no_speed_is_tried_twice_and_then_the_depth_is_reduced() -> None:
+    cuts = [chatter(18000, 1370)]
+    for _ in range(2):
+        found = suggest_speeds(cuts, 2, RANGE)
+        assert found.reason == ""
+        assert all(abs(math.log(found.speeds[0].speed_rpm / cut.speed_rpm)) > 0.015 for cut in cuts)
+        cuts.append(chatter(found.speeds[0].speed_rpm, 1370))
+    found = suggest_speeds(cuts, 2, RANGE)
+    assert found.reason == "no-deep-speed"
+    assert found.speeds[0].depth == pytest.approx(0.7e-3)
+    assert suggest_speeds([*cuts, chatter(*found.speeds[0][:1], 1370, 0.7e-3)], 2, RANGE).reason == ""
+
+
+def test_a_stable_cut_ends_the_search_and_a_contradicting_one_begins_it_again() -> None:
+    stable = HeardCut(20200, "stable", depth=1e-3)
+    assert suggest_speeds([chatter(18000, 1370), stable], 2, RANGE).reason == "stable"
+    later = chatter(20210, 1350, 0.9e-3)
+    found = suggest_speeds([chatter(18000, 1370), stable, later], 2, RANGE)
+    assert (found.reason, found.contradicting) == ("", (stable,))
+    deeper = later._replace(depth=1.1e-3)
+    assert suggest_speeds([chatter(18000, 1370), stable, deeper], 2, RANGE).contradicting == ()
+
+
+@pytest.mark.parametrize(
+    ("cuts", "reason"),
+    [
+        ([], "no-chatter-frequency"),
+        ([chatter(18000, math.nan)], "no-chatter-frequency"),
+        ([HeardCut(18000, "stable")], "stable"),
+    ],
+)
+def test_without_a_chatter_frequency_there_is_no_speed(cuts: list[HeardCut], reason: str) -> None:
+    found = suggest_speeds(cuts, 2, RANGE)
+    assert (found.reason, found.speeds) == (reason, ())
+
+
+def test_a_range_without_a_pocket_says_so() -> None:
+    assert suggest_speeds([chatter(18000, 1370)], 2, (14500.0, 19000.0)).reason == "no-speed-in-range"
+    assert suggest_speeds([chatter(18000, 1370)], 2, (50000.0, 90000.0)).reason == "no-speed-in-range"
+
+
+def test_an_unknown_depth_stays_unknown() -> None:
+    found = suggest_speeds([HeardCut(18000, "chatter", 1370)], 2, RANGE)
+    assert math.isnan(found.speeds[0].depth)
+
+
+@pytest.mark.parametrize(("teeth", "range_rpm"), [(0, RANGE), (2, (9000.0, 8000.0)), (2, (0.0, 8000.0))])
+def test_bad_values_are_rejected(teeth: int, range_rpm: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="teeth="):
+        suggest_speeds([chatter(18000, 1370)], teeth, range_rpm)

@@ -1,0 +1,60 @@
+"""A passed check with a known mass answers the question about the compliance of a tool."""
+
+from __future__ import annotations
+
+import pytest
+
+from lobewatch.logbook import Logbook
+from lobewatch.machine.folder_updates import exclude_entry
+from lobewatch.measurement.recording_questions import TOOL_COMPLIANCE, TOOL_MISMATCH_CODE
+from tests.lobewatch.logbook.conftest import Shop, entered, hit_mass, tap_both
+
+STIFF_TOOL = '[[tool]]\nname = "plain"\ndiameter_mm = 50\ntool_material = "carbide"\nstick_out_mm = 220\n\n'
+"""Tool that alone is softer than the tapped tip."""
+
+
+@pytest.fixture
+def mismatched(plain: Shop) -> Shop:
+    """Return a machine whose tip is stiffer than its tool as entered, tapped in x and y."""
+    text = plain.path.joinpath("machine.toml").read_text("utf-8")
+    plain.path.joinpath("machine.toml").write_text(text.replace("[[program]]", STIFF_TOOL + "[[program]]", 1), "utf-8")
+    tap_both(plain)
+    return plain
+
+
+def codes(shop: Shop) -> set[str]:
+    """Return the codes about the tool that all rows have."""
+    rows = Logbook.open(shop.path).history.rows
+    wanted = {TOOL_COMPLIANCE.code, TOOL_MISMATCH_CODE}
+    found = [{remark.code for remark in row.remarks} & wanted for row in rows]
+    assert all(each == found[0] for each in found)
+    return found[0]
+
+
+@pytest.mark.parametrize(("days", "is_answered"), [(30.0, True), (0.5, True), (-0.9, True), (-2.0, False)])
+def test_a_passed_check_later_or_of_the_day_answers_the_question(
+    mismatched: Shop, days: float, is_answered: bool
+) -> None:
+    assert codes(mismatched) == {TOOL_COMPLIANCE.code}
+    assert Logbook.open(mismatched.path).history.questions
+    hit_mass(mismatched, days)
+    assert codes(mismatched) == {TOOL_MISMATCH_CODE if is_answered else TOOL_COMPLIANCE.code}
+    assert (not Logbook.open(mismatched.path).history.questions) is is_answered
+
+
+def test_a_check_that_fails_or_is_excluded_or_of_another_chain_answers_nothing(mismatched: Shop) -> None:
+    hit_mass(mismatched, 1.0, ratio=2.0)
+    hit_mass(mismatched, 1.0, entered(1.2))
+    assert codes(mismatched) == {TOOL_COMPLIANCE.code}
+    passed = hit_mass(mismatched, 1.5)
+    assert codes(mismatched) == {TOOL_MISMATCH_CODE}
+    exclude_entry(mismatched.folder, passed.id, "wrong mass")
+    assert codes(mismatched) == {TOOL_COMPLIANCE.code}
+
+
+def test_a_check_before_the_tap_test_answers_at_once(plain: Shop) -> None:
+    text = plain.path.joinpath("machine.toml").read_text("utf-8")
+    plain.path.joinpath("machine.toml").write_text(text.replace("[[program]]", STIFF_TOOL + "[[program]]", 1), "utf-8")
+    hit_mass(plain, -0.1)
+    tap_both(plain)
+    assert codes(plain) == {TOOL_MISMATCH_CODE}

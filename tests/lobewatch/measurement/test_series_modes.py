@@ -1,0 +1,135 @@
+"""Questions from all modes of a series: another spindle, exchanged directions, unstated window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lobewatch.measurement.series_modes import (
+    MAX_MODE_FALL,
+    check_common_damping,
+    check_exchanged_directions,
+    check_other_modes,
+    find_series_questions,
+)
+from lobewatch.measurement.series_questions import EarlierTest, SeriesReference
+from modal import Mode
+
+START = datetime(2026, 1, 15, 9, tzinfo=UTC)
+TOOL, SPINDLE = (1500.0, 0.03, 1e7), (700.0, 0.02, 4e7)
+Values = tuple[float, float, float]
+pytestmark = pytest.mark.quick
+
+
+def months_of(modes: Sequence[Values], count: int = 6, scatter: float = 0.0, seed: int = 0) -> tuple[EarlierTest, ...]:
+    """Return monthly tests of these modes, whose frequencies scatter together."""
+    factors = np.exp(scatter * np.random.default_rng(seed).standard_normal(count))
+    return tuple(
+        EarlierTest(
+            START + timedelta(days=30 * number),
+            factor * modes[0][0],
+            modes[0][2],
+            modes=tuple((factor * f, zeta, stiffness, 0.0) for f, zeta, stiffness in modes),
+        )
+        for number, factor in enumerate(factors)
+    )
+
+
+def of(*modes: Values) -> list[Mode]:
+    return [Mode(*values) for values in modes]
+
+
+def moved(values: Values, ratio: float) -> Values:
+    return values[0] * ratio, *values[1:]
+
+
+@pytest.mark.parametrize("ratio", [1.07, 1.3, 0.88, 0.6])
+@pytest.mark.parametrize("count", [1, 6])
+def test_a_spindle_mode_elsewhere_is_asked_about_although_the_tool_is_the_same(ratio: float, count: int) -> None:
+    now = of(TOOL, moved(SPINDLE, ratio))
+    asked = find_series_questions(now[0], now, SeriesReference(months_of((TOOL, SPINDLE), count)))
+    assert [remark.code for remark in asked] == ["mode-jump"]
+
+
+@pytest.mark.parametrize("ratio", [1.04, 1 - MAX_MODE_FALL + 0.01])
+def test_warmth_and_wear_of_another_mode_ask_nothing(ratio: float) -> None:
+    assert check_other_modes(of(TOOL, moved(SPINDLE, ratio)), SeriesReference(months_of((TOOL, SPINDLE)))) is None
+
+
+@pytest.mark.parametrize("now", [[TOOL], [TOOL, (700.0, 0.02, 4e9)], [TOOL, SPINDLE, (1000.0, 0.02, 3e7)]])
+def test_a_mode_that_is_only_gone_weak_or_only_new_asks_nothing(now: list[Values]) -> None:
+    assert check_other_modes(of(*now), SeriesReference(months_of((TOOL, SPINDLE)))) is None
+
+
+def test_a_fall_of_all_modes_is_that_of_the_followed_one() -> None:
+    now = of(moved(TOOL, 0.87), moved(SPINDLE, 0.87))
+    assert find_series_questions(now[0], now, SeriesReference(months_of((TOOL, SPINDLE)))) == ()
+
+
+def test_a_mode_that_not_all_recent_tests_have_asks_nothing() -> None:
+    tests = (*months_of((TOOL,), 1), *months_of((TOOL, SPINDLE), 3))
+    assert check_other_modes(of(TOOL, moved(SPINDLE, 1.3)), SeriesReference(tests)) is None
+
+
+@given(seed=st.integers(0, 2**32 - 1), first=st.floats(-0.08, 0.08), second=st.floats(-0.08, 0.08))
+def test_exchanged_directions_are_asked_about_and_right_ones_are_not(seed: int, first: float, second: float) -> None:
+    other = (moved(TOOL, np.exp(first)), moved(SPINDLE, np.exp(second)))
+    x, y = (months_of(modes, 6, 0.003, seed) for modes in ((TOOL, SPINDLE), other))
+    right = SeriesReference(x, y, tuple(f for f, *_ in other))
+    wrong = SeriesReference(x, y, (TOOL[0], SPINDLE[0]))
+    assert check_exchanged_directions(of(TOOL, SPINDLE), right) is None
+    asked = check_exchanged_directions(of(*other), wrong)
+    if max(abs(first), abs(second)) > 0.003:
+        assert asked is not None
+    if max(abs(first), abs(second)) < 0.0005:
+        assert asked is None
+
+
+def test_directions_that_differ_otherwise_are_not_exchanged() -> None:
+    x, y = months_of((TOOL,)), months_of((moved(TOOL, 1.02),))
+    for ratio in (1.0, 1.01, 0.94):
+        assert check_exchanged_directions(of(moved(TOOL, ratio)), SeriesReference(x, y, (TOOL[0],))) is None
+    assert check_exchanged_directions(of(moved(TOOL, 1.02)), SeriesReference(x, y, (TOOL[0],))) is not None
+
+
+def damped(rise: float, factor: float = 1.0) -> list[Mode]:
+    """Return the modes with all decay rates times a factor and raised by a constant (1/s)."""
+    return [Mode(f, factor * zeta + rise / (2 * np.pi * f), stiffness) for f, zeta, stiffness in (TOOL, SPINDLE)]
+
+
+@pytest.mark.parametrize(("rise", "is_asked"), [(30.0, True), (1.0, False), (-30.0, False)])
+def test_a_constant_rise_of_all_decay_rates_is_an_unstated_window(rise: float, is_asked: bool) -> None:
+    asked = check_common_damping(damped(rise), SeriesReference(months_of((TOOL, SPINDLE))))
+    assert (asked is not None) == is_asked
+
+
+def test_damping_raised_by_a_share_or_in_one_mode_is_no_window() -> None:
+    reference = SeriesReference(months_of((TOOL, SPINDLE)))
+    assert check_common_damping(damped(0.0, factor=1.6), reference) is None
+    assert check_common_damping([damped(30.0)[0], Mode(*SPINDLE)], reference) is None
+    assert check_common_damping([Mode(*TOOL), damped(30.0)[1]], reference) is None
+
+
+def test_a_window_needs_three_tests_the_same_frequencies_and_two_modes() -> None:
+    few, enough = (SeriesReference(months_of((TOOL, SPINDLE), count)) for count in (2, 3))
+    assert check_common_damping(damped(30.0), few) is None
+    assert check_common_damping(damped(30.0), enough) is not None
+    assert check_common_damping(damped(30.0)[:1], enough) is None
+    shifted = [Mode(1.03 * mode.frequency, mode.damping_ratio, mode.stiffness) for mode in damped(30.0)]
+    assert check_common_damping(shifted, enough) is None
+
+
+def test_the_limit_follows_the_scatter_of_the_damping() -> None:
+    scatter = np.exp(0.3 * np.random.default_rng(1).standard_normal((12, 2)))
+    tests = [
+        test._replace(
+            modes=tuple((f, zeta * by, k, 0.0) for (f, zeta, k), by in zip((TOOL, SPINDLE), row, strict=True))
+        )
+        for test, row in zip(months_of((TOOL, SPINDLE), 12), scatter, strict=True)
+    ]
+    assert check_common_damping(damped(30.0), SeriesReference(tuple(tests))) is None

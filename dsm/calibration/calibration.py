@@ -34,7 +34,7 @@ class RemainingPreload(NamedTuple):
         return f"remaining preload: {low} to {high} % of the start (ball bearings assumed, {law})"
 
 
-def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPreload | None:
+def remaining_preload(bearings: Iterable[Bearing], *factors: float) -> RemainingPreload | None:
     """Estimate the remaining preload of ball bearings from their stiffness.
 
     The radial exponents follow from Jones's model without rotation (T. A. Harris and M. N. Kotzalas, Rolling Bearing
@@ -45,8 +45,8 @@ def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPr
     ----------
     bearings : iterable of Bearing
         Bearings.
-    factor : float
-        Radial stiffness over that at the start (-), > 0.
+    *factors : float
+        Radial stiffness over that at the start (-), > 0, or both ends of its interval.
 
     Returns
     -------
@@ -64,7 +64,8 @@ def remaining_preload(bearings: Iterable[Bearing], factor: float) -> RemainingPr
     kinds = {bearing.rolling_elements for bearing in bearings}
     if kinds != {"balls"}:
         return None
-    return RemainingPreload(*sorted(factor ** (1 / exponent) for exponent in PRELOAD_EXPONENTS))
+    left = [factor ** (1 / exponent) for factor in factors for exponent in PRELOAD_EXPONENTS]
+    return RemainingPreload(min(left), max(left))
 
 
 class UnreachableFrequencyError(ValueError):

@@ -15,8 +15,8 @@ from lobewatch.step_times import time_step
 def report(
     machine: Annotated[Path, FolderArgument(help="Machine folder, or a folder of machine folders.")],
     out: Annotated[Path | None, Option(help="HTML file. Default: report.html in the folder.")] = None,
-    tool: Annotated[str, Option(help="Tool of the series. Default: from the newest test.")] = "",
-    direction: Annotated[str, Option(help="Direction of the series: x or y. Default: from the newest test.")] = "",
+    tool: Annotated[str, Option(help="Tool of the series. Default: tool of the worst series.")] = "",
+    direction: Annotated[str, Option(help="Direction of the series: x or y. Default: that of the worst series.")] = "",
     now: Now = None,
     as_json: Json = False,
 ) -> None:

@@ -13,7 +13,7 @@ from lobewatch.show.terminal.output import Json, emit, results
 if TYPE_CHECKING:
     from lobewatch.fleet.fleet import Fleet
 
-DASHBOARD_ONLY_KEYS = ("drop_reasons", "points", "limits", "limit", "word", "why")
+DASHBOARD_ONLY_KEYS = ("points", "limits", "limit", "word", "change", "finding")
 """Keys that only the text and the dashboard show."""
 
 

@@ -10,11 +10,9 @@ from lobewatch.show.terminal.output import Json, emit, print_remarks, results
 
 def trend(
     machine: Machine,
-    tool: Annotated[
-        str | None, Option(help="Tool of the series. Default: tool with the largest frequency drop.")
-    ] = None,
+    tool: Annotated[str | None, Option(help="Tool of the series. Default: tool of the worst series.")] = None,
     direction: Annotated[
-        str | None, Option(help="Direction of the series: x or y. Default: direction of the larger drop.")
+        str | None, Option(help="Direction of the series: x or y. Default: direction of the worst series.")
     ] = None,
     as_csv: Annotated[bool, Option("--csv", help="CSV of the points on stdout.")] = False,
     now: Now = None,

@@ -27,7 +27,9 @@ CRC_HEAD_LENGTH = len('{"crc":"01234567",')
 """Bytes of the head of the file. Its checksum is that of the other fields as an object of their own."""
 
 
-class SeriesSummary(msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_std": "fall_std"}):
+class SeriesSummary(
+    msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_std": "fall_std", "drop_half_width": "fall_half_width"}
+):
     """Summary of one tool in one direction."""
 
     name: str
@@ -39,7 +41,7 @@ class SeriesSummary(msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_s
     drop: float | None
     """Frequency drop since the start of the series (%), or None."""
     drop_std: float | None
-    """Standard error of the drop (%), or None."""
+    """Standard error of the drop with reclamping (%), or None; 0 for the first test."""
     frequency: float | None
     """Natural frequency of the newest point (Hz), or None."""
     alarm: str = ""
@@ -50,6 +52,17 @@ class SeriesSummary(msgspec.Struct, frozen=True, rename={"drop": "fall", "drop_s
     """Scatter of the mean of both directions (%) and its degrees of freedom, for taps in the same clamping."""
     points: tuple[tuple[float, float], ...] = ()
     """Days since 1970 and frequency change from the start (%), thinned out."""
+    drop_half_width: float | None = None
+    """Half the width of the 95 % interval of the drop (%), or None; 0 for the first test."""
+    is_proven: bool = False
+    """True if the frequency has changed for certain."""
+
+    @property
+    def drop_interval(self) -> tuple[float, float] | None:
+        """Ends of the 95 % interval of the drop (%), or None."""
+        if self.drop is None or self.drop_half_width is None:
+            return None
+        return self.drop - self.drop_half_width, self.drop + self.drop_half_width
 
 
 class DatedStatus(NamedTuple):
@@ -114,7 +127,7 @@ class MachineSummary(
     limits: LimitForecasts = ()
     """Forecast of each frequency-drop limit of machine.toml, for the worst series."""
     series: tuple[SeriesSummary, ...] = ()
-    """Series, largest frequency drop first."""
+    """Series, that of the most severe reason first, then that of the largest frequency drop."""
 
     @cached_property
     def time(self) -> datetime | None:

@@ -171,21 +171,21 @@ def _collect_tap_times(logbook: Logbook) -> dict[str, datetime]:
 def _summarize_series(series: SeriesStatus) -> SeriesSummary:
     trend, drop, names = series.trend, series.drop, (series.name, series.tool, series.direction)
     value = drop.value if drop.is_known else None
-    std = drop.std if drop.is_known and math.isfinite(drop.std) else None
+    std, half_width = (part if math.isfinite(part) else None for part in (drop.std, drop.half_width))
     if trend is None:
-        return SeriesSummary(*names, value, std, None)
+        return SeriesSummary(*names, value, std, None, drop_half_width=half_width, is_proven=series.is_change_proven)
     frequency = trend.first_value * math.exp(trend.points[-1].percent / 100)
     alarm = trend.open_drop.change.kind if trend.open_drop is not None else ""
     scatter = series_points.estimate_scatter(trend.readings.y)
     common_scatter = series_points.estimate_scatter(trend.readings.mean_of_directions.y)
     points = tuple(_thin_out(trend))
-    return SeriesSummary(*names, value, std, frequency, alarm, scatter, common_scatter, points)
+    proven = series.is_change_proven
+    return SeriesSummary(*names, value, std, frequency, alarm, scatter, common_scatter, points, half_width, proven)
 
 
 def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:
     """Yield day and frequency change (%) of the points. Many points are averaged, but for the newest."""
-    percents = np.array([point.percent for point in trend.points])
-    points = np.column_stack([point_days(trend.points), percents - trend.start])
+    points = np.column_stack([point_days(trend.points), -trend.drops])
     if len(points) > MAX_SERIES_POINTS:
         size, larger = divmod(len(points) - 1, MAX_SERIES_POINTS - 1)
         begins = np.cumsum([0, *[size + 1] * larger, *[size] * (MAX_SERIES_POINTS - 1 - larger)])

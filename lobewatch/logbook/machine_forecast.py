@@ -31,7 +31,7 @@ class MachineForecast:
     """Forecast date of each frequency-drop limit of machine.toml (%), for the worst series."""
 
     def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStatus:
-        """Return the matching series with the largest frequency drop. DataError if there is none."""
+        """Return the worst matching series. DataError if there is none."""
         for series in self.status.series:
             if tool in (None, series.tool) and direction in (None, series.direction):
                 return series

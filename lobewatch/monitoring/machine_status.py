@@ -12,15 +12,18 @@ from pathlib import Path
 
 from acquisition import CROSS_TAP, Remark
 from acquisition.errors import join_sentences
+from dsm import format_with_error
 from lobewatch.history.history import History, HistoryRow
 from lobewatch.machine import LimitsTable, Machine
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
-from lobewatch.measurement.estimate import Estimate
 from lobewatch.measurement.recording_questions import question_remarks
 from lobewatch.measurement.tap_age import is_too_old, too_old_remark
 from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.alarm_estimate import ChangeKind, SeriesChange
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
+from lobewatch.monitoring.drop_text import format_below_start
+from lobewatch.monitoring.scatter_check import ScatterCheck
+from lobewatch.monitoring.series_drop import SeriesDrop
 from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import Alarm, StatusLevel, TriggeredAlarm, add_acknowledgements
@@ -35,28 +38,37 @@ RUN_IN_TEXT = " (dropped early, slower since: may be run-in)"
 """Text for a drop as by bearings that run in; it triggers an alarm like any other."""
 
 
-def _newest_remarks(name: str, newest: HistoryRow, drop: Estimate, limits: LimitsTable) -> Iterator[Remark]:
+def _newest_remarks(name: str, newest: HistoryRow, drop: SeriesDrop, limits: LimitsTable) -> Iterator[Remark]:
     """Remark on a newest test without the followed mode, and a frequency drop that has reached a limit."""
     if not newest.frequency.is_known and newest.direction != CROSS_TAP:
         yield rules.MODE_LOST.remark(name)
+    text = format_below_start(drop.value, drop.half_width)
     if drop.value >= limits.frequency_alarm_percent:
-        yield rules.FREQUENCY_ALARM.remark(name, drop=drop.value, limit=limits.frequency_alarm_percent)
+        yield rules.FREQUENCY_ALARM.remark(name, drop=text, limit=limits.frequency_alarm_percent)
     elif drop.value >= limits.frequency_warn_percent:
-        yield rules.FREQUENCY_WARNING.remark(name, drop=drop.value, limit=limits.frequency_warn_percent)
+        yield rules.FREQUENCY_WARNING.remark(name, drop=text, limit=limits.frequency_warn_percent)
 
 
-def _trend_remarks(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
+def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str = "MACHINE") -> Iterator[Remark]:
     """Remark on drops, doubtful drops and rises of the frequency; path: of the machine folder."""
+    text = format_below_start(drop.value, drop.half_width)
     folder = shlex.quote(str(path))
     event = rules.EVENT_CALL.format(folder=folder)
     if trend.open_drop is not None:
-        texts = _describe_change(trend.open_drop.change) | {"run_in": RUN_IN_TEXT if trend.is_run_in else ""}
-        yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, event=event, folder=folder, **texts)
+        texts = {"course": _describe_course(trend.open_drop.change), "run_in": RUN_IN_TEXT if trend.is_run_in else ""}
+        yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, drop=text, event=event, folder=folder, **texts)
     elif trend.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
-        rise = trend.detection.rise
-        yield rules.FREQUENCY_ROSE.remark(name, event=event, **_describe_change(rise._replace(size=-rise.size)))
+        yield rules.FREQUENCY_ROSE.remark(name, event=event, drop=text)
+
+
+def _scatter_remarks(name: str, check: ScatterCheck | None) -> Iterator[Remark]:
+    """Remark on scatter that is not independent."""
+    if check is not None and check.is_correlated:
+        yield rules.SCATTER_CORRELATED.remark(name, correlation=check.correlation, share=check.false_alarm_share)
+    if check is not None and check.group_distance:
+        yield rules.SCATTER_GROUPS.remark(name, distance=check.group_distance, share=check.false_alarm_share)
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -65,11 +77,14 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
         newest = series.values[value].find_newest_change()
         if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
             time, change = newest
-            yield rules.VALUE_CHANGED.remark(name, value=label, since=time, **_describe_change(change))
+            size = _describe_size(change)
+            yield rules.VALUE_CHANGED.remark(
+                name, value=label, since=time, course=_describe_course(change), change=size
+            )
 
 
-def _describe_change(change: SeriesChange) -> dict[str, str]:
-    """Describe trend and size of a change (%, with the half-width of its 95 % interval), logarithmic in the series."""
+def _describe_course(change: SeriesChange) -> str:
+    """Describe the kind of a change."""
     past, present = ("dropped", "dropping") if change.size > 0 else ("rose", "rising")
     courses: dict[ChangeKind, str] = {
         "step": f"{past} suddenly before",
@@ -77,9 +92,13 @@ def _describe_change(change: SeriesChange) -> dict[str, str]:
         "mixed": f"{past} suddenly and steadily since",
         "dropped": f"{past} since",
     }
+    return courses[change.kind]
+
+
+def _describe_size(change: SeriesChange) -> str:
+    """Describe the size of a change (%), logarithmic in the series, with its 95 % interval."""
     ratio = math.exp(-change.size / 100)
-    size = f"{100 * abs(1 - ratio):.2f} ±{change.half_width * ratio:.2f} % (95 % interval)"
-    return {"course": courses[change.kind], "change": size}
+    return f"{format_with_error(100 * abs(1 - ratio), change.half_width * ratio)} %"
 
 
 @dataclass(frozen=True)
@@ -94,7 +113,7 @@ class SeriesStatus:
     """Time of its newest test."""
     first_time: datetime
     """Time of the test it is compared with."""
-    drop: Estimate
+    drop: SeriesDrop
     """Drop of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
     """Points, changes and forecast; None without comparable tests."""
@@ -109,6 +128,12 @@ class SeriesStatus:
     def name(self) -> str:
         """Tool and direction."""
         return f"{self.tool}, {self.direction}"
+
+    @property
+    def is_change_proven(self) -> bool:
+        """True if the frequency has changed for certain: an open alarm, a rise, or a drop with the score of one."""
+        detected = self.trend is not None and (self.trend.open_drop or self.trend.detection.rise)
+        return self.drop.is_proven or bool(detected)
 
     @property
     def is_baseline(self) -> bool:
@@ -131,7 +156,7 @@ class MachineStatus:
     alarms: tuple[Alarm, ...] = ()
     """Open alarms, in order of severity."""
     series: tuple[SeriesStatus, ...] = ()
-    """Series, the largest drop first."""
+    """Series, that of the most severe remark first, then that of the largest drop."""
     last_tap: datetime | None = None
     """Time of the newest tap test; None if there is none."""
     days_left: float | None = None
@@ -190,6 +215,7 @@ def assess_status(
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.interval_days
+    series.sort(key=_severity_of_series)
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
@@ -200,7 +226,6 @@ def assess_status(
     remarks += [*programs, *rules.date_remarks(newest.tap_id, newest.time, interval, now, path)]
     remarks += _old_program_remarks(history, machine, now)
     remarks += _direction_remarks(rows)
-    series.sort(key=lambda standing: -standing.drop.value if standing.drop.is_known else math.inf)
     left = rules.count_days_left(newest.time, interval, now)
     alarms = [alarm.build_alarm(acknowledgements, history.baseline) for alarm in raised]
     status = _build_status(now, remarks, rules.next_tap_step(newest.time, interval), alarms)
@@ -230,13 +255,21 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
     of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
-    of_watch = [*_trend_remarks(name, trend, path)] if trend else []
+    of_watch = [*_trend_remarks(name, trend, drop, path)] if trend else []
     remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
+    remarks += _scatter_remarks(name, trend.scatter_check) if trend else []
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
     pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
     raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]
     times = newest.time, first.time
     return SeriesStatus(newest.tool, newest.direction, *times, drop, trend, tuple(remarks), tuple(raised), series)
+
+
+def _severity_of_series(series: SeriesStatus) -> tuple[int, float]:
+    """Return the place of a series in the status: by its most severe remark, then by its drop."""
+    codes = [remark.code for remark in series.remarks if rules.STATUS_BY_CODE[remark.code] is not StatusLevel.GOOD]
+    places = map([*rules.STATUS_BY_CODE].index, codes)
+    return min(places, default=len(rules.STATUS_BY_CODE)), -series.drop.value if series.drop.is_known else math.inf
 
 
 def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[Remark]:

@@ -74,4 +74,4 @@ def fit_confirmed_past(days: Floats, readings: Readings) -> PastFit | None:
     drops = detect_changes(readings).open_drops
     if drops and (is_expected or drops[-1].triggered_at == days.size - 1):
         return fit_past(days, readings)
-    return earlier._replace(dates=days, fitted=np.append(earlier.fitted, near.mean_line[-1]))
+    return earlier._replace(dates=days, fitted=np.append(earlier.fitted, near.quantile_line(0.5)[-1]))

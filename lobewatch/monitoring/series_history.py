@@ -4,12 +4,13 @@ Made once for a status and handed on with it. What is worked out of it lasts as 
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from itertools import chain, compress
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from lobewatch.machine import Machine
 from lobewatch.measurement.estimate import UNKNOWN_ESTIMATE, Estimate
 from lobewatch.monitoring.alarm_estimate import SeriesChange
 from lobewatch.monitoring.change_detection import find_newest_change
+from lobewatch.monitoring.series_drop import NO_DROP, UNKNOWN_DROP, SeriesDrop
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, SeriesScatterPrior
 from lobewatch.monitoring.trend import TapValue, Trend, fit_trend, list_newest_points
 
@@ -60,11 +62,14 @@ class ValueHistory:
 
     @property
     def tap_values(self) -> list[TapValue]:
-        """Reference rows as points of a trend.
+        """Reference rows as points of a trend."""
+        return self._make_tap_values(*self.trend_values)
+
+    def _make_tap_values(self, rows: Sequence[HistoryRow], numbers: Floats) -> list[TapValue]:
+        """Make points of rows with their numbers (n, 2).
 
         Temperature and operator count for the frequency only: their effect on other values is unknown.
         """
-        rows, numbers = self.trend_values
         errors = np.where(np.isfinite(numbers[:, 1]), 100 * numbers[:, 1] / numbers[:, 0], math.nan).tolist()
         under, times = [row.conditions for row in rows], [row.time for row in rows]
         hours = [_or_nan(conditions.hours) for conditions in under]
@@ -76,31 +81,64 @@ class ValueHistory:
         return [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures, hours, operators, reclamped)]
 
     @cached_property
+    def first_row(self) -> HistoryRow | None:
+        """First row with the value, without questions if there is one; None without any."""
+        return next(iter(self.reference_rows or self.known_rows), None)
+
+    @cached_property
     def start(self) -> Estimate:
         """Value at the start of the series, from its first tests together; UNKNOWN if there is none.
 
         From 8 points on its error is the scatter from tap test to tap test.
         """
-        if not self.known_rows:
+        if self.first_row is None:
             return UNKNOWN_ESTIMATE
-        first: Estimate = getattr((self.reference_rows or self.known_rows)[0], self.name)
+        first: Estimate = getattr(self.first_row, self.name)
         trend = self.trend
         if trend is None or (trend.past_fit is None and self.name != "frequency"):
             return first
         value = trend.first_value * math.exp(trend.start / 100)
         return Estimate(value, first.std if trend.past_fit is None else value * trend.spread / 100)
 
+    @cached_property
+    def _reference_trend(self) -> Trend | None:
+        """Trend, or that of the first row alone if all rows have questions; None without a positive value."""
+        if self.trend is not None or self.first_row is None:
+            return self.trend
+        taps = self._make_tap_values([self.first_row], np.array([getattr(self.first_row, self.name)]))
+        return fit_trend(taps, taps[0].time, known=self.scatter_prior) if taps[0].value > 0 else None
+
     @property
     def change(self) -> Estimate:
-        """Change (%) from the start to the last row; unknown if that has no value."""
-        return self.change_at(self.rows[-1])
+        """Change (%) from the start to the last row, the drop with the other sign; unknown if that has no value."""
+        drop = self.drop_at(self.rows[-1])
+        return Estimate(-drop.value + 0.0, drop.std)
 
-    def change_at(self, row: HistoryRow) -> Estimate:
-        """Return the change (%) from the start to a row; unknown if the row has no value."""
-        value: Estimate = getattr(row, self.name)
-        if not value.is_known:
-            return UNKNOWN_ESTIMATE
-        return Estimate(0.0, 0.0) if self.start == value else value.change_since(self.start)
+    def drop_at(self, row: HistoryRow) -> SeriesDrop:
+        """Return the drop (%) from the start to a row; unknown if the row has no value.
+
+        The interval of a value other than the frequency is unknown below 8 points, as its usual scatter is.
+        """
+        percent, trend = self.percent_below_start(row), self._reference_trend
+        if trend is None or math.isnan(percent):
+            return UNKNOWN_DROP
+        if row is self.first_row:
+            return NO_DROP
+        if trend.past_fit is None and self.name != "frequency":
+            return SeriesDrop(percent)
+        (tap,) = self._make_tap_values([row], np.array([getattr(row, self.name)]))
+        return trend.drop_model.drop_at(percent, tap.temperature, tap.operator, tap.error)
+
+    def percent_below_start(self, row: HistoryRow) -> float:
+        """Return the drop (%) of a row without its interval; NaN if the row has no value."""
+        trend, number = self._reference_trend, float(getattr(row, self.name).value)
+        if trend is None or not number > 0:
+            return math.nan
+        if trend.past_fit is None and self.name != "frequency":
+            return 100 * (1 - number / self.start.value)
+        (tap,) = self._make_tap_values([row], np.array([getattr(row, self.name)]))
+        percent = 100 * math.log(number / trend.first_value)
+        return trend.drop_model.percent_below_start(percent, tap.temperature, tap.operator)
 
     def find_newest_change(self) -> tuple[datetime, SeriesChange] | None:
         """Find the change that the newest points are sure of, and its time, or None."""
@@ -133,19 +171,24 @@ class SeriesHistory:
         return self.values["frequency"]
 
     @property
-    def drop(self) -> Estimate:
-        """Frequency drop (%) to the newest test, or to an earlier larger one if the newest has questions."""
-        newest = [rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows]
-        change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN_ESTIMATE)
-        return Estimate(-change.value + 0.0, change.std)
+    def drop(self) -> SeriesDrop:
+        """Frequency drop (%) to the newest test, or to an earlier larger one if the newest has questions.
+
+        The one number of a drop, which all texts, tables and figures show.
+        """
+        newest = {
+            rows[-1].tap_id: rows[-1] for rows in (self.frequency.known_rows, self.frequency.reference_rows) if rows
+        }
+        return max(map(self.frequency.drop_at, newest.values()), key=lambda drop: drop.value, default=UNKNOWN_DROP)
 
     def first_below(self, percent: float) -> HistoryRow | None:
         """Find the first of the newest tap tests that all show a drop of this much (%), or None."""
         first = None
         for row in reversed(self.frequency.known_rows):
-            if -self.frequency.change_at(row).value < percent and (first is not None or not row.questions):
+            is_below = self.frequency.percent_below_start(row) >= percent
+            if not is_below and (first is not None or not row.questions):
                 break
-            first = row if -self.frequency.change_at(row).value >= percent else first
+            first = row if is_below else first
         return first
 
     @property
@@ -182,27 +225,68 @@ def _build_value_histories(rows: tuple[HistoryRow, ...]) -> dict[str, ValueHisto
     return {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED_VALUES)}
 
 
-def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
-    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.preload_left.
+class BearingChange(NamedTuple):
+    """Bearing stiffness at the start and now, by the model and the drop of the frequency (N/m)."""
 
-    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it
-    open, or where one of the calibrated bearings has rollers.
+    start: float
+    """Stiffness at the frequency of the start."""
+    newest: float
+    """Stiffness now."""
+    low: float
+    """Lower end of the 95 % interval of the stiffness now, with reclamping and the uncertainty of the start."""
+    high: float
+    """Upper end."""
+
+    @property
+    def percent(self) -> float:
+        """Change since the start (%)."""
+        return 100 * (self.newest / self.start - 1)
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the 95 % interval of the change (%)."""
+        return 50 * (self.high - self.low) / self.start
+
+
+def compare_bearings(series: SeriesHistory, machine: Machine) -> BearingChange | None:
+    """Compare the bearing stiffness with that at the start, by the drop of the frequency.
+
+    None where no two tests gave a bearing stiffness, or not the newest, or where one of the frequencies leaves it
+    open or belongs to another model.
     """
-    stiffness = series.values["bearing_stiffness"]
-    change = stiffness.change
-    if machine.spindle is None or not change.is_known or len(stiffness.reference_rows) < 2:
+    stiffness, drop = series.values["bearing_stiffness"], series.drop
+    if machine.spindle is None or drop.interval is None or len(stiffness.reference_rows) < 2:
         return None
-    if any(_is_preload_open(row, machine) for row in (stiffness.reference_rows[0], series.rows[-1])):
+    if not series.rows[-1].bearing_stiffness.is_known:
+        return None
+    start, drops = series.frequency.start.value, (0.0, drop.value, *reversed(drop.interval))
+    found = [_calibrate_bearings(series.rows[-1].tool, start * (1 - percent / 100), machine) for percent in drops]
+    values = [value for value in found if value is not None]
+    return BearingChange(*values) if len(values) == len(found) else None
+
+
+def _calibrate_bearings(tool: str, frequency: float, machine: Machine) -> float | None:
+    """Return the bearing stiffness at a frequency; None if that leaves it open or belongs to another model."""
+    try:
+        found = calibrate(machine.model(tool), frequency, None, machine.mode.model_mode)
+    except (ValueError, ArithmeticError):
+        return None
+    return None if found.is_open else found.bearing_stiffness
+
+
+MAX_PRELOAD_RATIO = 2.0
+"""Largest upper end of a stated preload over its lower end; chosen."""
+
+
+def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
+    """Estimate the preload left in the bearings from the change of their stiffness; see dsm.remaining_preload.
+
+    None without that change, where one of the calibrated bearings has rollers, or where the range is too wide to say
+    anything.
+    """
+    change = compare_bearings(series, machine)
+    if machine.spindle is None or change is None:
         return None
     calibrated = [bearing for bearing in machine.spindle.build().bearings if bearing.group]
-    return remaining_preload(calibrated, 1 + change.value / 100)
-
-
-def _is_preload_open(row: HistoryRow, machine: Machine) -> bool:
-    """Return whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
-    frequency, std = row.frequency
-    try:
-        model = machine.model(row.tool)
-        return calibrate(model, frequency, std if math.isfinite(std) else None, machine.mode.model_mode).is_open
-    except (ValueError, ArithmeticError):
-        return True
+    left = remaining_preload(calibrated, change.low / change.start, change.high / change.start)
+    return None if left is None or left.high > MAX_PRELOAD_RATIO * left.low else left

@@ -135,14 +135,14 @@ class StatusRule(NamedTuple):
 FREQUENCY_ALARM = StatusRule(
     "frequency-alarm",
     ALARM,
-    "frequency dropped {drop:.1f} % since the first tests (alarm at {limit:g} %)",
+    "frequency {drop} (alarm at {limit:g} %)",
     "Stop. Inspect bearings, tool and clamping, then repeat the tap test.",
     is_limit=True,
 )
 FREQUENCY_DECAY = StatusRule(
     "decay",
     ALARM,
-    "frequency {course} {since:%Y-%m-%d}, by {change}{run_in}",
+    "frequency {course} {since:%Y-%m-%d}, now {drop}{run_in}",
     "Inspect bearings, tool and clamping. Then run {event} after a repair, "
     "or operator_entries.acknowledge_alarms {folder} if the cause is known.",
 )
@@ -160,7 +160,7 @@ NEVER_TAPPED = StatusRule(
 FREQUENCY_WARNING = StatusRule(
     "frequency-warn",
     WARN,
-    "frequency dropped {drop:.1f} % since the first tests (warning at {limit:g} %)",
+    "frequency {drop} (warning at {limit:g} %)",
     "Repeat the tap test. If the second test confirms the drop, inspect bearings and clamping soon.",
     is_limit=True,
 )
@@ -187,12 +187,26 @@ PROGRAM_DOUBTFUL = StatusRule(
     "Run Logbook.verdicts for the cause of this verdict and for safe values",
 )
 FREQUENCY_ROSE = StatusRule(
-    "frequency-rose", GOOD, "frequency rose by {change} (assembly changed?)", "Run {event} if the assembly was changed"
+    "frequency-rose", GOOD, "frequency rose, now {drop} (assembly changed?)", "Run {event} if the assembly was changed"
 )
 VALUE_CHANGED = StatusRule(
     "value-changed",
     GOOD,
     "{value} {course} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
+)
+SCATTER_CORRELATED = StatusRule(
+    "scatter-correlated",
+    GOOD,
+    "scatter of f1 repeats from test to test (correlation {correlation:.2f}), so {share:.0%} of healthy spindles have "
+    "a false alarm in 24 tests",
+    "Reclamp the tool for every test, and record operator and temperature",
+)
+SCATTER_GROUPS = StatusRule(
+    "scatter-groups",
+    GOOD,
+    "f1 scatters in two groups {distance:.2g} % apart, as of two operators or two ways of clamping. {share:.0%} of "
+    "healthy spindles have a false alarm in 24 tests",
+    "Record the operator of every test",
 )
 ONE_DIRECTION = StatusRule(
     "one-direction",
@@ -233,7 +247,8 @@ STATUS_RULES = (
         TOO_OLD_CODE,
     ),
     *_rules_of("chain-not-checked"),
-    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED, ONE_DIRECTION),
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED),
+    *(SCATTER_CORRELATED, SCATTER_GROUPS, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""
 STATUS_BY_CODE = {rule.code: rule.status for rule in STATUS_RULES}

@@ -16,6 +16,8 @@ from lobewatch.monitoring.change_detection import DetectedDrop, Detection, detec
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit, Rate
 from lobewatch.monitoring.level_model import build_level_model
 from lobewatch.monitoring.newest_point import fit_confirmed_past, measure_newest_distance
+from lobewatch.monitoring.scatter_check import ScatterCheck, check_scatter
+from lobewatch.monitoring.series_drop import DropModel, model_drop
 from lobewatch.monitoring.series_points import (
     MAX_OUTLIER_DISTANCE,
     NO_SERIES_PRIOR,
@@ -36,8 +38,6 @@ FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
 """Longest forecast after the last point (days); chosen."""
 MAX_RUN_IN_RATE = 0.4
 """Present rate of a drop over its mean rate, below which it has slowed down; chosen."""
-N_START_POINTS = 3
-"""Number of first points that define the start of a series without a fitted line; chosen."""
 
 
 class TapValue(NamedTuple):
@@ -124,16 +124,27 @@ class Trend:
         shape = self.forecast.likeliest
         return shape._replace(start=float(np.interp(shape.start, self.past_fit.dates, point_days(self.points))))
 
+    @cached_property
+    def drop_model(self) -> DropModel:
+        """Start and scatter of the series, by which each value becomes a drop."""
+        return model_drop(self.readings, np.array([point.error for point in self.points]), self.past_fit)
+
     @property
     def start(self) -> float:
-        """Start (%): the highest of the fitted line at the first 8 points, else of the first three points.
+        """Start (%): the highest of the fitted line at the first 8 points, else of the first three points."""
+        return self.drop_model.start
 
-        A first test clamped badly must not hide a drop for ever, and a mean of the first ones would hide that of a
-        spindle that drops from the beginning.
-        """
-        if self.past_fit is not None:
-            return float(self.past_fit.fitted[:MIN_FORECAST_POINTS].max())
-        return max(point.percent for point in self.points[:N_START_POINTS])
+    @cached_property
+    def drops(self) -> Floats:
+        """Drop of each point since the start (%), at the mean conditions, shape (n,)."""
+        model = self.drop_model
+        return np.array([model.percent_below_start(it.percent, it.temperature, it.operator) for it in self.points])
+
+    @cached_property
+    def scatter_check(self) -> ScatterCheck | None:
+        """Check of the scatter for independence; None below 20 points."""
+        has_changed = bool(self.detection.drops) or self.detection.rise is not None
+        return check_scatter(100 * np.log1p(-self.drops / 100), self.past_fit, has_changed=has_changed)
 
     @property
     def is_stale(self) -> bool:

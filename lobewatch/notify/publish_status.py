@@ -174,6 +174,8 @@ def make_message_content(machine: FleetMachine) -> dict[str, Any]:
         "next_step": current.next_step,
         "fall_percent": worst.drop if worst else None,
         "fall_percent_std": worst.drop_std if worst else None,
+        "fall_percent_interval": worst.drop_interval if worst else None,
+        "is_change_proven": worst.is_proven if worst else None,
         "series": worst.name if worst else None,
         "frequency_hz": worst.frequency if worst else None,
         "next_limit": build_limit_row(find_next_limit(summary.limits)),

@@ -8,11 +8,12 @@ import numpy as np
 
 from acquisition import Remark
 from acquisition.errors import join_sentences
-from dsm import RemainingPreload, format_with_error
+from dsm import RemainingPreload
 from lobewatch.arrays import Floats, Indices
 from lobewatch.logbook.machine_forecast import MachineForecast
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
+from lobewatch.monitoring.drop_text import describe_drop, format_change
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
@@ -28,6 +29,8 @@ FORECAST_ASSUMPTIONS = (
 """Note below every table of forecast dates."""
 TREND_CODES = ("frequency-alarm", "frequency-warn", "decay", "program-not-stable", "program-doubtful")
 """Codes of remarks that the trend of a machine with forecast dates contains."""
+INTERVAL_NOTE = "± is the 95 % interval, which contains reclamping"
+"""Note on the interval of a drop."""
 CHART_WIDTH, CHART_HEIGHT = 60, 12
 """Size of the plot area (characters)."""
 
@@ -47,6 +50,9 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
         "light": status.status,
         "fall_percent": series.drop.value,
         "fall_std_percent": series.drop.std,
+        "fall_interval_percent": series.drop.interval,
+        "is_change_proven": series.is_change_proven,
+        "scatter": trend and _scatter_json(trend),
         "preload_left": preload,
         "rate_percent_per_month": rate and rate._asdict(),
         "forecast": build_forecast_rows(outlook.programs, outlook.limits),
@@ -55,7 +61,17 @@ def trend_json(outlook: MachineForecast, series: SeriesStatus, preload: Remainin
 
 def _drop_json(trend: Trend) -> JsonObject | None:
     drop, since = trend.open_drop, trend.drop_since
-    return drop and {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
+    if drop is None:
+        return None
+    return {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
+
+
+def _scatter_json(trend: Trend) -> JsonObject:
+    """Return the scatter of a point (%), and whether it is independent from point to point."""
+    check = trend.scatter_check
+    checked = check and {**check._asdict(), "is_independent": check.is_independent}
+    shares = check and {"false_alarm_share_in_24_points": check.false_alarm_share}
+    return {"percent": trend.drop_model.scatter.percent, **(checked or {}), **(shares or {})}
 
 
 def trend_csv(series: SeriesStatus) -> str:
@@ -132,13 +148,12 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
     if trend.forecast is None:
         known = trend.readings.scatter_prior.single
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
-        fits = ["± is the standard error of the fits, without the scatter from reclamping"] if n > 1 else []
-        return [change, *fits, f"alarms are possible from {least}"]
+        return [change, *([INTERVAL_NOTE] if n > 1 else []), f"alarms are possible from {least}"]
     score = f"from {MIN_MONITORED_POINTS} points on"
     if math.isfinite(trend.detection.scores[-1]):
         score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more in two clampings)"
-    course = ", ".join(filter(None, (trend_text(trend), rate_text(trend))))
-    return [change, course, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
+    course = ", ".join(filter(None, (trend_text(series), rate_text(trend))))
+    return [change, INTERVAL_NOTE, course, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
 
 
 def rate_text(trend: Trend) -> str:
@@ -153,27 +168,36 @@ def rate_text(trend: Trend) -> str:
 
 
 def change_since_start_text(series: SeriesStatus) -> str:
-    """Return the frequency change since the series started."""
-    if series.is_baseline:
-        return "first test, no comparison yet"
-    return f"frequency {change_text(series)} since the first tests" if series.drop.is_known else "unknown"
+    """Return the frequency change since the series started, as a finding."""
+    return describe_drop(series.drop.value, series.drop.half_width, is_proven=series.is_change_proven)
 
 
 def change_text(series: SeriesStatus) -> str:
-    """Return the frequency change since the series started, with its standard error."""
-    fall = series.drop
-    return f"{format_with_error(-fall.value, fall.std)} %" if fall.is_known else "unknown"
+    """Return the frequency change since the series started, with its 95 % interval."""
+    drop = series.drop
+    return format_change(drop.value, drop.half_width) if drop.is_known else "unknown"
 
 
-def trend_text(trend: Trend) -> str:
-    """Return the date from which the frequency drops, or else the best shape; empty below 8 points."""
-    fallen, since = trend.open_drop, trend.drop_since
-    if fallen is not None and since is not None:
-        course = f"{'dropped at once before' if fallen.change.kind == 'step' else 'dropping since'} {since:%Y-%m-%d}"
-        return f"{course}, slower now (run-in)" if trend.is_run_in else course
-    if trend.likeliest_shape is None or trend.forecast is None:
+def trend_text(series: SeriesStatus) -> str:
+    """Return kind and date of a change that is proven; empty below 8 points."""
+    trend = series.trend
+    if trend is None or trend.likeliest_shape is None or trend.forecast is None:
         return ""
+    if not series.is_change_proven:
+        return "no change proven"
+    if trend.open_drop is not None:
+        return _alarm_course_text(trend)
     return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
+
+
+def _alarm_course_text(trend: Trend) -> str:
+    """Return kind and date of the drop of an alarm."""
+    fallen, since = trend.open_drop, trend.drop_since
+    if fallen is None or since is None:
+        return ""
+    words = {"step": "dropped at once before", "slope": "dropping since", "mixed": "dropped at once and steadily since"}
+    course = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
+    return f"{course}, slower now (run-in)" if trend.is_run_in else course
 
 
 def _shape_text(shape: TrendShape, falls: bool) -> str:
@@ -225,12 +249,13 @@ def _day_or_now(days: float, today: float) -> str:
 def chart_lines(trend: Trend) -> list[str]:
     """Return a chart of characters: points and fitted line (%) over the dates, a drop downwards."""
     dates, rows = point_days(trend.points), CHART_HEIGHT
-    percent = np.array([point.percent for point in trend.points]) - trend.start
+    percent = -trend.drops
     low, high = float(percent.min()), float(percent.max())
     low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
     canvas = np.full((rows, CHART_WIDTH), " ")
     if trend.forecast is not None:
-        line = np.interp(np.linspace(dates[0], dates[-1], CHART_WIDTH), dates, trend.forecast.fitted - trend.start)
+        fitted = 100 * np.expm1((trend.forecast.fitted - trend.start) / 100)
+        line = np.interp(np.linspace(dates[0], dates[-1], CHART_WIDTH), dates, fitted)
         canvas[_canvas_indices(np.clip(line, low, high), high, low, rows), np.arange(CHART_WIDTH)] = "."
     columns = _canvas_indices(dates, dates[0], dates[-1], CHART_WIDTH)
     canvas[_canvas_indices(percent, high, low, rows), columns] = "o"

@@ -8,13 +8,14 @@ from functools import partial
 import acquisition
 from acquisition import CROSS_TAP, Circumstances, Conditions, DataError, Device, DeviceError, Remark, TapTest
 from acquisition.errors import PERMISSION_ERRNOS, format_os_error, join_sentences
-from dsm import format_with_error
+from dsm import format_rounded
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.measurement import Measurement
 from lobewatch.measurement.recording_questions import check_question_codes, find_device_questions, find_open_questions
 from lobewatch.monitoring import SeriesStatus
+from lobewatch.monitoring.drop_text import describe_drop
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE
 from lobewatch.tap.device_connection import DeviceOpener
 from lobewatch.tap.hit_loop import TapPhases, TapStopped
@@ -267,18 +268,18 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
 def _format_values(measurement: Measurement, series: SeriesStatus | None) -> list[str]:
     if (mode := measurement.followed) is None:
         return []
-    f_std, zeta_std, k_std = mode.standard_error.tolist()
+    f_std, zeta_std, k_std = mode.standard_error.tolist()  # for the digits: they do not contain reclamping
     against = "first test of this tool and direction"
     if find_open_questions(measurement.remarks):
         against = "but the test has an open question"
     elif series is not None and not series.is_baseline:
-        sign = "+" if series.drop.value < 0 else ""
-        against = f"{sign}{format_with_error(-series.drop.value, series.drop.std)} % compared with the first test"
-    damping = format_with_error(mode.damping_ratio, zeta_std, 0.01)
-    stiffness = f"Stiffness {format_with_error(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
+        drop = series.drop
+        against = describe_drop(drop.value, drop.half_width, is_proven=series.is_change_proven)
+    damping = format_rounded(mode.damping_ratio, zeta_std, 0.01)
+    stiffness = f"Stiffness {format_rounded(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:
         stiffness = f"Damping {damping} %. Stiffness is unknown because no force was measured."
-    return [f"Frequency {format_with_error(mode.frequency, f_std)} Hz, {against}.", stiffness]
+    return [f"Frequency {format_rounded(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
 def plan_session(

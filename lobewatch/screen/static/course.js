@@ -3,7 +3,7 @@ const WIDTH = 120;
 const HEIGHT = 36;
 const EDGE = 3;
 
-export function drawCourse(svg, { points, limits, fall }) {
+export function drawCourse(svg, { points, limits, fall, change }) {
   if (!points.length) return;
   const limit = -(limits.find((one) => fall === null || fall < one) ?? limits.at(-1));
   const low = Math.min(limit, ...points.map(([, percent]) => percent));
@@ -21,5 +21,5 @@ export function drawCourse(svg, { points, limits, fall }) {
   const line = at.length > 1 ? at.join("L") : `${WIDTH / 2 - EDGE} ${y(points[0][1])}h${2 * EDGE}`;
   part("path", { d: `M${line}` });
   svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `frequency change ${points.at(-1)[1].toFixed(2)} % since the first tests, limit ${limit} %`);
+  svg.setAttribute("aria-label", `frequency change since the first tests: ${change}, limit ${limit} %`);
 }

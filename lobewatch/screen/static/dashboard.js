@@ -19,19 +19,14 @@ function fail(text) {
   at("error").hidden = !text;
 }
 
-function fallText({ fall, fall_std: std, series }) {
-  if (fall === null) return series;
-  if (std === 0) return `${series}: first test, no comparison yet`;
-  const digits = std === null ? 2 : Math.min(Math.max(1 - Math.floor(Math.log10(std)), 1), 4);
-  const error = std === null ? "" : ` ± ${std.toFixed(digits)}`;
-  return `${series}: frequency ${fall >= 0 ? "drop" : "rise"} ${Math.abs(fall).toFixed(digits)}${error} % since the first tests`;
+function fallText({ series, finding }) {
+  return series && `${series}: ${finding}`;
 }
 
 // The frequency change with a bar whose end is the last limit, so that 0.15 % looks different from 10 %.
-function showSize(place, { fall, fall_std: std, limits }) {
-  if (fall === null || std === 0) return;
-  const change = -Math.round(100 * fall) / 100 + 0; // + 0: no -0
-  place.textContent = `${change > 0 ? "+" : ""}${change.toFixed(2)} %`;
+function showSize(place, { fall, change, limits }) {
+  if (!change.endsWith("%")) return;
+  place.textContent = `${change.split(" ")[0]} %`; // its interval is in the text below
   place.style.setProperty("--share", Math.min(Math.max(fall / limits.at(-1), 0), 1.25));
   place.title = `frequency change since the first tests (alarm at -${limits.at(-1)} %)`;
 }
@@ -87,7 +82,7 @@ function row(machine) {
   part("light").textContent = machine.word;
   showSize(part("size"), machine);
   part("name").textContent = machine.name;
-  part("reason").textContent = unbroken(machine.why || fallText(machine));
+  part("reason").textContent = unbroken(machine.note || fallText(machine));
   part("fall").textContent = unbroken(fallText(machine));
   part("note").textContent = unbroken(machine.note);
   part("next").textContent = unbroken(machine.next_step);

@@ -86,6 +86,8 @@ class ValueTrend(NamedTuple):
     """Limits of its drop; None without limits."""
     curve: TrendCurve | None = None
     """Fitted line and forecast; None without one."""
+    start: float | None = None
+    """Start of the series, in the unit shown; None for the first value."""
 
     @property
     def drawn_excluded(self) -> list[tuple[datetime, float]]:
@@ -146,7 +148,7 @@ def plot_frf(
 def plot_trend(trend: ValueTrend) -> Figure:
     """Plot a value over time with its 95 % interval, and the limits of its drop if given.
 
-    The limits are in % of the first value of the curve, or else of the first value.
+    The limits are in % of the start of the series.
     """
     figure, (axes,) = new_axes(1, (FIGURE_WIDTH, TREND_HEIGHT))
     curve, days = trend.curve, date2num([time for time, _ in trend.estimates])
@@ -156,7 +158,7 @@ def plot_trend(trend: ValueTrend) -> Figure:
         warn, alarm = trend.limits.frequency_warn_percent, trend.limits.frequency_alarm_percent
         style: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "bottom"}
         for percent, colour, dashes in ((warn, Paint.FIRST, "--"), (alarm, Paint.ALARM, "-")):
-            level = (values[0] if curve is None else curve.line[0]) * (1 - percent / 100)
+            level = (values[0] if trend.start is None else trend.start) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
             axes.annotate(f"-{percent:g} %", (1, level), color=colour, **style)
     if curve is not None:

@@ -9,15 +9,17 @@ from acquisition import merge_remarks
 from acquisition.errors import join_sentences
 from dsm import format_with_error
 from lobewatch.fleet.fleet import FleetMachine
+from lobewatch.fleet.machine_summary import SeriesSummary
 from lobewatch.measurement.tap_age import tap_age_days
 from lobewatch.monitoring import threshold_dates
+from lobewatch.monitoring.drop_text import describe_drop, format_change
 from lobewatch.monitoring.threshold_dates import ThresholdDates, date_of_days
 from lobewatch.show.terminal.output import JsonObject, align_columns, count_noun, format_csv, make_printable
 from lobewatch.show.terminal.sentences import wrap_lines
 from lobewatch.show.terminal.status_labels import status_label, status_name
 
-SEPARATE_REASON_CODES = ("frequency-alarm", "frequency-warn", "overdue")
-"""Codes of reasons that have columns of their own."""
+SEPARATE_REASON_CODE = "overdue"
+"""Code of the reason that has a column of its own."""
 MAX_SHOWN_REASONS = 4
 """Largest number of reasons below the line of a machine."""
 
@@ -28,11 +30,11 @@ def fleet_rows(machines: Sequence[FleetMachine]) -> list[JsonObject]:
 
 
 def fleet_row(machine: FleetMachine) -> JsonObject:
-    """Return the row of one machine, with the series of the largest frequency drop."""
+    """Return the row of one machine, with its worst series."""
     summary, dated = machine.summary, machine.current
-    ahead, worst = threshold_dates.find_next_limit(summary.limits), next(iter(summary.series), None)
+    ahead = threshold_dates.find_next_limit(summary.limits)
     remarks = merge_remarks(dated.remarks)
-    reasons = [remark.finding for remark in remarks if remark.code not in SEPARATE_REASON_CODES]
+    reasons = [remark.finding for remark in remarks if remark.code != SEPARATE_REASON_CODE]
     return {
         "key": machine.key,
         "name": summary.name,
@@ -40,16 +42,12 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "is_early": dated.is_early,
         "word": status_label(dated.status, dated.is_early),
         "can_be_judged": dated.is_readable,
-        "fall": worst.drop if worst else None,
-        "fall_std": worst.drop_std if worst else None,
-        "series": worst.name if worst else "",
+        **_drop_columns(next(iter(summary.series), None)),
         "last_tap": summary.last_tap,
         "days_left": dated.days_left,
         "tap_age_days": None if summary.time is None else int(tap_age_days(summary.time, dated.time)),
         "reasons": reasons,
-        "drop_reasons": [remark.finding for remark in remarks if remark.code in SEPARATE_REASON_CODES[:2]],
         "note": join_sentences(*reasons),
-        "why": join_sentences(*(remark.finding for remark in remarks if remark.code != "overdue")),
         "next_step": dated.next_step,
         "alarms": [alarm.to_row(dated.time) for alarm in summary.alarms],
         "next_limit": threshold_dates.build_limit_row(ahead),
@@ -57,9 +55,31 @@ def fleet_row(machine: FleetMachine) -> JsonObject:
         "forecast": threshold_dates.build_forecast_rows(summary.forecasts, summary.limits),
         "has_port": summary.has_port,
         "programs": summary.programs_at(dated.time),
-        "points": worst.points if worst else (),
         "limits": [percent for percent, _ in summary.limits],
     }
+
+
+def _drop_columns(worst: SeriesSummary | None) -> JsonObject:
+    """Return the drop of the worst series as columns of a row."""
+    worst = worst or SeriesSummary("", "", "", None, None, None)
+    interval, finding = worst.drop_interval, describe_drop(worst.drop, worst.drop_half_width, is_proven=worst.is_proven)
+    columns: JsonObject = {"fall": worst.drop, "fall_std": worst.drop_std, "fall_interval": interval}
+    columns |= {"is_change_proven": worst.is_proven, "series": worst.name, "points": worst.points}
+    return columns | {"change": change_cell(columns), "finding": finding}
+
+
+def half_width_of(row: Mapping[str, Any]) -> float | None:
+    """Return half the width of the 95 % interval of the drop of a row (%); None if unknown."""
+    low, high = row["fall_interval"] or (None, None)
+    return None if low is None else (high - low) / 2
+
+
+def change_cell(row: Mapping[str, Any]) -> str:
+    """Return the frequency change of a row in a table."""
+    if row["fall"] is None:
+        return ""
+    half_width = half_width_of(row)
+    return "first test" if half_width == 0 else format_change(row["fall"], half_width)
 
 
 def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:
@@ -101,8 +121,8 @@ def due_text(days_left: float) -> str:
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     light = f"{'early ' if row['is_early'] else ''}{status_name(row['light'])}"
-    drop = "" if row["fall"] is None else format_with_error(row["fall"], row["fall_std"])
-    drop = "first test" if row["fall_std"] == 0 else drop
+    change = change_cell(row)
+    drop = format_with_error(row["fall"], half_width_of(row)) if change.endswith("%") else change
     due, left = "", row["days_left"]
     if left is not None:
         last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"
@@ -113,7 +133,7 @@ def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 def _machine_notes(row: Mapping[str, Any]) -> list[str]:
     """Return the name of a machine if the folder has another, the next step, and the reasons."""
     named = [f"Name: {row['name']}"] if row["name"] != row["key"] else []
-    reasons = row["drop_reasons"] + row["reasons"]
+    reasons = row["reasons"]
     shown, further = reasons[:MAX_SHOWN_REASONS], len(reasons) - MAX_SHOWN_REASONS
     more = [f"{count_noun(further, 'more reason')} (see the report)"] if further > 0 else []
     return wrap_lines([*named, f"Next: {row['next_step']}", *shown, *more])

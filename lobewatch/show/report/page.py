@@ -13,6 +13,7 @@ from markupsafe import Markup, escape
 
 from acquisition import DataError, atomic_write
 from acquisition.errors import PERMISSION_ERRNOS, join_sentences
+from lobewatch.monitoring.drop_text import format_change
 from lobewatch.show.terminal.option_names import with_option_names
 
 
@@ -87,8 +88,11 @@ class Gauge(NamedTuple):
     """Position of the alarm limit."""
 
 
-def make_gauge(drop: float, warn: float, alarm: float) -> Gauge:
-    """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty."""
+def make_gauge(drop: float, warn: float, alarm: float, half_width: float | None = None) -> Gauge:
+    """Return the gauge of a frequency drop and its limits (%); a rise leaves it empty.
+
+    half_width: half the width of the 95 % interval of the drop (%); None if unknown.
+    """
     scale = GAUGE_WIDTH / (1.25 * alarm)
-    text = f"f1 change {-drop:+z.2f} %, warning at -{warn:g} %, alarm at -{alarm:g} %"
+    text = f"f1 change {format_change(drop, half_width)}, warning at -{warn:g} %, alarm at -{alarm:g} %"
     return Gauge(text, min(max(drop, 0.0) * scale, GAUGE_WIDTH), warn * scale, alarm * scale)

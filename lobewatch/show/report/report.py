@@ -6,10 +6,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from dsm import format_with_error
 from lobewatch.logbook import Analysis, Logbook
 from lobewatch.monitoring.status_rules import StatusLevel
-from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, due_text
+from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, change_cell, due_text, half_width_of
 from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import ReportData, collect_report_data
 from lobewatch.show.report.section import NumberTable
@@ -22,12 +21,14 @@ from lobewatch.verdicts import Stability
 def write_report(
     logbook: Logbook, path: Path | None = None, tool: str = "", direction: str = "", sections: SectionMakers = SECTIONS
 ) -> Path:
-    """Write the report of one series, by default that of the newest test; DataError without a tap test.
+    """Write the report of one series, by default that of the most severe reason; DataError without a tap test.
 
     path None: report.html in the machine folder. sections: makers of the sections below the first screen, in order.
     """
-    newest = logbook.newest_tap()
-    html = render_report(logbook, tool or newest.tool, direction or newest.direction, sections=sections)
+    newest, series = logbook.newest_tap(), logbook.status().series
+    fits = [one for one in series if tool in ("", one.tool) and direction in ("", one.direction)]
+    shown = fits[0] if fits else newest
+    html = render_report(logbook, tool or shown.tool, direction or shown.direction, sections=sections)
     path = path or logbook.folder.path / "report.html"
     write_page(path, html)
     return path
@@ -55,14 +56,13 @@ def _report_content(
 
 def make_summary(data: ReportData) -> dict[str, Any]:
     """Return the status, next step and reasons for the template."""
-    status, limits = data.outlook.status, data.machine.limits
-    worst, level = status.series[0], (status.status, status.is_early)
-    has_changed = worst.drop.is_known and not worst.is_baseline
+    status, limits, series = data.outlook.status, data.machine.limits, data.series
+    level, has_changed = (status.status, status.is_early), series.drop.is_known and not series.is_baseline
     levels = limits.frequency_warn_percent, limits.frequency_alarm_percent
     return {
         "label": status_label(*level),
         "kind": status_css_class(*level),
-        "gauge": make_gauge(worst.drop.value, *levels) if has_changed else None,
+        "gauge": make_gauge(series.drop.value, *levels, series.drop.half_width) if has_changed else None,
         "next_step": status.next_step,
         "reasons": data.reasons[0],
         "has_notes": bool(data.reasons[1]),
@@ -100,15 +100,16 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
 
 def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine for the template."""
-    left, last, drop, std = row["days_left"], row["last_tap"], row["fall"], row["fall_std"]
+    left, last, change = row["days_left"], row["last_tap"], change_cell(row)
     due = "never tapped" if left is None else due_text(left)
-    is_good, has_changed = row["light"] is StatusLevel.GOOD, drop is not None and std != 0
+    warn, alarm = row["limits"][:2] or (math.nan, math.nan)
+    is_good, has_changed = row["light"] is StatusLevel.GOOD, change.endswith("%")
     return {
         **row,
         "kind": status_css_class(row["light"], row["is_early"]),
-        "reasons": row["reasons"] or [row["why"] or ("no finding" if is_good else "-")],
-        "change": f"{format_with_error(-drop, std)} %" if has_changed else "first test",
-        "gauge": make_gauge(drop, *row["limits"]) if has_changed else None,
+        "reasons": row["reasons"] or ["no finding" if is_good else "-"],
+        "change": change or "first test",
+        "gauge": make_gauge(row["fall"], warn, alarm, half_width_of(row)) if has_changed else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
         "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,

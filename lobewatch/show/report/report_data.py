@@ -17,7 +17,7 @@ from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import Machine
-from lobewatch.measurement import Measurement
+from lobewatch.measurement import Estimate, Measurement
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from lobewatch.monitoring.trend import DAYS_PER_MONTH, Trend, days_since_epoch
@@ -90,11 +90,12 @@ class ReportData:
         return [it.finding for it in shown], [it.finding for it in others if it not in shown]
 
     def _pick_reasons(self) -> tuple[list[Remark], list[Remark]]:
-        """Return the most severe reason, of the series with the largest drop, and those that no table shows."""
+        """Return the most severe reason, of the series of the figures if it has it, and those that no table shows."""
         status = self.outlook.status
-        plain, order = set(status.reasons), {series.name: place for place, series in enumerate(status.series)}
+        order = [self.series.name, *(series.name for series in status.series)]
         alike = [remark for remark in status.remarks if remark.code == status.remarks[0].code]
-        first = merge_remarks(sorted(alike, key=lambda remark: order.get(remark.about, 0)))[:1]
+        alike.sort(key=lambda remark: order.index(remark.about) if remark.about in order else 0)
+        first, plain = merge_remarks(alike)[:1], set(status.reasons)
         other = [remark for remark in status.remarks if remark.code not in TABLE_REASON_CODES or remark not in plain]
         return first, [remark for remark in merge_remarks(other) if remark not in first]
 
@@ -164,7 +165,7 @@ def collect_report_data(analysis: Analysis, tool: str, direction: str, now: date
 MIN_TAPS_FOR_VALUE = 2
 """Smallest number of tap tests in a trend."""
 SHOWN_VALUES = (
-    SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Error bars: 95 % interval of one tap test."),
+    SeriesValue("frequency", "Natural frequency", "Hz", 1.0, "Error bars: 95 % interval with reclamping."),
     SeriesValue(
         "bearing_stiffness",
         "Bearing stiffness",
@@ -185,10 +186,13 @@ def make_value_trend(data: ReportData, value: SeriesValue) -> ValueTrend | None:
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
     events = [(event.time, event.text) for event in data.analysis.files.contents.events if event.time >= since]
     aside = [(row.time, getattr(row, value.field).value / value.scale) for row in data.excluded_rows]
-    is_followed, trend = value.field == "frequency", data.series.trend
-    limits = data.machine.limits if is_followed else None
-    course = make_trend_curve(trend) if trend is not None and is_followed else None
-    return ValueTrend(value, estimates, aside, events, limits, course)
+    trend = data.series.trend if value.field == "frequency" else None
+    if trend is None:
+        return ValueTrend(value, [(time, Estimate(it.value)) for time, it in estimates], aside, events)
+    stds = [trend.drop_model.std(100 * it.std / it.value) / 100 * it.value for _, it in estimates]
+    bars = [(time, Estimate(it.value, std)) for (time, it), std in zip(estimates, stds, strict=True)]
+    start = data.series.history.frequency.start.value / value.scale
+    return ValueTrend(value, bars, aside, events, data.machine.limits, make_trend_curve(trend), start)
 
 
 def make_lobe_diagram(data: ReportData) -> LobeDiagram | None:

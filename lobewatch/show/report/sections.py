@@ -10,22 +10,22 @@ from typing import Any
 import numpy as np
 
 from acquisition import merge_remarks
-from dsm import format_with_error
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
-from lobewatch.monitoring.series_history import SeriesHistory, estimate_preload
 from lobewatch.monitoring.status_rules import Alarm, is_early_alarm, sort_by_severity, worst_status
 from lobewatch.monitoring.threshold_dates import date_of_days
+from lobewatch.monitoring.trend import Trend
 from lobewatch.show import trend as trends
 from lobewatch.show.figures.lobe_figures import plot_lobes
 from lobewatch.show.figures.trend_figures import ValueTrend, plot_frf, plot_trend
 from lobewatch.show.history import condition_texts, cut_result_text
 from lobewatch.show.programs import verdicts
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, format_rpm, frequency_margin_text
+from lobewatch.show.report.measured_changes import make_values
 from lobewatch.show.report.report_data import SHOWN_VALUES, ReportData, compute_lobe_history, make_value_trend
 from lobewatch.show.report.section import (
     BulletList,
@@ -78,7 +78,7 @@ def _series_row(series: SeriesStatus, alarm: float) -> list[str | TableCell]:
         TableCell(status_label(*status), status_css_class(*status)),
         "\N{NO-BREAK SPACE}→ ".join(f"{value:.1f}" for value in values) or "-",
         "first test" if series.is_baseline else trends.change_text(series),
-        (trend and trends.trend_text(trend)) or f"since {series.first_time:%Y-%m-%d}",
+        trends.trend_text(series) or f"since {series.first_time:%Y-%m-%d}",
         (trend and trends.rate_text(trend)) or f"needs {MIN_FORECAST_POINTS} tests",
         _margin_text(alarm - drop.value) if drop.is_known else "-",
         f"{trend.spread:.2f} %" if trend is not None and is_fitted else "-",
@@ -227,50 +227,6 @@ def make_notes(data: ReportData) -> list[Section]:
     return [Section("Notes", [BulletList([*dict.fromkeys(lines)])])] if lines else []
 
 
-CHANGE_VALUES = (
-    ("damping_ratio", "damping ratio zeta (%)", 0.01),
-    ("stiffness", "stiffness K (N/µm)", 1e6),
-    ("bearing_stiffness", "bearing stiffness k_b (N/µm)", 1e6),
-)
-"""Field of a row, its name in the table, and the size of its unit."""
-MODEL_CHANGE_VALUES = (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal"))
-"""Field of a row from the model, and its name in the table."""
-
-
-def make_values(data: ReportData) -> list[Section]:
-    """Make the table of the other values: at the start, newest, and their change; only values for a single test."""
-    history = data.series.history
-    rows = [*_measured_changes(history), *_model_changes(history)]
-    if not rows:
-        return []
-    heads = ["value", f"start ({data.rows[0].time:%Y-%m-%d})", f"newest ({data.last.time:%Y-%m-%d})", "change"]
-    text = f"± is the standard error of one test. ± at the start is the scatter of {MIN_FORECAST_POINTS} or more tests."
-    if data.series.is_baseline:
-        heads, rows = ["value", heads[2]], [[name, now] for name, _, now, _ in rows]
-        text = "± is the standard error of one tap test."
-    preload = estimate_preload(history, data.machine)
-    left = "" if preload is None else f"{str(preload)[:1].upper()}{str(preload)[1:]}."
-    parts = DataTable(heads, rows), Paragraph(text, is_small=True), Paragraph(left)
-    return [Section("Measured values", parts, "folded")]
-
-
-def _measured_changes(history: SeriesHistory) -> Iterator[list[str]]:
-    for name, label, scale in CHANGE_VALUES:
-        values = history.values[name]
-        if values.change.is_known:
-            newest = getattr(values.known_rows[-1], name)
-            now, start = (format_with_error(estimate.value, estimate.std, scale) for estimate in (newest, values.start))
-            yield [label, start, now, f"{values.change.value:+z.2f} %"]
-
-
-def _model_changes(history: SeriesHistory) -> Iterator[list[str]]:
-    for name, label in MODEL_CHANGE_VALUES:
-        values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
-        if values and np.isfinite(getattr(history.rows[-1], name)):
-            start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
-            yield [f"{label} tip stiffness, model (N/µm)", start, now, f"{100 * (values[-1] / values[0] - 1):+z.2f} %"]
-
-
 def make_modes(data: ReportData) -> list[Section]:
     """Make the table of the modes of the newest test."""
     heads, rows = ["natural frequency", "damping ratio (%)", "stiffness (N/µm)", "remark"], list[list[str]]()
@@ -344,16 +300,24 @@ NOT_DETECTED = (
     "Preload changes by heat and speed while the spindle rotates",
     "Damage since the newest tap test",
 )
-ALARM_CONFIDENCE = (
-    "two clampings in a row with a score that scatter reaches once in 2000. "
-    "False alarms: 5 of 100 healthy series within 60 clampings"
-)
-"""Confidence of the alarm, measured (docs/decay.md)."""
+ALARM_RULE = "two clampings in a row with a score that scatter reaches once in 2000"
+"""Rule of the alarm."""
+INDEPENDENT_CONFIDENCE = "False alarms: 5 of 100 healthy series within 60 clampings"
+"""Confidence of the alarm with independent scatter, measured (docs/decay.md)."""
+
+
+def _alarm_confidence(trend: Trend | None) -> str:
+    """Return rule and confidence of the alarm."""
+    if trend is None or len(trend.points) < MIN_MONITORED_POINTS:
+        return f"needs {MIN_MONITORED_POINTS} clampings"
+    check = trend.scatter_check
+    if check is None or not check.is_correlated:
+        return f"{ALARM_RULE}. {INDEPENDENT_CONFIDENCE}"
+    return f"{ALARM_RULE}. False alarms: {100 * check.false_alarm_share:.0f} of 100 series within 24 clampings"
 
 
 def make_sign_off(data: ReportData) -> list[Section]:
     """Make the last section: measurement chain, confidence, open alarms, and room for a signature."""
-    points = 0 if data.series.trend is None else len(data.series.trend.points)
     tap, circumstances = data.newest, data.newest.circumstances
     hits = f"{len(tap.accepted)} of {len(tap.hits)} averaged" if tap.hits else "unknown"
     hits += f" (by hand: {format_decisions(tap.decisions)})" if tap.decisions else ""
@@ -369,7 +333,7 @@ def make_sign_off(data: ReportData) -> list[Section]:
         *sensor_rows(tap.hits[0].channels or () if tap.hits else (), data.assembly.chain_checks),
         ("cutting coefficients", "machine.toml"),
         ("monitored failure", FAILURE_MODE),
-        ("alarm", ALARM_CONFIDENCE if points >= MIN_MONITORED_POINTS else f"needs {MIN_MONITORED_POINTS} clampings"),
+        ("alarm", _alarm_confidence(data.series.trend)),
         ("forecast dates", "80 % intervals for unchanged use of the machine"),
         *(("open alarm", _alarm_text(alarm)) for alarm in data.outlook.status.alarms),
         ("name, date, signature", ""),

@@ -253,12 +253,21 @@ def preload_in_trend(shop: Shop) -> list[float] | None:
     return found
 
 
+def tap_a_step(shop: Shop) -> list[str]:
+    """Drop by 2 % after six of twelve tests that scatter by 0.05 %."""
+    shares = np.repeat([1.0, 0.98], 6) + np.tile([5e-4, -5e-4], 6)
+    return [shop.tap(30 * i, 1713.0 * share) for i, share in enumerate(shares.tolist())]
+
+
 def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
-    for days, share in ((0, 1.0), (30, 0.98)):
-        shop.tap(days, 1713.0 * share)
-    model = shop.folder.machine.model("reference")
-    new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
-    left = [(worn / new) ** (1 / exponent) for exponent in (0.27, 0.32)]
+    """The range is that of both laws at both ends of the interval of the drop."""
+    tap_a_step(shop)
+    model, drop = shop.folder.machine.model("reference"), shop.logbook.status().series[0]
+    start = drop.history.frequency.start.value
+    ends = [start * (1 - percent / 100) for percent in (0.0, *(drop.drop.interval or ()))]
+    new, high, low = (calibrate(model, frequency).bearing_stiffness for frequency in ends)
+    left = [(low / new) ** (1 / 0.27), (high / new) ** (1 / 0.32)]
+    assert left[0] < 0.6 < 0.66 < left[1] < 2 * left[0]
     assert preload_in_trend(shop) == pytest.approx(left, rel=1e-3)
     percent = f"{100 * left[0]:.2g} to {100 * left[1]:.2g} %"
     assert percent in " ".join(run("trend", shop.path).stdout.split())
@@ -274,7 +283,7 @@ def printed_of(shop: Shop, tap_id: str) -> str:
 
 def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop) -> None:
     shop.edit("bearing_stiffness_n_per_um = 1280", "bearing_stiffness_n_per_um = 800")
-    first, *_, last = (shop.tap(days, 1713.0 * share) for days, share in ((0, 1.0), (15, 0.99), (30, 0.98)))
+    first, *_, last = tap_a_step(shop)
     assert "preload" not in printed_of(shop, first)
     low, high = preload_in_trend(shop) or (math.nan, math.nan)
     assert high < 1
@@ -282,6 +291,13 @@ def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop
     logbook = shop.logbook
     assert measurement_json(logbook.measurement(last), logbook)["preload_left"] == pytest.approx([low, high])
     assert measurement_json(logbook.measurement(first), logbook)["preload_left"] is None
+
+
+def test_nothing_is_reported_of_preload_where_the_scatter_is_unknown(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    newest = shop.tap(30, 1713.0 * 0.98)
+    assert preload_in_trend(shop) is None
+    assert "preload" not in printed_of(shop, newest)
 
 
 def test_nothing_is_reported_of_preload_where_the_bearings_are_not_felt(shop: Shop) -> None:

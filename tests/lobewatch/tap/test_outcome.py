@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -75,20 +76,26 @@ def test_the_status_follows_the_fall_of_the_frequency(folder: MachineFolder) -> 
     lights = [tapped(folder, 30 * month, 1720 * share).status for month, share in enumerate((0.96, 0.94, 0.89), 1)]
     assert lights == ["good", "warn", "alarm"]
     worn = tapped(folder, 120, 0.88 * 1720)
-    assert "-12 %" in worn.texts[0]
+    assert "-12.0 ± " in worn.texts[0]
     assert worn.next_step == FREQUENCY_ALARM.remedy
 
 
 def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFolder) -> None:
-    """Check 0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
+    """Check 0.1 % each, in addition to reclamping: 0.96 sqrt(2) 0.1 % = 0.14 %."""
     tapped(folder, 0, 1720.0)
     tapped(folder, 30, 0.96 * 1720)
     first, last = Logbook(folder).history.rows
-    first = replace(first, frequency=Estimate(first.frequency.value, 1.72))
-    last = replace(last, frequency=Estimate(last.frequency.value, 0.96 * 1.72))
-    change = build_series_history([first, last]).frequency.change
-    assert change.value == pytest.approx(-4.0, abs=0.01)
-    assert change.std == pytest.approx(0.136, abs=0.001)
+    exact, scattered = (
+        build_series_history(
+            [
+                replace(row, frequency=Estimate(row.frequency.value, share * row.frequency.value))
+                for row in (first, last)
+            ]
+        ).frequency.change
+        for share in (0.0, 0.001)
+    )
+    assert scattered.value == pytest.approx(-4.0, abs=0.01)
+    assert math.sqrt(scattered.std**2 - exact.std**2) == pytest.approx(0.136, abs=0.001)
 
 
 def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: MachineFolder) -> None:
@@ -97,7 +104,7 @@ def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: Ma
     assert tapped(folder, 60, 0.88 * 1720).status == "alarm"
     other = tapped(folder, 60.1, 1700.0, "y")
     assert other.status == "alarm"
-    assert any("reference, x" in text and "12.0 %" in text for text in other.texts)
+    assert any("reference, x" in text and "12.0 ± " in text for text in other.texts)
     assert other.next_step == FREQUENCY_ALARM.remedy
 
 

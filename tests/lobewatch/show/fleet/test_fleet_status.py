@@ -43,12 +43,12 @@ def test_the_next_step_comes_before_a_short_list_of_reasons(shop: Shop) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fall", "std", "shown"), [(10.0642, 0.0803, "10.064 ± 0.080"), (0.0012, 0.00081, "0.00120 ± 0.00081")]
+    ("fall", "half", "shown"), [(10.0642, 0.0803, "10.064 ± 0.080"), (0.0012, 0.00081, "0.00120 ± 0.00081")]
 )
-def test_a_change_has_the_digits_that_its_error_leaves(shop: Shop, fall: float, std: float, shown: str) -> None:
+def test_a_change_has_the_digits_that_its_interval_leaves(shop: Shop, fall: float, half: float, shown: str) -> None:
     shop.tap(0, 1713.0)
     (row,) = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start))
-    rows = [{**row, "fall": fall, "fall_std": std}]
+    rows = [{**row, "fall": fall, "fall_interval": (fall - half, fall + half)}]
     assert f" {shown} " in fleet_text(rows)
     page = render_fleet(rows, "plant", shop.start)
     assert f"-{shown} %" in page.replace("\u00a0", " ").replace("\u2060", "")

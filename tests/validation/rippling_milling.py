@@ -76,7 +76,9 @@ class RipplingCut:
         return np.asarray((self.kind == "corner") & (np.mod(time, 0.8) > 0.8 - 1 / 6))
 
 
-def draw_cuts(seed: int, count: int, chatters: bool, seconds: tuple[float, float] = (1.5, 4.0)) -> Iterator[RipplingCut]:
+def draw_cuts(
+    seed: int, count: int, chatters: bool, seconds: tuple[float, float] = (1.5, 4.0)
+) -> Iterator[RipplingCut]:
     """Draw cuts of 1 to 6 teeth at 3000 to 24 000 rpm; depths over the limit: at most 0.8, or at least 1.25."""
     random = np.random.default_rng(seed)
     while count:
@@ -203,7 +205,12 @@ def _step_all(
         swing *= flight * (1 + pole * (step[:, n, np.newaxis, np.newaxis] - even))
         tip = swing.imag.sum(axis=-1)
         rigid = feed * normal[0, at]
-        chip = rigid + runout[:, number] * (normal[0, at] ** 2 + normal[1, at] ** 2) + tip @ normal[:, at] - surface[:, :, at]
+        chip = (
+            rigid
+            + runout[:, number] * (normal[0, at] ** 2 + normal[1, at] ** 2)
+            + tip @ normal[:, at]
+            - surface[:, :, at]
+        )
         np.maximum(chip, 0.0, out=chip)
         surface[:, :, at] += chip - rigid
         force = np.where(wide[:, n, np.newaxis, np.newaxis], forces[1][..., at], forces[0][..., at])

@@ -71,6 +71,8 @@ class CutEvaluation(NamedTuple):
     """Speed far from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
     tone: float = np.nan
     """Frequency of an unexplained tone (Hz); NaN unless that is the reason."""
+    comb_teeth: int = 0
+    """Number of teeth by the harmonics; 0 unless it contradicts the stated one."""
     axis: int = 0
     """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
@@ -252,6 +254,8 @@ def _evaluate_peaks(
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return sound._replace(verdict="cannot tell", reason="slow-sampling")
+    if other := classification.find_other_teeth(peaks.comb, speed, teeth):
+        return sound._replace(verdict="cannot tell", reason="teeth-contradicted", comb_teeth=other)
     if not len(peaks.unexplained):
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth

@@ -24,11 +24,11 @@ def evaluate_windows(
 ) -> "CutEvaluation":
     """Evaluate all windows of a cut, the last one first, as its speed is known then; axes: of the recording."""
     places, heard, n_searches = windowing.place_windows(parts, rate), list["CutEvaluation"](), 0
-    for number, place in reversed(list(enumerate(places))):
+    for place in reversed(places):
         if known.speed is None and n_searches == MAX_SPEED_SEARCHES:
             break
         n_searches += known.speed is None
-        sound = evaluate(place, known._replace(is_begun=number > 0))
+        sound = evaluate(place, known._replace(is_begun=len(places) > 1))
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)

@@ -118,20 +118,18 @@ def evaluate_cut(
     >>> heard.verdict, round(heard.speed_rpm)
     ('stable', 6000)
     """
-    spectra = spectral.compute_spectra(cut, sample_rate)
+    spectra: Spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
-    quiet = known.air or spectral.compute_spectra(air, sample_rate)
+    quiet: Spectra = known.air or spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    follows = known.speed is not None and not is_measured
-    speed = spindle_speed.follow_speed(spectra, quiet, known.speed) if follows else None
-    if speed is None:
-        speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    followed = known.speed and not is_measured and spindle_speed.follow_speed(spectra, quiet, known.speed)
+    asked = teeth, commanded_rpm / 60, measured_rpm if is_measured else None
+    speed = followed or _find_speed(spectra, quiet, *asked)
     if isinstance(speed, CutEvaluation):
         return speed
-    even = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
-    cut, spectra, quiet, speed, ripple = even
-    axes = zip(cut, np.atleast_2d(air), spectra, quiet, strict=True)
+    even, spectra, quiet, speed, ripple = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
+    axes = zip(even, np.atleast_2d(air), spectra, quiet, strict=True)
     about = speed, teeth, immersion, known
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)

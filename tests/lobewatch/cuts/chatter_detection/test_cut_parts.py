@@ -77,8 +77,13 @@ def test_a_part_in_a_later_recording_is_shifted(early: CutEvaluation) -> None:
 
 
 def swing(rate: float, depth: float, sharp: bool = False) -> Any:
-    wave = (lambda t: np.sign(np.sin(2 * np.pi * rate * t))) if sharp else (lambda t: np.sin(2 * np.pi * rate * t))
-    return lambda t: 1 + depth * wave(t)
+    """Loudness that swings by `depth` (relative) at a rate (Hz), as a sine or a square wave."""
+
+    def loudness(time: Floats) -> Floats:
+        wave = np.sin(2 * np.pi * rate * time)
+        return np.asarray(1 + depth * (np.sign(wave) if sharp else wave))
+
+    return loudness
 
 
 @pytest.mark.parametrize(("rate", "depth", "sharp"), [(8.3, 0.1, False), (4.0, 0.4, False), (24.0, 0.3, False),

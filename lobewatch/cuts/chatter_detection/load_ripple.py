@@ -74,7 +74,7 @@ def follow_multiples(axes: Floats, spectra: Spectra, turn: float) -> Envelopes:
 
 def _find_carriers(spectrum: Spectrum, turn: float) -> Floats:
     """Find the loudest multiples of a turn (Hz) that are clear of the noise, above the first."""
-    multiples = turn * np.arange(2, int(spectrum.sample_rate / 2 / turn))
+    multiples = turn * np.arange(2, int(spectrum.sample_rate / 2 / turn), dtype=np.float64)
     power = spectrum.max_power_near(multiples, 2 * spectral.PEAK_TOLERANCE)
     clear = power > MIN_CARRIER_CLEARNESS * np.interp(multiples, spectrum.frequency, spectrum.noise)
     loudest = np.argsort(-np.where(clear, power, 0.0))[:N_CARRIERS]

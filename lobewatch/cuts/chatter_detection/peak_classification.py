@@ -149,7 +149,8 @@ def find_other_teeth(comb: SpectralPeaks, turning: SpindleSpeed, teeth: int) -> 
     A multiple of the stated number needs gaps between its harmonics, a divisor of it looks like run-out.
     """
     order, power = np.round(comb.frequency / turning.frequency).astype(np.int64), comb.amplitude**2
-    total, by_order = float(np.sum(power)), np.bincount(order, power) if power.size else np.zeros(1)
+    by_order = np.bincount(order, power).astype(np.float64) if power.size else np.zeros(1)
+    total = float(np.sum(power))
     is_stated = np.sum(by_order[::teeth]) > MAX_STATED_TEETH_SHARE * total
     for other in (n for n in range(MAX_TEETH, 1, -1) if teeth % n):
         first = by_order[other : MIN_TOOTH_HARMONICS * other + 1 : other]

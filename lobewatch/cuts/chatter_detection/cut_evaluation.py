@@ -355,7 +355,8 @@ def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation
         return _evaluate_window(recording, of_window, known)
 
     known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest)
-    return evaluate_windows(evaluate, axes, parts, rate, known)
+    worst: CutEvaluation = evaluate_windows(evaluate, axes, parts, rate, known)
+    return worst
 
 
 def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:

@@ -199,25 +199,21 @@ def _step_all(
     swing = np.zeros((2, count, 2, 2), dtype=complex)
     record = np.empty((step.shape[1], 2, count, 2), dtype=np.float32)
     behind = (np.arange(teeth) * steps) // teeth
-    number = np.arange(teeth)
+    knocked = [int(max(cut.first, RAMP) / pace) for cut, pace in zip(cuts, even[:, 0, 0], strict=True)]
     for n in range(step.shape[1]):
+        swing[1, [n == knock for knock in knocked]] += 1j * KNOCK
         at = (n - behind) % steps
         swing *= flight * (1 + pole * (step[:, n, np.newaxis, np.newaxis] - even))
         tip = swing.imag.sum(axis=-1)
         rigid = feed * normal[0, at]
-        chip = (
-            rigid
-            + runout[:, number] * (normal[0, at] ** 2 + normal[1, at] ** 2)
-            + tip @ normal[:, at]
-            - surface[:, :, at]
-        )
+        chip = rigid + runout + tip @ normal[:, at] - surface[:, :, at]
         np.maximum(chip, 0.0, out=chip)
         surface[:, :, at] += chip - rigid
         force = np.where(wide[:, n, np.newaxis, np.newaxis], forces[1][..., at], forces[0][..., at])
         pushed = np.einsum("cae,kce->kca", force, chip) * depth[:, n, np.newaxis]
         swing += (pushed * step[:, n, np.newaxis])[..., np.newaxis] * gain
         record[n] = (pole**2 * swing).imag.sum(axis=-1)
-    return record[:, 0], record[:, 1]
+    return np.asarray(record[:, 0], dtype=np.float64), np.asarray(record[:, 1], dtype=np.float64)
 
 
 def _end(cut: RipplingCut, path: Floats, other: Floats, time: Floats, even: float) -> Milled:
@@ -225,7 +221,7 @@ def _end(cut: RipplingCut, path: Floats, other: Floats, time: Floats, even: floa
     begin, end = cut.first, min(cut.seconds - RAMP, cut.last)
     inside = (time > begin + 0.6 * (end - begin)) & (time < end)
     apart = (path - other)[inside].astype(np.float64)
-    distance = float(np.std(apart) / max(np.std(path[inside]), 1e-12))
+    distance = float(np.std(apart)) / max(float(np.std(path[inside])), 1e-12)
     chatters = True if distance > APART else False if distance < TOGETHER else None
     size = apart.shape[0]
     power = np.sum(np.abs(np.fft.rfft(apart * np.blackman(size)[:, np.newaxis], axis=0)) ** 2, axis=1)

@@ -72,6 +72,8 @@ class CutEvaluation(NamedTuple):
     """Speed far from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
     tone: float = np.nan
     """Frequency of an unexplained tone (Hz); NaN unless that is the reason."""
+    comb_teeth: int = 0
+    """Number of teeth by the harmonics; 0 unless it contradicts the stated one."""
     axis: int = 0
     """Index of the axis that the verdict rests on."""
     measured_rpm: float | None = None
@@ -117,21 +119,19 @@ def evaluate_cut(
     >>> heard.verdict, round(heard.speed_rpm)
     ('stable', 6000)
     """
-    spectra = spectral.compute_spectra(cut, sample_rate)
+    spectra: Spectra = spectral.compute_spectra(cut, sample_rate)
     if not air.shape[-1]:
         return _evaluate_without_air(spectra, teeth, commanded_rpm / 60)._replace(reason="no-air")
-    quiet = known.air or spectral.compute_spectra(air, sample_rate)
+    quiet: Spectra = known.air or spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
-    follows = known.speed is not None and not is_measured
-    speed = spindle_speed.follow_speed(spectra, quiet, known.speed) if follows else None
-    if speed is None:
-        speed = _find_speed(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    followed = known.speed and not is_measured and spindle_speed.follow_speed(spectra, quiet, known.speed)
+    asked = teeth, commanded_rpm / 60, measured_rpm if is_measured else None
+    speed = followed or _find_speed(spectra, quiet, *asked)
     if isinstance(speed, CutEvaluation):
         return speed
-    even = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
-    cut, spectra, quiet, speed, ripple = even
+    even, spectra, quiet, speed, ripple = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
-    axes = zip(cut, gaps, spectra, quiet, strict=True)
+    axes = zip(even, gaps, spectra, quiet, strict=True)
     about = speed, teeth, immersion, known
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
     sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)
@@ -263,6 +263,8 @@ def _evaluate_peaks(
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return sound._replace(verdict="cannot tell", reason="slow-sampling")
+    if other := classification.find_other_teeth(peaks.comb, speed, teeth):
+        return sound._replace(verdict="cannot tell", reason="teeth-contradicted", comb_teeth=other)
     if not len(peaks.unexplained):
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
@@ -366,7 +368,8 @@ def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation
 
     shop = tuple(axes[:, gap] for gap in parts.shop)
     known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest, shop=shop)
-    return evaluate_windows(evaluate, axes, parts, rate, known)
+    worst: CutEvaluation = evaluate_windows(evaluate, axes, parts, rate, known)
+    return worst
 
 
 def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:

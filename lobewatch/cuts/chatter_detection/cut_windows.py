@@ -39,7 +39,7 @@ class KnownCut(NamedTuple):
     lowest: float = MIN_CHATTER_FREQUENCY
     """Lowest frequency of chatter (Hz)."""
     is_begun: bool = False
-    """True if the cut has begun before the window, so that no mode rings down from the entry."""
+    """True for the windows of a long cut, in which no mode rings down from the entry for long."""
     shop: tuple[Floats, ...] = ()
     """All air between passes in a shop, whose tones come and go, each of shape (axes, n)."""
 
@@ -79,10 +79,15 @@ def place_windows(parts: CutParts, rate: float) -> list[slice]:
 
 
 def shift_window(window: slice, parts: CutParts, rate: float) -> list[slice]:
-    """Return a window half a step earlier and later, within its cut; rate in Hz."""
+    """Return a window half a step earlier and later; at an end of the cut the half of the window at that end."""
     first, step = round((parts.begin + CUT_SETTLING_TIME) * rate), round(WINDOW_STEP / 2 * rate)
-    starts = (min(max(start, first), parts.cut.start) for start in (window.start - step, window.start + step))
-    return [slice(start, start + window.stop - window.start) for start in starts if start != window.start]
+    middle = (window.start + window.stop) // 2
+    earlier = slice(window.start - step, window.stop - step)
+    later = slice(window.start + step, window.stop + step)
+    return [
+        earlier if earlier.start >= first else slice(window.start, middle),
+        later if later.stop <= parts.cut.stop else slice(middle, window.stop),
+    ]
 
 
 def join_windows(axes: Floats, windows: Sequence[HeardWindow], parts: CutParts, rate: float) -> tuple[PartVerdict, ...]:

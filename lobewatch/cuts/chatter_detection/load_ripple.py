@@ -74,7 +74,7 @@ def follow_multiples(axes: Floats, spectra: Spectra, turn: float) -> Envelopes:
 
 def _find_carriers(spectrum: Spectrum, turn: float) -> Floats:
     """Find the loudest multiples of a turn (Hz) that are clear of the noise, above the first."""
-    multiples = turn * np.arange(2, int(spectrum.sample_rate / 2 / turn))
+    multiples = turn * np.arange(2, int(spectrum.sample_rate / 2 / turn), dtype=np.float64)
     power = spectrum.max_power_near(multiples, 2 * spectral.PEAK_TOLERANCE)
     clear = power > MIN_CARRIER_CLEARNESS * np.interp(multiples, spectrum.frequency, spectrum.noise)
     loudest = np.argsort(-np.where(clear, power, 0.0))[:N_CARRIERS]
@@ -174,10 +174,16 @@ SWING_PADDING = 4
 """Zero-padding factor of the search for the frequency of a ripple; chosen."""
 
 
+RESAMPLING_FACTOR = 3
+"""Oversampling before a signal is sampled at equal angles, as splines are inexact near half the rate; chosen."""
+
+
 def sample_evenly(axes: Floats, deviation: Floats) -> Floats:
     """Sample signals again at equal angles of the spindle; axes: shape (axes, n), deviation in samples, shape (n,)."""
-    places = np.arange(axes.shape[1]) - deviation
-    return np.stack([scipy.ndimage.map_coordinates(axis, [places], order=3, mode="nearest") for axis in axes])
+    size = axes.shape[1]
+    places = RESAMPLING_FACTOR * (np.arange(size) - deviation)
+    fine = RESAMPLING_FACTOR * scipy.fft.irfft(scipy.fft.rfft(axes, axis=1), RESAMPLING_FACTOR * size, axis=1)
+    return np.stack([scipy.ndimage.map_coordinates(axis, [places], order=3, mode="nearest") for axis in fine])
 
 
 MAX_SIDEBAND_RATIO = 4.0

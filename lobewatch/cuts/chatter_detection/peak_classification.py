@@ -130,6 +130,47 @@ def is_undersampled(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bo
     return spectrum.sample_rate / 2 < MIN_TOOTH_HARMONICS * teeth * turning.frequency
 
 
+MAX_TEETH = 12
+"""Largest number of teeth that harmonics are compared with; chosen."""
+MIN_TEETH_SHARE, MAX_STATED_TEETH_SHARE = 0.9, 0.5
+"""Smallest energy share of the harmonics of another number of teeth, and largest of the stated one; chosen."""
+
+MIN_HARMONIC_POWER = 1e-2
+"""Smallest power of the first three harmonics of another number of teeth over the largest of all; chosen.
+
+A single one may be loud by a mode."""
+MAX_GAP_POWER = 2.5e-3
+"""Largest power between harmonics that there are not, over theirs: 5 % of their amplitude; chosen."""
+
+
+def find_other_teeth(comb: SpectralPeaks, turning: SpindleSpeed, teeth: int) -> int:
+    """Find a number of teeth whose harmonics a comb has instead of those of the stated number; 0 if there is none.
+
+    A multiple of the stated number needs gaps between its harmonics, a divisor of it looks like run-out.
+    """
+    order, power = np.round(comb.frequency / turning.frequency).astype(np.int64), comb.amplitude**2
+    by_order = np.bincount(order, power).astype(np.float64) if power.size else np.zeros(1)
+    total = float(np.sum(power))
+    is_stated = np.sum(by_order[::teeth]) > MAX_STATED_TEETH_SHARE * total
+    for other in (n for n in range(MAX_TEETH, 1, -1) if teeth % n):
+        first = by_order[other : MIN_TOOTH_HARMONICS * other + 1 : other]
+        is_clear = first.size == MIN_TOOTH_HARMONICS and np.min(first) > MIN_HARMONIC_POWER * np.max(power)
+        is_apart = _has_gaps(by_order, teeth, other) if other % teeth == 0 else not is_stated
+        if is_clear and is_apart and np.sum(by_order[::other]) > MIN_TEETH_SHARE * total:
+            return other
+    return 0
+
+
+def _has_gaps(power: Floats, teeth: int, other: int) -> bool:
+    """Return whether the first harmonics of `other` teeth have hardly any of the stated ones between them."""
+    reach = MIN_TOOTH_HARMONICS * other
+    if power.size <= reach:
+        return False
+    own = power[other : reach + 1 : other]
+    gaps = [np.max(power[first + teeth : first + other : teeth]) for first in range(other, reach, other)]
+    return bool(np.all(gaps < MAX_GAP_POWER * np.minimum(own[:-1], own[1:])))
+
+
 def classify_peaks(
     peaks: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:

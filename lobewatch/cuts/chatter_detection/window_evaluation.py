@@ -1,17 +1,16 @@
 """Evaluate the windows of a cut one by one, settle contradictions, and let the worst one decide."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection import cut_windows as windowing
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts
 from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, KnownCut
 
-if TYPE_CHECKING:
-    from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation
-
-Evaluate = Callable[[slice, KnownCut], "CutEvaluation"]
+Sound = Any
+"""Evaluation of a window, as a `CutEvaluation`."""
+Evaluate = Callable[[slice, KnownCut], Sound]
 """Function that evaluates the samples of a window."""
 MAX_SPEED_SEARCHES = 3
 """Number of windows of a cut in which its speed is searched from the set speed; chosen."""
@@ -19,16 +18,14 @@ MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
 
 
-def evaluate_windows(
-    evaluate: Evaluate, axes: Floats, parts: CutParts, rate: float, known: KnownCut
-) -> "CutEvaluation":
+def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: float, known: KnownCut) -> Sound:
     """Evaluate all windows of a cut, the last one first, as its speed is known then; axes: of the recording."""
-    places, heard, n_searches = windowing.place_windows(parts, rate), list["CutEvaluation"](), 0
-    for number, place in reversed(list(enumerate(places))):
+    places, heard, n_searches = windowing.place_windows(parts, rate), list[Sound](), 0
+    for place in reversed(places):
         if known.speed is None and n_searches == MAX_SPEED_SEARCHES:
             break
         n_searches += known.speed is None
-        sound = evaluate(place, known._replace(is_begun=number > 0))
+        sound = evaluate(place, known._replace(is_begun=len(places) > 1))
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
@@ -36,7 +33,7 @@ def evaluate_windows(
     return _worst_window(heard)._replace(part_verdicts=joined)
 
 
-def _summarize(sound: "CutEvaluation") -> HeardWindow:
+def _summarize(sound: Sound) -> HeardWindow:
     """Return what the parts of a cut need to know about a window."""
     chatter = sound.chatter
     if chatter is None:
@@ -45,8 +42,8 @@ def _summarize(sound: "CutEvaluation") -> HeardWindow:
 
 
 def _settle_contradictions(
-    evaluate: Evaluate, parts: CutParts, rate: float, heard: Sequence["CutEvaluation"], known: KnownCut
-) -> list["CutEvaluation"]:
+    evaluate: Evaluate, parts: CutParts, rate: float, heard: Sequence[Sound], known: KnownCut
+) -> list[Sound]:
     """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
 
     Chatter counts if one of the two has it, too, else they replace it.
@@ -63,7 +60,7 @@ def _settle_contradictions(
     return settled
 
 
-def _worst_window(heard: Sequence["CutEvaluation"]) -> "CutEvaluation":
+def _worst_window(heard: Sequence[Sound]) -> Sound:
     """Return the window that decides: the loudest chatter, else the last stable one if most of them are."""
     worst = max(heard, key=rank_evidence)
     if worst.chatter is not None:
@@ -72,7 +69,7 @@ def _worst_window(heard: Sequence["CutEvaluation"]) -> "CutEvaluation":
     return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
 
 
-def rank_evidence(sound: "CutEvaluation") -> tuple[bool, float]:
+def rank_evidence(sound: Sound) -> tuple[bool, float]:
     """Rank an axis: chatter first, then by energy."""
     peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
     return sound.chatter is not None, peaks.energy if peaks else 0.0

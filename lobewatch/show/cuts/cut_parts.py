@@ -8,6 +8,9 @@ from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine.journal.entries import PartVerdict
 from lobewatch.show.terminal.output import JsonObject
 
+MICROPHONE_NOTE = "microphone: other machines may be recorded too, and the vibration of the tool stays unknown"
+"""Limits of a recording by microphone."""
+
 
 def part_text(part: PartVerdict) -> str:
     """Return the verdict on a part of a cut with its times, such as "chatter at 1760 Hz from 1.6 to 4.6 s"."""
@@ -42,6 +45,7 @@ def parts_json(comparison: CutComparison) -> JsonObject:
         "steady_begin_s": heard.parts.steady_begin,
         "steady_end_s": heard.parts.steady_end,
         "parts": [asdict(part) for part in heard.part_verdicts],
+        "comb_teeth": heard.comb_teeth or None,
         "ripple_hz": ripple and ripple.frequency,
         "loudness_ripple": ripple and ripple.loudness,
         "speed_ripple": ripple and ripple.speed,

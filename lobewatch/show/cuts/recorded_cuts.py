@@ -18,7 +18,7 @@ from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.machine import ProgramTable
-from lobewatch.show.cuts.cut_parts import parts_json, parts_texts, recorded_cut_remarks
+from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, parts_texts, recorded_cut_remarks
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.programs.verdicts import chance_text, factor_text
@@ -48,6 +48,9 @@ FAULTS: Mapping[str, Fault] = {
         "run-out lines are louder than tooth passing, which may hide chatter locked to the spindle",
         "Cut at a 3 % higher or lower speed, and give pitch_deg for unevenly spaced flutes",
     ),
+    "teeth-contradicted": Fault(
+        "the spindle harmonics contradict the number of flutes", "Correct the number of flutes"
+    ),
     "faint": Fault("lines outside the spindle harmonics are too weak to prove chatter", "Cut longer or deeper"),
     "unexplained-tone": Fault(
         "is not explained by spindle, flutes or air, and has no side bands of chatter",
@@ -56,10 +59,6 @@ FAULTS: Mapping[str, Fault] = {
     "slow-sampling": Fault("the sample rate covers fewer than three harmonics of tooth passing", "Use a higher rate"),
 }
 """Fault for each reason without a verdict."""
-
-
-MICROPHONE_NOTE = "microphone: other machines may be recorded too, and the vibration of the tool stays unknown"
-"""Limits of a recording by microphone."""
 
 
 SUGGEST_HINT = "Run lobewatch suggest for the next test cut"
@@ -85,6 +84,8 @@ def _fault_text(comparison: CutComparison) -> str:
     match detected.reason:
         case "speed-not-found" if math.isfinite(detected.distant_rpm):
             finding = f"{finding} (the lines fit {detected.distant_rpm:.0f} rpm)"
+        case "teeth-contradicted":
+            finding = f"the spindle harmonics are those of {detected.comb_teeth} flutes"
         case "tacho-contradicts":
             finding, remedy = _speed_conflict(comparison)
         case "slow-sampling":

@@ -1,0 +1,162 @@
+"""Parts of a cut and ripple: synthetic combs whose loudness, speed or chatter changes in time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.load_ripple import find_ripple_peaks
+from lobewatch.cuts.chatter_detection.peak_classification import find_other_teeth
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
+
+Floats = NDArray[np.float64]
+RATE, TURN, TEETH = 6400.0, 8000 / 60, 4
+AIR = 1.0
+
+
+def recording(seconds: float, change: Any = None, ahead: Any = None, add: Any = None) -> Floats:
+    """Comb of four teeth with run-out, between a second of air each.
+
+    change: loudness at times in the cut; ahead: time by which the spindle is ahead (s); add: signal in the cut.
+    """
+    random, time = np.random.default_rng(0), np.arange(round(seconds * RATE)) / RATE
+    turned = time + (0.0 if ahead is None else ahead(time))
+    cut = np.zeros(time.size)
+    for order in range(1, 23):
+        amplitude = 12.0 / (order / TEETH) ** 0.8 if order % TEETH == 0 else 1.0 / order
+        cut += amplitude * np.cos(2 * np.pi * order * TURN * turned + random.uniform(0, 6))
+    cut = cut * (1.0 if change is None else change(time)) + (0.0 if add is None else add(time))
+    air = np.zeros(round(AIR * RATE))
+    signal = np.concatenate([air, cut, air])
+    return signal + 0.3 * random.normal(size=signal.size)
+
+
+def listen(signal: Floats, teeth: int = TEETH, **options: Any) -> CutEvaluation:
+    (heard,) = evaluate_recording(CutRecording(signal, RATE, teeth, 0.5, 8010.0, **options))
+    return heard
+
+
+def chatter(begin: float, end: float, frequency: float = 1760.0) -> Any:
+    """Chatter with two side bands between two times (s)."""
+    lines = ((frequency, 9.0), (frequency - TEETH * TURN, 3.0), (frequency + TEETH * TURN, 3.0))
+    return lambda t: ((t > begin) & (t < end)) * sum(a * np.cos(2 * np.pi * f * t) for f, a in lines)
+
+
+@pytest.fixture(scope="module")
+def early() -> CutEvaluation:
+    """Chatter from 1.1 to 4.1 s of the recording, in a cut from 1 to 7 s."""
+    return listen(recording(6.0, add=chatter(0.1, 3.1)))
+
+
+def test_the_worst_part_decides_and_its_times_are_known(early: CutEvaluation) -> None:
+    assert early.verdict == "chatter"
+    first, second = early.part_verdicts
+    assert (first.verdict, second.verdict, second.hz) == ("chatter", "stable", None)
+    assert first.hz == pytest.approx(1760.0, abs=1.0)
+    assert (first.from_s, second.to_s) == pytest.approx((1.0, 7.0), abs=0.1)
+    assert first.to_s == second.from_s == pytest.approx(4.1, abs=0.1)
+
+
+@pytest.mark.parametrize("begin", [0.4, 1.9, 3.2])
+def test_half_a_second_of_chatter_anywhere_is_reported(begin: float) -> None:
+    heard = listen(recording(4.5, add=chatter(begin, begin + 0.5)))
+    assert heard.verdict == "chatter"
+    (part,) = [part for part in heard.part_verdicts if part.verdict == "chatter"]
+    assert part.from_s <= AIR + begin + 0.2
+    assert part.to_s >= AIR + begin + 0.3
+
+
+def test_a_part_in_a_later_recording_is_shifted(early: CutEvaluation) -> None:
+    part = early.part_verdicts[1].shift(-1.0)
+    assert (part.from_s, part.to_s) == pytest.approx((3.1, 6.0), abs=0.1)
+
+
+def swing(rate: float, depth: float, sharp: bool = False) -> Any:
+    """Loudness that swings by `depth` (relative) at a rate (Hz), as a sine or a square wave."""
+
+    def loudness(time: Floats) -> Floats:
+        wave = np.sin(2 * np.pi * rate * time)
+        return np.asarray(1 + depth * (np.sign(wave) if sharp else wave))
+
+    return loudness
+
+
+@pytest.mark.parametrize(("rate", "depth", "sharp"), [(8.3, 0.1, False), (4.0, 0.4, False), (24.0, 0.3, False),
+                                                      (11.0, 0.4, True)])  # fmt: skip
+def test_ripple_of_loudness_is_no_chatter_and_is_measured(rate: float, depth: float, sharp: bool) -> None:
+    heard = listen(recording(2.2, swing(rate, depth, sharp)))
+    assert (heard.verdict, heard.reason) == ("stable", "")
+    assert heard.ripple is not None
+    assert heard.ripple.frequency == pytest.approx(rate, abs=0.3)
+    assert heard.ripple.loudness == pytest.approx(depth * (np.sqrt(2) if sharp else 1), rel=0.2)
+    assert heard.ripple.speed == 0.0
+
+
+def wave(rate: float, change: float) -> Any:
+    """Time by which a spindle is ahead whose speed swings by `change` (relative) at a rate (Hz)."""
+    return lambda t: change * np.sin(2 * np.pi * rate * t) / (2 * np.pi * rate)
+
+
+@pytest.mark.parametrize(("rate", "change"), [(6.0, 2e-3), (15.0, 1.5e-3)])
+def test_ripple_of_speed_is_no_chatter_and_is_measured(rate: float, change: float) -> None:
+    heard = listen(recording(2.2, ahead=wave(rate, change)))
+    assert (heard.verdict, heard.reason) == ("stable", "")
+    assert heard.ripple is not None
+    assert heard.ripple.frequency == pytest.approx(rate, abs=0.3)
+    assert heard.ripple.speed == pytest.approx(change, rel=0.2)
+
+
+@pytest.mark.parametrize("beside", [5.0, -12.0, 60.0])
+def test_chatter_next_to_a_multiple_is_heard_through_ripple(beside: float) -> None:
+    place = 3 * TEETH * TURN + beside
+    heard = listen(recording(2.2, swing(9.0, 0.3), wave(9.0, 5e-4), chatter(0.0, 2.2, place)))
+    assert heard.verdict == "chatter"
+    assert heard.chatter is not None
+    assert np.min(np.abs(heard.chatter.peaks.frequency - place)) < 1.5
+
+
+def test_a_steady_cut_has_no_ripple() -> None:
+    assert listen(recording(1.5)).ripple is None
+
+
+def test_what_is_slower_than_100_hz_or_half_the_lowest_mode_is_no_chatter() -> None:
+    def low(t: Floats) -> Floats:
+        return sum(3.0 * np.cos(2 * np.pi * f * t) for f in (90.0, 90.0 - TURN / 2))  # type: ignore[return-value]
+
+    assert listen(recording(1.5, add=low)).verdict == "stable"
+    cut = recording(1.5, add=chatter(0.0, 1.5, 700.0))
+    assert listen(cut).verdict == "chatter"
+    assert listen(cut, lowest_mode=2700.0).verdict == "stable"
+
+
+@pytest.mark.parametrize("stated", [2, 3, 5])
+def test_a_number_of_flutes_that_the_comb_contradicts_is_named(stated: int) -> None:
+    heard = listen(recording(1.5), stated)
+    assert (heard.verdict, heard.reason, heard.comb_teeth) == ("cannot tell", "teeth-contradicted", 4)
+
+
+@pytest.mark.parametrize(("orders", "teeth", "other"), [
+    ((4, 8, 12), 4, 0), ((3, 6, 9), 4, 3), ((4, 8, 12), 2, 4), ((2, 4, 6, 8), 2, 0), ((10, 20), 4, 0),
+])  # fmt: skip
+def test_harmonics_of_other_teeth(orders: tuple[int, ...], teeth: int, other: int) -> None:
+    lines = np.array(orders, dtype=float)
+    comb = SpectralPeaks(100.0 * lines, np.ones(lines.size), np.full(lines.size, 1e6))
+    assert find_other_teeth(comb, SpindleSpeed(100.0, 0.01, 1.0, 3, 0.0), teeth) == other
+
+
+def test_side_bands_of_one_multiple_are_no_ripple() -> None:
+    """8 Hz beside all three loud multiples with a tenth each, and 13 Hz beside one of them."""
+    time = np.arange(12_800) / RATE
+    multiples = np.array([400.0, 800.0, 1200.0])
+    signal = sum(np.cos(2 * np.pi * f * time) + 0.1 * np.cos(2 * np.pi * (f + 8) * time) for f in multiples)
+    signal = signal + 0.1 * np.cos(2 * np.pi * 813 * time)
+    signal = signal + 1e-4 * np.random.default_rng(0).normal(size=time.size)
+    left = SpectralPeaks(np.array([408.0, 808.0, 813.0, 1208.0]), np.full(4, 0.1), np.full(4, 1e6))
+    comb = SpectralPeaks(multiples, np.ones(3), np.full(3, 1e6))
+    found = find_ripple_peaks(left, comb, compute_spectrum(signal, RATE), 100.0)
+    assert not found[2]

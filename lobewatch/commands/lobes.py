@@ -135,13 +135,12 @@ def _show_stated(
         cut = cut._replace(direction=stated["direction"])
     if stated["speeds"]:
         cut = cut.with_speeds(stated["speeds"])
-    machine = build_stated_machine(cut)
     x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
     with show_progress("searching stable pockets"), time_step("lobes"):
-        comparison = compare_stated_modes(machine, x, y, stated["speed"], stated["depth"], method)
+        comparison = compare_stated_modes(cut, x, y, stated["speed"], stated["depth"], method)
     if figure is not None:
         from lobewatch.show.figures.drawing import save_figure  # brings matplotlib
         from lobewatch.show.figures.lobe_figures import plot_comparison
 
-        save_figure(plot_comparison(machine, comparison, ()), figure)
+        save_figure(plot_comparison(build_stated_machine(cut), comparison, ()), figure)
     _show(comparison, comparison.remarks, as_json)

@@ -1,10 +1,14 @@
 """Evaluate the windows of a cut one by one, settle contradictions, and let the worst one decide."""
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from typing import Any
+
+import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection import cut_windows as windowing
+from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts
 from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, KnownCut
 
@@ -16,6 +20,11 @@ MAX_SPEED_SEARCHES = 3
 """Number of windows of a cut in which its speed is searched from the set speed; chosen."""
 MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
+
+MIN_GROWTH = 3.0
+"""Amplitude of chatter over that of the same line in the stable windows, below which they contradict it; chosen."""
+SAME_LINE_DISTANCE = 3.0
+"""Distance within which a line of another window is the same, as it drifts (Hz); chosen."""
 
 
 def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: float, known: KnownCut) -> Sound:
@@ -29,6 +38,7 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
+    heard = _compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
     return _worst_window(heard)._replace(part_verdicts=joined)
 
@@ -58,6 +68,32 @@ def _settle_contradictions(
         if again and not any((other.chatter is not None) == chatters[i] for other in again):
             settled[i] = again[0]._replace(parts=sound.parts)
     return settled
+
+
+def _compare_with_stable(axes: Floats, rate: float, heard: Sequence[Sound]) -> list[Sound]:
+    """Let chatter that is as loud in the stable windows of a cut, and these, count by what most of them say."""
+    stable = [i for i, sound in enumerate(heard) if sound.verdict == "stable"]
+    groups = [[i for i, _ in group] for _, group in groupby(enumerate(heard), lambda item: item[1].chatter is None)]
+    doubted = [i for group in groups if stable and not _has_grown(axes, rate, heard, group, stable) for i in group]
+    wrong = stable if len(doubted) > len(stable) else doubted
+    return [
+        sound._replace(verdict="cannot tell", reason="unexplained-tone", chatter=None) if i in wrong else sound
+        for i, sound in enumerate(heard)
+    ]
+
+
+def _has_grown(axes: Floats, rate: float, heard: Sequence[Sound], group: Sequence[int], stable: Sequence[int]) -> bool:
+    """Return whether chatter in neighbouring windows is far louder than its line in the stable ones."""
+    loudest = max((heard[i] for i in group), key=rank_evidence)
+    if loudest.chatter is None:
+        return True
+    frequency = np.array([loudest.chatter.frequency])
+
+    def level(sound: Sound) -> float:
+        spectrum = spectral.compute_spectrum(axes[loudest.axis, sound.parts.cut], rate)
+        return float(spectrum.max_power_near(frequency, SAME_LINE_DISTANCE / spectrum.bin_width)[0] ** 0.5)
+
+    return level(loudest) > MIN_GROWTH * float(np.median([level(heard[i]) for i in stable]))
 
 
 def _worst_window(heard: Sequence[Sound]) -> Sound:

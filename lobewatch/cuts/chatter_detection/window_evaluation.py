@@ -36,9 +36,18 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
+    if len(places) > 1 and known.speed:
+        about = known._replace(is_begun=True)
+        ends = windowing.place_end_windows(parts, rate)
+        early, late = ([evaluate(place, about) for place in places] for places in ends)
+        heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
     heard = _compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
     return _worst_window(heard)._replace(part_verdicts=joined)
+
+
+def _with_chatter(heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    return [sound for sound in heard if sound.chatter is not None]
 
 
 def _summarize(sound: CutEvaluation) -> HeardWindow:

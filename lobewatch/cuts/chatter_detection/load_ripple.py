@@ -254,7 +254,7 @@ MIN_ENERGY_UNEVEN = 2e-2
 MAX_LOUDNESS_RIPPLE = 1.0
 """Largest ripple of the loudness over its mean; more is a part of another depth, not ripple."""
 RINGING_BAND, RINGING_MARGIN = 150.0, 3.0
-"""Half width of the band around a ringing mode, and of the gap for each spindle harmonic in it (Hz); chosen."""
+"""Half width of the band around a ringing mode, and of the least gap for each spindle harmonic in it (Hz); chosen."""
 RINGING_PIECE_LENGTH = 0.4
 """Length of the loudest piece that is compared (s): two ripples of 5 Hz, and less than chatter of 0.5 s; chosen."""
 MAX_RINGING_SHARE = 0.42
@@ -273,10 +273,11 @@ def least_chatter_energy(ripple: Ripple | None) -> float:
 
 def is_ringing(signal: Floats, rate: float, frequency: float, turn: float) -> bool:
     """Return whether a mode near a frequency (Hz) rings in short pulses; turn: of the spindle (Hz)."""
-    transform = scipy.fft.rfft((signal - np.mean(signal)) * scipy.signal.windows.tukey(signal.size, 0.1))
+    transform = scipy.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size))
     every = np.arange(transform.size) * (rate / signal.size)
     near = np.abs(every - frequency) < RINGING_BAND
-    band = np.where(spectral.fold_frequency(every, turn) > RINGING_MARGIN, transform, 0.0)[near]
+    gap = max(RINGING_MARGIN, OWN_SIDEBAND_BINS * rate / signal.size)
+    band = np.where(spectral.fold_frequency(every, turn) > gap, transform, 0.0)[near]
     power = np.abs(scipy.fft.ifft(band, 4 * band.size)) ** 2
     size = min(round(RINGING_PIECE_LENGTH * rate * power.size / signal.size), power.size)
     pieces = np.lib.stride_tricks.sliding_window_view(power, size)[:: max(size // 2, 1)]

@@ -41,7 +41,7 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         ends = windowing.place_end_windows(parts, rate)
         early, late = ([evaluate(place, about) for place in places] for places in ends)
         heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
-    heard = _compare_with_stable(axes, rate, heard)
+    heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
     return _worst_window(heard)._replace(part_verdicts=joined)
 
@@ -77,7 +77,7 @@ def _settle_contradictions(
     return settled
 
 
-def _compare_with_stable(axes: Floats, rate: float, heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+def compare_with_stable(axes: Floats, rate: float, heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
     """Let chatter that is as loud in the stable windows of a cut, and these, count by what most of them say."""
     stable = [i for i, sound in enumerate(heard) if sound.verdict == "stable"]
     groups = [[i for i, _ in group] for _, group in groupby(enumerate(heard), lambda item: item[1].chatter is None)]

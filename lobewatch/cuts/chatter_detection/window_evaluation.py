@@ -43,7 +43,13 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
     heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
-    return _worst_window(heard)._replace(part_verdicts=joined)
+    return _with_usual_speed(_worst_window(heard), heard)._replace(part_verdicts=joined)
+
+
+def _with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> CutEvaluation:
+    """Return an evaluation with the median speed of all windows, as all axes have one speed."""
+    speeds = sorted(sound.spindle_speed for sound in heard if sound.spindle_speed is not None)
+    return worst if worst.spindle_speed is None else worst._replace(spindle_speed=speeds[len(speeds) // 2])
 
 
 def _with_chatter(heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:

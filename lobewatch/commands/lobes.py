@@ -129,19 +129,18 @@ def _show_stated(
     from lobewatch.logbook.stated_modes import StatedCut, build_stated_machine, compare_stated_modes, parse_mode
 
     if missing := [f"--{name}" for name in ("teeth", "material") if stated[name] is None]:
-        raise ValueError(f"--mode needs {' and '.join(missing)}. Give {'both' if len(missing) > 1 else 'it'}.")
+        raise ValueError(f"--mode needs {' and '.join(missing)}. Write --teeth 4 --material 6061, for example.")
     cut = StatedCut(*(stated[name] for name in ("teeth", "material", "diameter", "radial-depth")))
     if stated["direction"]:
         cut = cut._replace(direction=stated["direction"])
     if stated["speeds"]:
         cut = cut.with_speeds(stated["speeds"])
-    machine = build_stated_machine(cut)
     x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
     with show_progress("searching stable pockets"), time_step("lobes"):
-        comparison = compare_stated_modes(machine, x, y, stated["speed"], stated["depth"], method)
+        comparison = compare_stated_modes(cut, x, y, stated["speed"], stated["depth"], method)
     if figure is not None:
         from lobewatch.show.figures.drawing import save_figure  # brings matplotlib
         from lobewatch.show.figures.lobe_figures import plot_comparison
 
-        save_figure(plot_comparison(machine, comparison, ()), figure)
+        save_figure(plot_comparison(build_stated_machine(cut), comparison, ()), figure)
     _show(comparison, comparison.remarks, as_json)

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import inspect
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
@@ -47,7 +48,10 @@ def power(text: str | float) -> float:
 
 
 def _quantity(text: str | float, kind: str) -> float:
-    if not isinstance(text, str) or (text.strip()[-1:] in {*"0123456789."} and "/" not in text):
+    text = str(text).strip()
+    if re.fullmatch(r"(?:\d+[ -])?\d+/\d+", text):
+        raise BadParameter(f"{text!r} has no unit. Write {text}in for inches.")
+    if text[-1:] in {*"0123456789."}:
         return number(text)
     from lobewatch.machine.settings.unit_text import UNITS_BY_KEY_END, read_quantity
 
@@ -58,7 +62,10 @@ def _quantity(text: str | float, kind: str) -> float:
 
 
 def rpm(text: str | float) -> float:
-    """Parse a spindle speed, whose point before three digits may separate thousands."""
+    """Parse a spindle speed, whose point before three digits may separate thousands; with or without the unit rpm."""
+    text = re.sub(r"\s*(?:rpm|1/min)\s*$", "", str(text), flags=re.IGNORECASE)
+    if text.casefold().endswith(("sfm", "sfpm", "ft/min", "m/min")):
+        raise BadParameter(f"{text!r} is a cutting speed. Give the spindle speed in rpm.")
     if len(list_readings(str(text))) < 2:
         return number(text)
     from lobewatch.machine.settings.setup_tables import SpeedTable

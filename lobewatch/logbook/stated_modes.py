@@ -20,7 +20,18 @@ from lobewatch.verdicts import find_stable_pockets
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 
-STIFFNESS_UNITS = {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3, "MN/m": 1e6, "kN/mm": 1e6, "N/um": 1e6, "N/µm": 1e6}
+LBF_PER_INCH = 4.4482216152605 / 0.0254
+"""Pound-force per inch in N/m."""
+STIFFNESS_UNITS = {
+    "N/m": 1.0,
+    "kN/m": 1e3,
+    "N/mm": 1e3,
+    "MN/m": 1e6,
+    "kN/mm": 1e6,
+    "N/um": 1e6,
+    "N/µm": 1e6,
+    "lbf/in": LBF_PER_INCH,
+}
 """Units of a stiffness in N/m."""
 FREQUENCY_UNITS = {"Hz": 1.0, "kHz": 1e3}
 """Units of a frequency in Hz."""
@@ -30,6 +41,8 @@ MODE_PATTERN = re.compile(
 )
 MODE_RANGES = {"frequency": (1.0, 20e3, "Hz"), "damping ratio": (1e-4, 0.5, ""), "stiffness": (1e4, 1e10, "N/m")}
 """Plausible range of each number of a mode, with its unit; chosen."""
+MAX_BARE_DAMPING_RATIO = 0.1
+"""Largest damping ratio that needs no %; chosen, as a larger number is rather a percentage."""
 EXAMPLE = "Write frequency, damping ratio and stiffness with their units, such as '600 Hz 3% 10 N/um'."
 DEFAULT_DIAMETER_MM = 10.0
 """Tool diameter where none is stated; chosen. It limits depth and cutting speed."""
@@ -63,6 +76,8 @@ def parse_mode(text: str) -> Mode:
     if match is None:
         raise ValueError(f"{text!r} is not a mode. {EXAMPLE}")
     frequency, hertz, damping, percent, stiffness, unit = match.groups()
+    if not percent and float(damping) > MAX_BARE_DAMPING_RATIO:
+        raise ValueError(f"damping {damping} of {text!r} has no unit. Write {damping} % or {100 * float(damping):g} %.")
     values = (
         float(frequency) * _find_unit(text, hertz, FREQUENCY_UNITS),
         float(damping) / (100 if percent else 1),
@@ -113,6 +128,10 @@ class StatedCut(NamedTuple):
 
 def build_stated_machine(cut: StatedCut) -> Machine:
     """Build a machine with default uncertainties, whose [reference_cut] is a stated cut. ValueError for bad values."""
+    if cut.teeth < 1:
+        raise ValueError(f"StatedCut.teeth {cut.teeth} is not above 0. Give the number of flutes.")
+    if cut.radial_depth_mm is not None and cut.diameter_mm is None:
+        raise ValueError(f"StatedCut.radial_depth_mm {cut.radial_depth_mm:g} needs StatedCut.diameter_mm. Give both.")
     diameter = cut.diameter_mm or DEFAULT_DIAMETER_MM
     tables: dict[str, dict[str, Any]] = {
         "machine": {"name": "stated modes"},
@@ -134,7 +153,7 @@ def build_stated_machine(cut: StatedCut) -> Machine:
 
 
 def compare_stated_modes(
-    machine: Machine,
+    cut: StatedCut,
     x: Sequence[Mode],
     y: Sequence[Mode],
     speed_rpm: float | None = None,
@@ -145,8 +164,8 @@ def compare_stated_modes(
 
     Parameters
     ----------
-    machine
-        Machine of `build_stated_machine`.
+    cut
+        Stated cut.
     x, y
         Modes at the tool tip; y is empty for a tip that is equal in both directions.
     speed_rpm, depth_mm
@@ -168,7 +187,8 @@ def compare_stated_modes(
         raise ValueError(
             "ProgramTable.speed_rpm or ProgramTable.depth_mm is missing. Give both for a verdict, or none."
         )
-    tip = _build_tip(machine, x, y)
+    machine = build_stated_machine(cut)
+    tip = _build_tip(machine, x, y, cut)
     table, cuts = machine.cut_tables[REFERENCE_CUT], machine.cuts(tip.tool)[REFERENCE_CUT]
     lobes = lobe_chart.compute_lobe_chart(method, tip.x, tip.y, cuts, speed_grid(machine))
     now = lobe_chart.LobeChart(REFERENCE_CUT, table, tip, lobe_chart.DynamicsSource.MODES, tip.x, tip.y, cuts, lobes)
@@ -183,9 +203,12 @@ def compare_stated_modes(
     return LobeComparison(now, None, pockets, (), verdicts, remarks)
 
 
-def _build_tip(machine: Machine, x: Sequence[Mode], y: Sequence[Mode]) -> Assembly:
-    """Return the tool with the stated modes and a remark on them."""
+def _build_tip(machine: Machine, x: Sequence[Mode], y: Sequence[Mode], cut: StatedCut) -> Assembly:
+    """Return the tool with the stated modes and remarks on what is assumed."""
     text = "modes are stated, not measured, with the default uncertainties" + ("" if y else ", and equal in x and y")
-    remark = Remark("modes-stated", "", text, "Tap the tool, or state the modes in y if they differ")
+    remarks = [Remark("modes-stated", "", text, "Tap the tool, or state the modes in y if they differ")]
+    if cut.diameter_mm is None:
+        text = f"tool diameter {DEFAULT_DIAMETER_MM:g} mm is assumed, which limits depth and cutting speed"
+        remarks.append(Remark("diameter-assumed", "", text, "Give StatedCut.diameter_mm"))
     time, directions = datetime.now(UTC), ("x", "y")
-    return Assembly(machine.tap.tool, time, "stated modes", x, y or x, directions, None, {}, False, (remark,))
+    return Assembly(machine.tap.tool, time, "stated modes", x, y or x, directions, None, {}, False, tuple(remarks))

@@ -125,14 +125,15 @@ def test_progress_is_shown_on_a_terminal_only(
 
 
 @pytest.mark.parametrize(
-    ("text", "speed"), [("9000", 9000), ("18'000", 18000), ("18 000", 18000), ("1,000", 1000), ("318.310", 318.31)]
+    ("text", "speed"),
+    [("9000", 9000), ("8,000 rpm", 8000), ("18'000", 18000), ("18 000", 18000), ("1,000", 1000), ("318.310", 318.31)],
 )
 def test_a_speed_may_have_separators_of_thousands(text: str, speed: float) -> None:
     assert rpm(text) == speed
 
 
 @pytest.mark.parametrize(
-    ("text", "facts"), [("18,000", "18 or 18000"), ("18.000", "18 or 18000"), ("8000,5", "8000.5")]
+    ("text", "facts"), [("18,000", "18 or 18000"), ("18.000", "18 or 18000"), ("8000,5", "8000.5"), ("300 sfm", "rpm")]
 )
 def test_a_speed_of_two_values_is_rejected(text: str, facts: str) -> None:
     with pytest.raises(BadParameter, match=f"'{text}'.*{facts}"):

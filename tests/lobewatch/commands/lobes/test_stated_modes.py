@@ -29,7 +29,8 @@ def test_a_mode_may_be_written_in_several_units(text: str) -> None:
     ("text", "fact"),
     [
         ("600 3% 10 N/um", "600 3% 10 N/um"),
-        ("600 Hz 3 10 N/um", "damping ratio 3"),
+        ("600 Hz 3 10 N/um", "3 %"),
+        ("600 Hz 0.3 10 N/um", "30 %"),
         ("600 Hz -3% 10 N/um", "-0.03"),
         ("600 Hz 3% 10", "no unit"),
         ("600 Hz 3% 10 kN", "'kN'"),
@@ -55,7 +56,7 @@ def test_pockets_of_stated_modes_are_below_the_limit_of_the_semi_discretisation(
     for pocket in answer["pockets"]:
         (limit,) = stability_boundary(x, y, cut, pocket["speed_rpm"], 20e-3).depth
         assert 1e3 * limit == pytest.approx(pocket["depth_mm"] * (1 + pocket["depth_margin"]), rel=0.02)
-    assert "modes-stated" in {remark["code"] for remark in answer["remarks"]}
+    assert {"modes-stated", "diameter-assumed"} <= {remark["code"] for remark in answer["remarks"]}
 
 
 @pytest.mark.parametrize(("depth", "verdict"), [("0.2", "stable"), ("5", "not stable")])
@@ -71,6 +72,7 @@ def test_a_setting_on_stated_modes_has_a_verdict(depth: str, verdict: str) -> No
         (MODES[:2], ["--teeth", "--material"]),
         ([*MODES, *CUT, "--speed", "8600"], ["--depth"]),
         ([*MODES, *CUT, "--tool", "T"], ["--tool"]),
+        ([*MODES, *CUT, "--radial-depth", "1"], ["--radial-depth 1", "--diameter"]),
         ([*MODES, "--teeth", "4", "--material", "steel"], ["'steel'", "42CrMo4"]),
         (["m", "--teeth", "4"], ["--teeth"]),
     ],

@@ -83,5 +83,6 @@ def test_options_take_texts_with_units(shop: Shop) -> None:
     inch, metric = (json.loads(invoke([*words, depth]).stdout)["programs"] for depth in ("0.05in", "1.27"))
     assert inch == metric
     assert inch[0]["depth_mm"] == 1.27
-    rejected = invoke([*words, "0.05 im"])
-    assert (rejected.exit_code, "'im'" in rejected.stderr) == (2, True)
+    for depth, fact in (("0.05 im", "'im'"), ("1/8", "1/8in")):
+        rejected = invoke([*words, depth])
+        assert (rejected.exit_code, fact in rejected.stderr) == (2, True)

@@ -51,7 +51,7 @@ def _quantity(text: str | float, kind: str) -> float:
     text = str(text).strip()
     if re.fullmatch(r"(?:\d+[ -])?\d+/\d+", text):
         raise BadParameter(f"{text!r} has no unit. Write {text}in for inches.")
-    if text[-1:] in {*"0123456789."}:
+    if not re.search(r"\d\D*[^\W\d_\"]|\"", text) or re.fullmatch(r"[\d.]+[eE][+-]?\d+", text):
         return number(text)
     from lobewatch.machine.settings.unit_text import UNITS_BY_KEY_END, read_quantity
 
@@ -88,6 +88,8 @@ def mass(text: str | float) -> float:
         raise BadParameter(str(error)) from None
 
 
+DATE_EXAMPLES = "2026-11-27, 2026-11-27T08:30 or 2026-11-27T08:30Z"
+"""Forms of a date."""
 FIRST_NOW, LAST_NOW = (datetime(year, 1, 1, tzinfo=UTC) for year in (1970, 2200))
 """Range of dates that ages may be counted to; chosen, as no clock of a computer is beyond it."""
 
@@ -99,12 +101,15 @@ def present_time(text: str) -> datetime:
         if FIRST_NOW <= (time if time.tzinfo else time.replace(tzinfo=UTC)) < LAST_NOW:
             return time.astimezone()
     dates = f"{FIRST_NOW:%Y-%m-%d} to {LAST_NOW - timedelta(days=1):%Y-%m-%d}"
-    raise BadParameter(f"{text!r} is not a date from {dates}. Write 2026-11-27, 2026-11-27T08:30 or 2026-11-27T08:30Z.")
+    raise BadParameter(f"{text!r} is not a date from {dates}. Write {DATE_EXAMPLES}.")
 
 
 def local_time(text: str) -> datetime:
     """Parse a date or time (ISO 8601) to local time without a time zone."""
-    return present_time(text).replace(tzinfo=None)
+    with contextlib.suppress(ValueError, OverflowError):
+        time = datetime.fromisoformat(text)
+        return time if time.tzinfo is None else time.astimezone().replace(tzinfo=None)
+    raise BadParameter(f"{text!r} is not a date. Write {DATE_EXAMPLES}.")
 
 
 Command = Callable[..., None]

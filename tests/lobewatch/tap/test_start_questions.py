@@ -229,7 +229,7 @@ def test_a_hit_that_the_hammer_does_not_show_is_named(folder: MachineFolder, ses
 def test_a_spindle_that_turns_after_the_last_hit_leaves_its_question_open(rpm: float, is_left_open: bool) -> None:
     questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
     for _ in range(2):
-        questions.check_after(record_at_rest({rpm / 60: 2.0} if rpm else {}))
+        questions.check_after(record_at_rest({rpm / 60: 2.0} if rpm else {}), record_at_rest({}))
     assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
 
 
@@ -239,7 +239,20 @@ def test_a_response_that_still_decays_is_no_turning_spindle(half_life: float, is
     line = 3.0 * 0.5 ** (time / half_life) * np.sin(2 * np.pi * 20.0 * time)
     codes = np.stack([INPUTS[0].channel.encode(record.force), INPUTS[1].channel.encode(record.acceleration + line)])
     questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
-    questions.check_after(Hit.from_codes(codes, EMULATED_CHANNELS, RATE))
+    questions.check_after(Hit.from_codes(codes, EMULATED_CHANNELS, RATE), record)
+    assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "is_left_open"),
+    [(0.0, 0.2, True), (0.0, 0.08, False), (0.06, 0.2, False), (0.02, 0.2, True), (0.2, 0.2, False)],
+)
+def test_a_weak_line_that_was_not_there_before_the_first_hit_is_asked_about(
+    before: float, after: float, is_left_open: bool
+) -> None:
+    """0.2 m/s^2 at 320 Hz are 0.1 mm/s."""
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    questions.check_after(*(record_at_rest({320.0: rms}, 0.1) for rms in (after, before)))
     assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
 
 
@@ -247,7 +260,7 @@ def test_an_accepted_line_after_the_last_hit_asks_nothing() -> None:
     questions = StartQuestions(
         StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", [SPINDLE_TURNING.code], asks=False
     )
-    questions.check_after(record_at_rest({16.0: 2.0}))
+    questions.check_after(record_at_rest({16.0: 2.0}), record_at_rest({}))
     assert questions.left_open == []
 
 

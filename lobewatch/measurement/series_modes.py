@@ -14,7 +14,6 @@ from lobewatch.measurement.series_questions import (
     MIN_PAIRS_FOR_MEDIAN,
     N_PRIOR_PAIRS,
     N_RECENT_TESTS,
-    N_STD_ASKED,
     EarlierTest,
     SeriesReference,
     check_level_stiffness,
@@ -45,8 +44,9 @@ MIN_STIFFNESS_PEAK_RATIO = 0.1
 """Peak of a mode over the largest one, from which its stiffness is compared; chosen. A weaker fit is uncertain."""
 MAX_WINDOW_FREQUENCY_CHANGE = 0.02
 """Largest relative frequency change with a raised damping that a window explains: a window changes none; chosen."""
-MAX_WINDOW_DISTANCE = 2.0
-"""Largest distance of each mode from the common rise, in standard deviations; chosen."""
+MAX_WINDOW_DISTANCE, N_STD_WINDOW = 3.0, 3.8
+"""Largest distance of each mode from the common rise, and number of standard deviations as unlikely as the rise that
+raises the question; chosen. Both must hold, so it is less than N_STD_ASKED."""
 
 
 def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: SeriesReference) -> tuple[Remark, ...]:
@@ -258,8 +258,8 @@ def _estimate_spread(series: Sequence[Floats]) -> tuple[float, float]:
 
 
 def _student_limit(freedom: float) -> float:
-    """Return the value of Student's distribution that is as unlikely as N_STD_ASKED standard deviations."""
-    return math.sqrt(freedom * math.expm1(N_STD_ASKED**2 / (freedom + 1)))
+    """Return the value of Student's distribution that is as unlikely as N_STD_WINDOW standard deviations."""
+    return math.sqrt(freedom * math.expm1(N_STD_WINDOW**2 / (freedom + 1)))
 
 
 def _trace(now: Floats, tests: Sequence[EarlierTest]) -> Floats:

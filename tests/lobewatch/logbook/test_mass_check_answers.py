@@ -33,8 +33,10 @@ def codes(shop: Shop) -> set[str]:
 
 @pytest.mark.parametrize(
     ("days", "is_answered"),
-    [((-0.9, 0.9), True), ((-0.1, 0.1, 40.0), True), ((0.5,), False), ((-0.5,), False), ((30.0,), False)]
-    + [((-2.0, 0.1), False), ((-0.1, 2.0), False), ((0.1, 0.2), False)],
+    [
+        *[((-0.9, 0.9), True), ((-0.1, 0.1, 40.0), True), ((0.5,), False), ((-0.5,), False), ((30.0,), False)],
+        *[((-2.0, 0.1), False), ((-0.1, 2.0), False), ((0.1, 0.2), False)],
+    ],
 )
 def test_passed_checks_of_the_day_before_and_after_answer_the_question(
     mismatched: Shop, days: tuple[float, ...], is_answered: bool

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lobewatch.measurement.recording_questions import check_followed_band
 from lobewatch.measurement.series_modes import (
     MAX_MODE_FALL,
     check_common_damping,
@@ -83,6 +84,16 @@ def test_a_spindle_mode_beside_that_of_the_tool_is_not_taken_for_it() -> None:
     assert [(remark.code, remark.about) for remark in asked] == [("mode-jump", "1430 Hz")]
 
 
+@pytest.mark.parametrize(
+    ("band", "is_asked"), [((50.0, 1400.0), True), ((1600.0, 4000.0), True), ((50.0, 1500.0), False), (None, False)]
+)
+def test_a_followed_mode_out_of_the_usable_band_is_asked_about(
+    band: tuple[float, float] | None, is_asked: bool
+) -> None:
+    asked = check_followed_band(Mode(*TOOL), band)
+    assert [remark.code for remark in [asked] if remark] == ["other-band"] * is_asked
+
+
 def stiffer(values: Values, ratio: float) -> Values:
     return *values[:2], values[2] * ratio
 
@@ -150,7 +161,7 @@ def test_the_rise_that_is_asked_about_is_that_of_student(count: int) -> None:
     """Closed form without scatter: 0.03 / sqrt(n) sqrt(1 + 1/n) times Student's limit of n degrees of freedom."""
     weights = np.array([(f * zeta) ** -2 for f, zeta, _ in (TOOL, SPINDLE)])
     rates = np.array([2 * np.pi * f * zeta for f, zeta, _ in (TOOL, SPINDLE)])
-    limit = np.sqrt(count * np.expm1(16 / (count + 1))) * 0.03 / np.sqrt(count) * np.sqrt(1 + 1 / count)
+    limit = np.sqrt(count * np.expm1(3.8**2 / (count + 1))) * 0.03 / np.sqrt(count) * np.sqrt(1 + 1 / count)
     reference = SeriesReference(months_of((TOOL, SPINDLE), count))
     rise = limit * float(rates @ weights / np.sum(weights))
     assert check_common_damping(damped(0.98 * rise), reference) is None

@@ -201,9 +201,9 @@ def test_two_presses_answer_one_question() -> None:
     ("faults", "flag"),
     [
         (EmulatedFaults(turning_rpm=12_000, begin=3.0), HitFlags.STEADY_VIBRATION),
-        (EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION),
+        pytest.param(EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION, marks=pytest.mark.long),
         (EmulatedFaults(EmulatedFault.RESPONSE_CABLE, begin=3.0), HitFlags.NO_RESPONSE),
-        (EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE),
+        pytest.param(EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE, marks=pytest.mark.long),
         (EmulatedFaults(EmulatedFault.SATURATED, begin=3.0), HitFlags.NO_RESPONSE),
         (EmulatedFaults(EmulatedFault.SWAPPED, begin=3.0), HitFlags.SWAPPED_CHANNELS),
         (EmulatedFaults(EmulatedFault.SOFT_TIP), HitFlags.NARROW_BAND),
@@ -293,7 +293,7 @@ class SlowHands(Simulated):
         super().__init__(signal, EMULATED_CHANNELS)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("begin", "is_left_open"), [(6.0, True), (np.inf, False)])
+@pytest.mark.parametrize(("begin", "is_left_open"), [(6.0, True), pytest.param(np.inf, False, marks=pytest.mark.long)])
 def test_a_spindle_that_starts_slowly_during_the_test_leaves_a_question(
     folder: MachineFolder, session_of: Callable[..., Any], begin: float, is_left_open: bool
 ) -> None:

@@ -188,9 +188,7 @@ def check_other_stiffness(modes: Sequence[Mode], reference: SeriesReference) -> 
     strongest = max((mode.peak for mode in modes), default=0.0)
     strong = [mode for mode in modes if mode.peak >= MIN_STIFFNESS_PEAK_RATIO * strongest]
     series = [_follow(mode.frequency, tests) for mode in strong for tests in (reference.level, reference.across)]
-    common = tuple(
-        test._replace(is_new_level=test.is_new_level or not i) for one in series for i, test in enumerate(one)
-    )
+    common = tuple(test for tests in series for test in tests)
     for mode, own, across in zip(strong, series[::2], series[1::2], strict=True):
         asked = [check_level_stiffness(mode, SeriesReference(own, scatter)) for scatter in (across, common)]
         if len(own) >= MIN_MODE_TESTS and all(asked):

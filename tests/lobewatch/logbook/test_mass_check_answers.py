@@ -52,6 +52,7 @@ def test_passed_checks_of_the_day_before_and_after_answer_the_question(
 
 def test_a_check_that_fails_or_is_excluded_or_of_another_chain_answers_nothing(mismatched: Shop) -> None:
     hit_mass(mismatched, -0.5)
+    hit_mass(mismatched, 0.2)
     hit_mass(mismatched, 0.5, ratio=2.0)
     hit_mass(mismatched, 0.6, entered(1.2))
     assert codes(mismatched) == {TOOL_COMPLIANCE.code}

@@ -94,6 +94,13 @@ def test_a_followed_mode_out_of_the_usable_band_is_asked_about(
     assert [remark.code for remark in [asked] if remark] == ["other-band"] * is_asked
 
 
+def test_an_earlier_mode_that_is_gone_is_not_the_one_beside_it() -> None:
+    tests = months_of((TOOL, (1450.0, 0.02, 1e7)))
+    asked = check_other_modes(of(TOOL, (900.0, 0.02, 1e7)), SeriesReference(tests))
+    assert asked is not None
+    assert asked.about == "900 Hz"
+
+
 def stiffer(values: Values, ratio: float) -> Values:
     return *values[:2], values[2] * ratio
 
@@ -122,6 +129,15 @@ def test_a_stiffness_that_scatters_in_the_other_direction_raises_the_limit() -> 
     now, own = of(SPINDLE, stiffer(TOOL, 1.35)), months_of((SPINDLE, TOOL), 3)
     assert check_other_stiffness(now, SeriesReference(own)) is not None
     assert check_other_stiffness(now, SeriesReference(own, across)) is None
+
+
+def test_the_stiffness_scatter_of_all_modes_counts() -> None:
+    scatter = np.exp(0.3 * np.random.default_rng(3).standard_normal(20))
+    others = SPINDLE, (1000.0, 0.02, 3e7), (2200.0, 0.02, 2e7)
+    own = tuple(months_of((*(stiffer(other, by) for other in others), TOOL), 1)[0] for by in scatter)
+    now = of(*others, stiffer(TOOL, 1.35))
+    assert check_other_stiffness(now, SeriesReference(own)) is None
+    assert check_other_stiffness(now, SeriesReference(months_of((*others, TOOL), 20))) is not None
 
 
 @given(seed=st.integers(0, 2**32 - 1), first=st.floats(-0.08, 0.08), second=st.floats(-0.08, 0.08))
@@ -166,6 +182,25 @@ def test_the_rise_that_is_asked_about_is_that_of_student(count: int) -> None:
     rise = limit * float(rates @ weights / np.sum(weights))
     assert check_common_damping(damped(0.98 * rise), reference) is None
     assert check_common_damping(damped(1.02 * rise), reference) is not None
+
+
+def test_a_window_that_comes_and_goes_raises_the_limit() -> None:
+    rises = 25.0 * np.random.default_rng(4).standard_normal(8)
+    tests = tuple(
+        months_of([(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in damped(rise)], 1)[0]
+        for rise in rises
+    )
+    assert check_common_damping(damped(30.0), SeriesReference(tests)) is None
+
+
+def test_a_window_raises_all_modes() -> None:
+    def raised(*rises: float) -> list[Mode]:
+        modes = zip((TOOL, SPINDLE), rises, strict=True)
+        return [Mode(f, zeta + rise / (2 * np.pi * f), stiffness) for (f, zeta, stiffness), rise in modes]
+
+    reference = SeriesReference(months_of((TOOL, SPINDLE), 20))
+    assert check_common_damping(raised(0.1, 3.9), reference) is not None
+    assert check_common_damping(raised(-0.1, 3.9), reference) is None
 
 
 def test_damping_raised_by_a_share_or_in_one_mode_is_no_window() -> None:

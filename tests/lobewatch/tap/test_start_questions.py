@@ -256,6 +256,12 @@ def test_a_weak_line_that_was_not_there_before_the_first_hit_is_asked_about(
     assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
 
 
+def test_a_strong_line_is_asked_about_even_if_it_was_there_before() -> None:
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    questions.check_after(record_at_rest({16.0: 2.0}), record_at_rest({16.0: 2.0}))
+    assert questions.left_open == [SPINDLE_TURNING.code]
+
+
 def test_an_accepted_line_after_the_last_hit_asks_nothing() -> None:
     questions = StartQuestions(
         StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", [SPINDLE_TURNING.code], asks=False

@@ -10,6 +10,9 @@ from lobewatch.commands.shared_options import ReclampingScatter, Seed, WearScena
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
+DIRECTION_DIFFERENCE = 2e-4
+"""Relative difference of f1 in x and y of a demo without scatter, chosen. Without any, y repeats x."""
+
 
 def demo(
     out: Annotated[Path | None, Option(help="New folder. Default: lobewatch-demo.")] = None,
@@ -43,7 +46,8 @@ def demo(
         from lobewatch.tap.demo import age_spindle, compare_with_truth, forecast_levels
         from lobewatch.tap.emulated_spindle import MountingVariation, SpindleWear, WearScenario
 
-        mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature)
+        differ = 0.0 if scatter else DIRECTION_DIFFERENCE
+        mounting = MountingVariation(scatter / 100, bad_clampings / 100, temperature, differ)
         mounting.check()
         path = out or _find_free_name()
         make_machine_folder(path, "surrogate_machine.toml")

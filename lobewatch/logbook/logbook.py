@@ -31,9 +31,8 @@ ROW_SAVING_PAUSE = 10
 class Logbook:
     """Tap tests, test cuts and results of one machine.
 
-    A logbook shows the machine folder as it was at the first access. `commit` and `replay` add to it, and `is_current`
-    tells whether another program has changed the folder. Reading updates history.rows if the lock of the folder is
-    free. Otherwise the logbook works in memory, and a remark says so. All results come from `Analysis`.
+    A logbook shows the folder as it was at the first access. `commit` and `replay` add to it, and `is_current` tells
+    whether another program has changed it. Reading updates history.rows if it can lock the folder, else a remark tells.
 
     Examples
     --------
@@ -41,8 +40,7 @@ class Logbook:
     >>> from tempfile import TemporaryDirectory
     >>> from lobewatch.machine import make_machine_folder
     >>> with TemporaryDirectory() as parent:
-    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
-    ...     logbook = Logbook.open(toml.parent)
+    ...     logbook = Logbook.open(make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml").parent)
     ...     status = logbook.status()
     >>> status.status.value, [reason.code for reason in status.reasons]
     ('unknown', ['never-tapped'])
@@ -294,9 +292,8 @@ class Logbook:
         """
         with self.folder.locked():
             enter_orphaned_taps(self.folder)  # else an interrupted replay would be stored twice
-            outcome = recordings.store_recordings(
-                self.folder, files, description, on_stored=self._remember_fit, **options
-            )
+            options["on_stored"] = self._remember_fit
+            outcome = recordings.store_recordings(self.folder, files, description, **options)
             self._invalidate()
             known = dict.fromkeys(outcome.already_stored.values())
             decided = [tap_id for tap_id in known if self.decide_hits(tap_id, description.hit_decisions)]

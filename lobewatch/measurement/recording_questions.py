@@ -55,6 +55,12 @@ OTHER_BAND = RecordingQuestion(
     "other-band", 0.9, "usable band {low:.0f}..{high:.0f} Hz does not cover [mode] band_hz {first:g}..{last:g} Hz"
 )
 """Limit: share of [mode] band_hz that a recording has to cover; chosen."""
+FOLLOWED_OUT_OF_BAND = RecordingQuestion(
+    OTHER_BAND.code,
+    sentence="usable band {low:.0f}..{high:.0f} Hz does not contain the followed mode of the newest test at "
+    "{last:.0f} Hz: is the hammer tip too soft?",
+)
+"""Asked if the mode to follow is outside of the usable band."""
 NO_MODE_TO_FOLLOW = RecordingQuestion("no-mode-to-follow")
 """Asked if no mode continues the followed one."""
 STIFFNESS_JUMP = RecordingQuestion(
@@ -180,6 +186,13 @@ def check_frequency_jump(last: Mode, now: Mode) -> Remark | None:
     if abs(change) <= FREQUENCY_JUMP.limit:
         return None
     return FREQUENCY_JUMP.ask(f"{now.frequency:.0f} Hz", now=now.frequency, percent=100 * change, last=last.frequency)
+
+
+def check_followed_band(last: Mode, band: tuple[float, float] | None) -> Remark | None:
+    """Return the question about a followed mode outside of the usable band (Hz), where no hit shows it, or None."""
+    if band is None or band[0] <= last.frequency <= band[1]:
+        return None
+    return FOLLOWED_OUT_OF_BAND.ask(f"{last.frequency:.0f} Hz", low=band[0], high=band[1], last=last.frequency)
 
 
 def check_model_stiffness(first: Mode, model: float) -> Remark | None:

@@ -14,12 +14,11 @@ from lobewatch.measurement.series_questions import (
     MIN_PAIRS_FOR_MEDIAN,
     N_PRIOR_PAIRS,
     N_RECENT_TESTS,
-    N_STD_ASKED,
     EarlierTest,
     SeriesReference,
+    check_level_stiffness,
     check_same_direction,
     check_series,
-    estimate_scatter,
     iterate_day_pairs,
 )
 from modal import Mode
@@ -36,14 +35,18 @@ DIRECTION_STD = 0.001
 Both are tapped in one clamping, so it is below FREQUENCY_STD; chosen."""
 MAX_EXCHANGED_STD = 4.0
 """Largest distance from the exchanged directions in standard deviations; chosen. Farther away it is another tool."""
-DAMPING_STD = 0.1
-"""Relative standard deviation of a damping ratio from test to test, before a series shows its own; chosen."""
-MIN_DAMPING_TESTS = 3
-"""Smallest number of earlier tests that show the damping of a series; chosen."""
+DAMPING_STD, N_PRIOR_DAMPINGS = 0.03, 1
+"""Relative standard deviation of a damping ratio from test to test before a series shows its own, and the number of
+tests that it counts for; chosen."""
+MIN_MODE_TESTS = 3
+"""Smallest number of earlier tests that show the damping of a series, or the stiffness of another mode; chosen."""
+MIN_STIFFNESS_PEAK_RATIO = 0.1
+"""Peak of a mode over the largest one, from which its stiffness is compared; chosen. A weaker fit is uncertain."""
 MAX_WINDOW_FREQUENCY_CHANGE = 0.02
 """Largest relative frequency change with a raised damping that a window explains: a window changes none; chosen."""
-MAX_WINDOW_DISTANCE = 2.0
-"""Largest distance of each mode from the common rise, in standard deviations; chosen."""
+MAX_WINDOW_DISTANCE, N_STD_WINDOW = 3.0, 3.8
+"""Largest distance of each mode from the common rise, and number of standard deviations as unlikely as the rise that
+raises the question; chosen. Both must hold, so it is less than N_STD_ASKED."""
 
 
 def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: SeriesReference) -> tuple[Remark, ...]:
@@ -68,7 +71,7 @@ def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: Seri
     change = followed.frequency / reference.level[-1].frequency if reference.level else 1.0
     checks: Sequence[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
     others = partial(check_other_modes, change=change)
-    checks = () if asked else (others, check_exchanged_directions, check_common_damping)
+    checks = () if asked else (others, check_exchanged_directions, check_other_stiffness, check_common_damping)
     further = filter(None, (check(modes, reference) for check in checks))
     return (*asked, *filter(None, [next(further, None)]))
 
@@ -88,29 +91,32 @@ def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change:
     change
         Frequency of the followed mode over that of the newest test. The others may move as far.
     """
-    recent = [_tabulate_test(test) for test in reference.level[-N_RECENT_TESTS:]]
-    now = _tabulate(modes)
+    recent = [_tabulate_test(test)[:, 0] for test in reference.level[-N_RECENT_TESTS:]]
     if not recent:
         return None
-    lost = [f for f in _select_strong(recent[-1])[:, 0] if not _has_become(f, now[:, 0], change)]
-    lost = [f for f in lost if all(_is_among(f, test, 1.0) for test in recent)]
-    new = [f for f in _select_strong(now)[:, 0] if not any(_is_among(f, test, change) for test in recent)]
+    now, strong = _tabulate(modes)[:, 0], _select_strong(_tabulate(modes))[:, 0]
+    before = _select_strong(_tabulate_test(reference.level[-1]))[:, 0]
+    lost = [f for f in before if f not in _match_modes(recent[-1], now, change)]
+    lost = [f for f in lost if all(f in _match_modes(before, test) for test in recent)]
+    new = [f for f in strong if not any(f in _match_modes(test, now, change).values() for test in recent)]
     if not lost or not new:
         return None
     then = min(lost, key=lambda f: abs(math.log(f / new[0])))
     return MODE_JUMP.ask(f"{new[0]:.0f} Hz", now=new[0], before=then, count=len(recent), s="s" * (len(recent) > 1))
 
 
-def _has_become(before: float, now: Floats, change: float) -> bool:
-    """Tell whether an earlier frequency can be any of those now, shape (n,), as another mode changed by a ratio."""
-    ratios = now / before
+def _match_modes(before: Floats, now: Floats, change: float = 1.0) -> dict[float, float]:
+    """Return the frequency that each earlier one has become, nearest first; each counts once.
+
+    change: frequency ratio of another mode, by which these may have moved, too.
+    """
     low, high = (1 - MAX_MODE_FALL) * min(change, 1.0), (1 + MODE_JUMP.limit) * max(change, 1.0)
-    return bool(np.any((ratios >= low) & (ratios <= high)))
-
-
-def _is_among(frequency: float, test: Floats, change: float) -> bool:
-    """Tell whether a frequency can be any of those of the table of an earlier test."""
-    return any(_has_become(before, np.array([frequency]), change) for before in test[:, 0])
+    pairs = [(float(f), float(g)) for f in before for g in now if low <= g / f <= high]
+    found: dict[float, float] = {}
+    for f, g in sorted(pairs, key=lambda pair: abs(math.log(pair[1] / pair[0]))):
+        if f not in found and g not in found.values():
+            found[f] = g
+    return found
 
 
 def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
@@ -166,6 +172,40 @@ def _level_pairs(reference: SeriesReference) -> list[tuple[EarlierTest, EarlierT
     return [(own, other) for own, other in pairs if own.modes and other.modes]
 
 
+def check_other_stiffness(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
+    """Return the question about the stiffness of any strong mode that does not fit its earlier tests, or None.
+
+    Hits away from the tip change each mode by a factor of its own, that of the tool most. The scatter of this mode
+    and that of all modes both count, as that of one in a few tests is uncertain.
+
+    Parameters
+    ----------
+    modes
+        Modes of the test that count.
+    reference
+        Earlier tests of the series.
+    """
+    strongest = max((mode.peak for mode in modes), default=0.0)
+    strong = [mode for mode in modes if mode.peak >= MIN_STIFFNESS_PEAK_RATIO * strongest]
+    series = [_follow(mode.frequency, tests) for mode in strong for tests in (reference.level, reference.across)]
+    common = tuple(test for tests in series for test in tests)
+    for mode, own, across in zip(strong, series[::2], series[1::2], strict=True):
+        asked = [check_level_stiffness(mode, SeriesReference(own, scatter)) for scatter in (across, common)]
+        if len(own) >= MIN_MODE_TESTS and all(asked):
+            return asked[0]
+    return None
+
+
+def _follow(frequency: float, tests: Sequence[EarlierTest]) -> tuple[EarlierTest, ...]:
+    """Return the tests that have a mode near a frequency (Hz), with this mode as the followed one."""
+    near = ((test, min(test.modes, key=lambda mode: abs(mode[0] - frequency), default=None)) for test in tests)
+    return tuple(
+        test._replace(frequency=mode[0], stiffness=mode[2])
+        for test, mode in near
+        if mode is not None and mode[2] > 0 and abs(mode[0] / frequency - 1) <= MODE_JUMP.limit
+    )
+
+
 def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> Remark | None:
     """Return the question about decay rates zeta 2 pi f that rose by one constant in all modes, or None.
 
@@ -185,7 +225,7 @@ def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> R
     Mechanical Systems and Signal Processing 11(1).
     """
     now, tests = _select_strong(_tabulate(modes)), reference.level[-MAX_PAIRS:]
-    if len(tests) < MIN_DAMPING_TESTS or len(now) < 2:
+    if len(tests) < MIN_MODE_TESTS or len(now) < 2:
         return None
     then = _trace(now, tests)
     if not np.all(np.isfinite(then)):
@@ -193,16 +233,31 @@ def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> R
     usual = np.median(then, axis=0)
     if np.any(np.abs(now[:, 0] / usual[:, 0] - 1) > MAX_WINDOW_FREQUENCY_CHANGE):
         return None
-    both = [*then[:, :, 1].T, *_trace(now, reference.across[-MAX_PAIRS:])[:, :, 1].T]
-    spread = estimate_scatter([rates[np.isfinite(rates)] for rates in both], DAMPING_STD)
-    std = usual[:, 1] * spread * math.sqrt(1 + math.pi / 2 / len(tests))
-    rise, weight = now[:, 1] - usual[:, 1], std**-2
-    common = float(np.sum(rise * weight) / np.sum(weight))
-    is_common = np.all((rise > 0) & (np.abs(rise - common) <= MAX_WINDOW_DISTANCE * std))
-    if not is_common or common * math.sqrt(float(np.sum(weight))) <= N_STD_ASKED:
+    across = _trace(now, reference.across[-MAX_PAIRS:])
+    both = [rows[:, :, 1] for rows in (then, across[np.all(np.isfinite(across[:, :, 1]), axis=1)])]
+    weight = usual[:, 1] ** -2 / np.sum(usual[:, 1] ** -2)
+    spread, freedom = _estimate_spread([rates @ weight for rates in both])
+    own_spread, _ = _estimate_spread([rates.T for rates in both])
+    rise = now[:, 1] - usual[:, 1]
+    common, std = float(rise @ weight), math.sqrt(1 + 1 / len(tests)) * usual[:, 1]
+    is_common = np.all((rise > 0) & (np.abs(rise - common) <= MAX_WINDOW_DISTANCE * own_spread * std))
+    if not is_common or common <= _student_limit(freedom) * spread * float(std @ weight):
         return None
     asked = {"percent": 100 * rise[0] / usual[0, 1], "rise": common, "time": 1e3 / common, "count": len(tests)}
     return DAMPING_JUMP.ask(f"{now[0, 0]:.0f} Hz", **asked)
+
+
+def _estimate_spread(series: Sequence[Floats]) -> tuple[float, float]:
+    """Return the relative standard deviation of decay rates in series, shape (..., tests), and degrees of freedom."""
+    series = [values for values in series if values.size]
+    squares = sum(float(np.sum((values / np.mean(values, axis=-1, keepdims=True) - 1) ** 2)) for values in series)
+    freedom = N_PRIOR_DAMPINGS + sum(values.size - values.size // values.shape[-1] for values in series)
+    return math.sqrt((squares + N_PRIOR_DAMPINGS * DAMPING_STD**2) / freedom), freedom
+
+
+def _student_limit(freedom: float) -> float:
+    """Return the value of Student's distribution that is as unlikely as N_STD_WINDOW standard deviations."""
+    return math.sqrt(freedom * math.expm1(N_STD_WINDOW**2 / (freedom + 1)))
 
 
 def _trace(now: Floats, tests: Sequence[EarlierTest]) -> Floats:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -143,8 +143,9 @@ def check_series(now: Mode, reference: SeriesReference) -> Iterator[Remark]:
     if rise is not None:
         yield rise
     elif now.has_stiffness:
-        check = _check_level_stiffness if reference.own else _check_other_direction
-        yield from filter(None, [check(now, reference)])
+        checks = (check_level_stiffness, _check_drift) if reference.own else (_check_other_direction,)
+        asked = filter(None, (check(now, reference) for check in checks))
+        yield from islice(asked, 1)
 
 
 def _check_rise(now: Mode, reference: SeriesReference) -> Remark | None:
@@ -162,11 +163,19 @@ def _check_rise(now: Mode, reference: SeriesReference) -> Remark | None:
     return FREQUENCY_RISE.ask(f"{now.frequency:.0f} Hz", **asked)
 
 
-def _check_level_stiffness(now: Mode, reference: SeriesReference) -> Remark | None:
-    """Return the question about a stiffness that the frequency does not explain, or None."""
+def check_level_stiffness(now: Mode, reference: SeriesReference) -> Remark | None:
+    """Return the question about a stiffness that the frequency does not explain, or None.
+
+    Parameters
+    ----------
+    now
+        Followed mode.
+    reference
+        Earlier tests of the series.
+    """
     expected = expect_stiffness(reference, now.frequency)
     if expected is None or not expected.is_beyond(now.stiffness):
-        return _check_drift(now, reference)
+        return None
     here, there = (format_rounded(value, scale=1e6, digits=3) for value in (now.stiffness, expected.value))
     count, limit = len(reference.level), 100 * math.expm1(expected.limit)
     asked = {"now": here, "expected": there, "ratio": now.stiffness / expected.value, "s": "s" * (count > 1)}

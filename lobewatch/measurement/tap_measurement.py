@@ -190,7 +190,8 @@ def interpret_fit(
     with _thread_controller().limit(limits=1):
         trusted = modal.select_credible_modes(_select_in_band(modes, machine))
         remarks += trusted.remarks
-        followed = _follow_mode(trusted, modes, machine, remarks, last)
+        band = None if fit.frf is None else fit.frf.usable_band
+        followed = _follow_mode(trusted, modes, machine, remarks, last, band)
         if followed is not None and not any(remark.code in LOST_MODE_CODES for remark in remarks):
             remarks += find_series_questions(followed, trusted.modes, reference)
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
@@ -232,7 +233,12 @@ def _select_in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
 
 
 def _follow_mode(
-    trusted: CredibleModes, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
+    trusted: CredibleModes,
+    modes: Sequence[Mode],
+    machine: Machine,
+    remarks: list[Remark],
+    last: Mode | None,
+    band: tuple[float, float] | None,
 ) -> Mode | None:
     """Return the credible mode that continues the last one; without a last one, or far off, the predominant one."""
     now = modal.predominant_mode(trusted.modes)
@@ -243,7 +249,7 @@ def _follow_mode(
     next_mode = modal.follow_mode(last, trusted.modes)
     jump = questions.check_frequency_jump(last, now) if next_mode.mode is None else None
     if jump is not None:
-        remarks.append(jump)
+        remarks.append(questions.check_followed_band(last, band) or jump)
         return now
     cure = "For a rebuilt spindle, set [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]

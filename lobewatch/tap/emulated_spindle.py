@@ -350,6 +350,8 @@ class MountingVariation(NamedTuple):
     """Share of tests with a bad clamping (-)."""
     temperature_swing: float | None = None
     """Half the temperature difference of the spindle between summer and winter (K), None if not recorded."""
+    direction_difference: float = 0.0
+    """Relative difference of f1 between the tests of a month (-)."""
 
     def check(self) -> None:
         """Raise ValueError for impossible values."""
@@ -371,7 +373,7 @@ class MountingVariation(NamedTuple):
 
     def shifts(self, months: int, tests: int, random: np.random.Generator) -> Floats:
         """Draw the relative shifts of f1, shape (months, tests)."""
-        shifts = random.normal(scale=self.scatter, size=(months, tests))
+        shifts = random.normal(scale=self.scatter, size=(months, tests)) + self.direction_difference * np.arange(tests)
         if self.bad_share:
             shifts -= BAD_CLAMPING_DROP * (random.random((months, tests)) < self.bad_share)
         if (warmth := self.temperatures(months)) is None:

@@ -183,7 +183,7 @@ class TapPhases:
             return
         record = connection.read_on(blocks, REST_AFTER_DURATION)
         if record is not None:
-            self.questions.check_after(find_quiet_part(record))
+            self.questions.check_after(find_quiet_part(record), self._tap.baseline)
 
     def _check(self, connection: DeviceConnection) -> None:
         """Run the self-check, once per session."""

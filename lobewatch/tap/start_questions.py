@@ -8,7 +8,7 @@ from acquisition.errors import join_sentences
 from lobewatch.measurement.recording_questions import SPINDLE_TURNING
 from lobewatch.tap.self_check import slice_record
 from lobewatch.tap.state import Choice, StatePublisher, TapState, TapStep
-from lobewatch.tap.steady_line import find_steady_line, measure_line
+from lobewatch.tap.steady_line import find_new_line, find_steady_line, measure_line
 
 START_CHOICE = Choice("start", "Yes, start")
 """Answer that begins a test."""
@@ -71,12 +71,13 @@ class StartQuestions:
         self._publisher.show(choices=())
         return baseline
 
-    def check_after(self, record: Hit) -> None:
+    def check_after(self, record: Hit, baseline: Hit) -> None:
         """Leave the question about the spindle open if a record at rest after the last hit has a steady line.
 
-        The response to the last hit may still decay, so the line must be as strong in the second half of the record.
+        A weak one counts if the record before the first hit, baseline, has less of it. The response to the last hit may
+        still decay, so the line must be as strong in the second half of the record.
         """
-        line, middle = find_steady_line(record), record.acceleration.size // 2
+        line, middle = find_steady_line(record) or find_new_line(record, baseline), record.acceleration.size // 2
         if line is None or not line.is_asked:
             return
         halves = slice_record(record, 0, middle), slice_record(record, middle, record.acceleration.size)

@@ -34,6 +34,9 @@ MIN_LINE_VELOCITY = 0.28e-3
 Smallest vibration severity of ISO 10816-1:1995, table B.1. At 3000 rpm it is 0.09 m/s^2. Healthy spindles have 0.3 to
 1 m/s^2 there, and floors next to machines less than 0.2 mm/s.
 """
+MIN_NEW_LINE_VELOCITY, MIN_NEW_LINE_RATIO = 0.05e-3, 5.0
+"""RMS velocity (m/s) from which a line is asked about that is stronger than in an earlier record, and the least ratio
+of their rms; chosen. Vibration of the floor is in both records."""
 MIN_LINE_PROMINENCE = 60.0
 """Power of a line over the median of the lines around it, chosen: at most 58 in 1200 records of noise and drift."""
 NEIGHBOUR_LINES = 15
@@ -78,10 +81,10 @@ class SteadyLine:
         return join_sentences(self.finding, "Stop the spindle", cure)
 
 
-def find_steady_line(record: Hit) -> SteadyLine | None:
+def find_steady_line(record: Hit, min_velocity: float = MIN_LINE_VELOCITY) -> SteadyLine | None:
     """Find the steady line with the largest velocity in a record without hits, None without one.
 
-    Electrical hum is returned only if there is no other line.
+    Electrical hum is returned only if there is no other line. min_velocity: rms (m/s).
     """
     frequency, power = compute_power_spectrum(record.acceleration, record.sample_rate)
     prominent = power > MIN_LINE_PROMINENCE * _find_local_medians(power)
@@ -90,13 +93,24 @@ def find_steady_line(record: Hit) -> SteadyLine | None:
     lines = [mains for mains in MAINS if is_electrical_hum(frequency, power, mains)]
     hum = _select_lines(frequency, *(line for mains in lines for line in list_harmonics(mains)))
     for is_hum, usable in ((False, prominent & ~hum), (True, prominent & hum)):
-        line = _find_fastest_line(frequency, power, usable)
+        line = _find_fastest_line(frequency, power, usable, min_velocity)
         rms = 0.0 if line is None else float(np.sqrt(sum_lines(frequency, power, *list_harmonics(line))))
         total = float(np.sum(power))
         is_dithered = total - rms**2 >= (MIN_DITHER_CODES * step) ** 2
         if line is not None and (is_dithered or rms > MIN_LINE_CODES * step):
             return SteadyLine(line, rms, rms**2 / total, is_hum)
     return None
+
+
+def find_new_line(record: Hit, baseline: Hit) -> SteadyLine | None:
+    """Find a steady line in a record without hits that is weak in an earlier one, however small its velocity is.
+
+    A spindle that begins to turn slowly has the line, the floor and nearby machines have it in both records.
+    """
+    line = find_steady_line(record, MIN_NEW_LINE_VELOCITY)
+    if line is None or line.rms < MIN_NEW_LINE_RATIO * measure_line(baseline, line.frequency):
+        return None
+    return line
 
 
 def measure_line(record: Hit, frequency: float) -> float:
@@ -112,11 +126,11 @@ def is_electrical_hum(frequency: Floats, power: Floats, mains: float) -> bool:
     return first > max(higher) and odd >= MIN_ODD_SHARE * first and odd >= MIN_ODD_RATIO * even
 
 
-def _find_fastest_line(frequency: Floats, power: Floats, usable: Flags) -> float | None:
+def _find_fastest_line(frequency: Floats, power: Floats, usable: Flags, min_velocity: float) -> float | None:
     """Return the frequency of the usable line with the largest velocity (Hz), None if all are slow."""
     velocity = power / (2 * np.pi * np.maximum(frequency, frequency[1])) ** 2
     highest = int(np.argmax(np.where(usable, velocity, 0.0)))
-    if not usable[highest] or sum_lines(frequency, velocity, frequency[highest]) < MIN_LINE_VELOCITY**2:
+    if not usable[highest] or sum_lines(frequency, velocity, frequency[highest]) < min_velocity**2:
         return None
     near = slice(highest - 2, highest + 3)
     line = float(np.average(frequency[near], weights=power[near]))

@@ -29,6 +29,18 @@ SOMETIMES_SILENT = {
 """Kinds that not every machine shows (docs/studies/human-errors.md)."""
 NEEDS_MORE_TESTS = {"names x and y exchanged", "exponential window not stated"}
 """Kinds that three earlier tests show at least."""
+FAST = {
+    "mass check with a wrong mass",
+    "channels swapped",
+    "spindle turns from the start",
+    "cable of the accelerometer broken",
+    "sensor left in x for y",
+    "same tool in another machine",
+    "hits away from the tip",
+    "soft tip",
+    "folder copied",
+}
+"""Kinds of the fast round; tests of their own ask the other questions."""
 OTHER_FACTORS = {
     "first tests, mV/lbf entered as mV/N",
     "gain changed at once",
@@ -71,7 +83,13 @@ def test_an_honest_test_asks_nothing(shop: Workshop, tmp_path: Path) -> None:
     assert not named & frozenset().union(*(error.right for error in ERRORS.values()))
 
 
-@pytest.mark.parametrize("kind", sorted(ERRORS.keys() - NEEDS_MORE_TESTS - OTHER_FACTORS))
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=() if kind in FAST else pytest.mark.long)
+        for kind in sorted(ERRORS.keys() - NEEDS_MORE_TESTS - OTHER_FACTORS)
+    ],
+)
 def test_an_error_is_named(kind: str, shop: Workshop, new_shop: Workshop, tmp_path: Path) -> None:
     error: HumanError = ERRORS[kind]
     other = (shop if error.earlier else new_shop).copy(tmp_path / "m", 2)

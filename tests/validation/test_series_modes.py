@@ -14,13 +14,14 @@ from lobewatch.measurement.series_modes import (
     check_common_damping,
     check_exchanged_directions,
     check_other_modes,
+    check_other_stiffness,
 )
 from lobewatch.measurement.series_questions import EarlierTest, SeriesReference
 from modal import Mode
 
 N_TESTS = 24
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
-CHECKS = check_other_modes, check_exchanged_directions, check_common_damping
+CHECKS = check_other_modes, check_exchanged_directions, check_other_stiffness, check_common_damping
 Array = NDArray[np.float64]
 
 
@@ -37,16 +38,17 @@ class Machine:
         self.stiffness = np.exp(rng.uniform(np.log(1e7), np.log(6e7), count)) * np.ones((2, 1))
         self.reclamping, self.is_one_clamping = np.exp(rng.uniform(np.log(5e-4), np.log(5e-3))), rng.random() < 0.5
         self.drop = rng.uniform(0, 0.1, count) * (rng.random() < 0.7)
+        self.exponent = rng.uniform(0.1, 3.8, count)
 
     def session(self, number: int) -> Array:
         """Return frequency, damping ratio and stiffness of the modes in x and y, shape (2, n, 3)."""
         rng, shape = self.rng, self.frequency.shape
         reclamped = rng.standard_normal((1 if self.is_one_clamping else 2, 1)) * np.ones((2, 1))
         own = 2e-4 * rng.standard_normal(shape)
-        frequency = self.frequency * (1 - self.drop * number / N_TESTS) * np.exp(self.reclamping * reclamped + own)
+        moved = (1 - self.drop * number / N_TESTS) * np.exp(self.reclamping * reclamped + own)
         damping = self.damping * np.exp(self.damping_std * rng.standard_normal(shape))
-        stiffness = self.stiffness * np.exp(0.05 * rng.standard_normal(shape))
-        return np.stack([frequency, damping, stiffness], axis=-1)
+        stiffness = self.stiffness * moved**self.exponent * np.exp(0.05 * rng.standard_normal(shape))
+        return np.stack([self.frequency * moved, damping, stiffness], axis=-1)
 
 
 def ask_all(sessions: list[Array]) -> list[set[str]]:
@@ -73,14 +75,17 @@ LONG = [pytest.param(200, std, marks=pytest.mark.long) for std in (0.03, 0.1, 0.
 
 @pytest.mark.parametrize(("count", "damping_std"), [(25, 0.1), *LONG])
 def test_honest_series_are_left_alone(count: int, damping_std: float) -> None:
-    numbers, asking = Counter[str](), 0
+    numbers, asking, stiffness, repeated = Counter[str](), 0, 0, 0
     for rng in np.random.default_rng(7).spawn(count):
         machine = Machine(rng, damping_std)
         codes = [code for codes in ask_all([machine.session(n) for n in range(N_TESTS)]) for code in codes]
         numbers.update(codes)
-        asking += len(codes) > 0
+        asking += bool({*codes} - {"stiffness-jump"})
+        stiffness, repeated = stiffness + ("stiffness-jump" in codes), repeated + (len(codes) > 1)
     sys.stdout.write(f"scatter of zeta {damping_std}: {asking} of {count} series ask, {dict(numbers)}\n")
     assert asking <= (0.1 if damping_std > 0.1 else 0.03) * count
+    assert stiffness <= 0.08 * count
+    assert repeated <= 0.03 * count
 
 
 def window(session: Array, rng: np.random.Generator) -> Array:

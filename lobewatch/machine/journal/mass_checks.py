@@ -98,13 +98,14 @@ def find_deciding_check(chain: SensorChain, time: datetime, checks: Sequence[Mas
 
 
 def proves_sensitivities(chain: SensorChain | None, time: datetime, checks: Sequence[MassCheckEntry]) -> bool:
-    """Tell whether a passed check with a known mass is the one that decides, later than a tap test or of its day.
+    """Tell whether passed checks with a known mass before and after a tap test, each of its day, hold for it.
 
-    An older check shows no amplifier that was switched since.
+    One alone shows no amplifier that was switched between it and the test.
     """
     decides = None if chain is None else find_deciding_check(chain, time, checks)
-    return decides is not None and decides.passed and decides.mass_kg is not None and _is_of_day(decides, time)
-
-
-def _is_of_day(check: MassCheckEntry, time: datetime) -> bool:
-    return check.date >= time - MAX_REPEAT_TIME
+    if decides is None or not decides.passed:
+        return False
+    passed = [check for check in checks if check.chain == chain and check.passed and not check.excluded]
+    gaps = [check.date - time for check in passed if check.mass_kg is not None]
+    near = [gap for gap in gaps if abs(gap) <= MAX_REPEAT_TIME]
+    return bool(near) and min(near) < timedelta(0) <= max(near)

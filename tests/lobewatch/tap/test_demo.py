@@ -65,6 +65,13 @@ def test_without_scatter_both_directions_fall_by_ten_percent_alike(folder: Machi
     assert np.all(np.diff(found[:, 0]) < 0)
 
 
+def test_directions_differ_as_asked(folder: MachineFolder) -> None:
+    wear = SpindleWear.of(folder, MONTHS, WearScenario.NONE)
+    plans = plan_taps(folder, wear, np.random.default_rng(1), MountingVariation(direction_difference=2e-4), NOW)
+    found = frequencies(plans)
+    assert found[:, 1] / found[:, 0] - 1 == pytest.approx(np.full(MONTHS, 2e-4), rel=1e-6)
+
+
 @pytest.mark.parametrize(("scatter", "seed"), [(0.001, 1), (0.001, 2), (0.005, 3)])
 def test_truths_scatter_by_what_is_asked(folder: MachineFolder, scatter: float, seed: int) -> None:
     moved = frequencies(plan(folder, scatter, seed)) / frequencies(plan(folder, 0.0)) - 1

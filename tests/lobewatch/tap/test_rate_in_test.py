@@ -104,7 +104,7 @@ def test_a_wrong_rate_refuses_the_test_and_its_hits_are_corrected_later(
     assert session.measurement.followed.frequency == pytest.approx(truth, rel=1e-3)
 
 
-@pytest.mark.parametrize(("change", "n_kept"), [(2e-4, 1), (5e-3, 0)])
+@pytest.mark.parametrize(("change", "n_kept"), [pytest.param(2e-4, 1, marks=pytest.mark.long), (5e-3, 0)])
 def test_kept_hits_get_a_rate_that_was_measured_again(
     tapped: Callable[[float], Any], folder: MachineFolder, change: float, n_kept: int
 ) -> None:
@@ -140,7 +140,9 @@ def test_hits_of_an_unknown_rate_are_not_resumed(tapped: Callable[[float], Any],
     assert any(spool.name in text for text in tap.not_resumed)
 
 
-@pytest.mark.parametrize(("error", "is_refused"), [(0.0036, True), (-0.0036, True), (0.001, False)])
+@pytest.mark.parametrize(
+    ("error", "is_refused"), [(0.0036, True), pytest.param(-0.0036, True, marks=pytest.mark.long), (0.001, False)]
+)
 def test_a_short_test_reads_on_until_a_small_error_is_known(
     tapped: Callable[[float], Any], folder: MachineFolder, error: float, is_refused: bool
 ) -> None:

@@ -201,9 +201,9 @@ def test_two_presses_answer_one_question() -> None:
     ("faults", "flag"),
     [
         (EmulatedFaults(turning_rpm=12_000, begin=3.0), HitFlags.STEADY_VIBRATION),
-        (EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION),
+        pytest.param(EmulatedFaults(turning_rpm=13_020, begin=3.0), HitFlags.STEADY_VIBRATION, marks=pytest.mark.long),
         (EmulatedFaults(EmulatedFault.RESPONSE_CABLE, begin=3.0), HitFlags.NO_RESPONSE),
-        (EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE),
+        pytest.param(EmulatedFaults(EmulatedFault.OPEN_INPUT, begin=3.0), HitFlags.NO_RESPONSE, marks=pytest.mark.long),
         (EmulatedFaults(EmulatedFault.SATURATED, begin=3.0), HitFlags.NO_RESPONSE),
         (EmulatedFaults(EmulatedFault.SWAPPED, begin=3.0), HitFlags.SWAPPED_CHANNELS),
         (EmulatedFaults(EmulatedFault.SOFT_TIP), HitFlags.NARROW_BAND),
@@ -229,7 +229,7 @@ def test_a_hit_that_the_hammer_does_not_show_is_named(folder: MachineFolder, ses
 def test_a_spindle_that_turns_after_the_last_hit_leaves_its_question_open(rpm: float, is_left_open: bool) -> None:
     questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
     for _ in range(2):
-        questions.check_after(record_at_rest({rpm / 60: 2.0} if rpm else {}))
+        questions.check_after(record_at_rest({rpm / 60: 2.0} if rpm else {}), record_at_rest({}))
     assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
 
 
@@ -239,15 +239,34 @@ def test_a_response_that_still_decays_is_no_turning_spindle(half_life: float, is
     line = 3.0 * 0.5 ** (time / half_life) * np.sin(2 * np.pi * 20.0 * time)
     codes = np.stack([INPUTS[0].channel.encode(record.force), INPUTS[1].channel.encode(record.acceleration + line)])
     questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
-    questions.check_after(Hit.from_codes(codes, EMULATED_CHANNELS, RATE))
+    questions.check_after(Hit.from_codes(codes, EMULATED_CHANNELS, RATE), record)
     assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "is_left_open"),
+    [(0.0, 0.2, True), (0.0, 0.08, False), (0.06, 0.2, False), (0.02, 0.2, True), (0.2, 0.2, False)],
+)
+def test_a_weak_line_that_was_not_there_before_the_first_hit_is_asked_about(
+    before: float, after: float, is_left_open: bool
+) -> None:
+    """0.2 m/s^2 at 320 Hz are 0.1 mm/s."""
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    questions.check_after(*(record_at_rest({320.0: rms}, 0.1) for rms in (after, before)))
+    assert questions.left_open == [SPINDLE_TURNING.code] * is_left_open
+
+
+def test_a_strong_line_is_asked_about_even_if_it_was_there_before() -> None:
+    questions = StartQuestions(StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", (), asks=False)
+    questions.check_after(record_at_rest({16.0: 2.0}), record_at_rest({16.0: 2.0}))
+    assert questions.left_open == [SPINDLE_TURNING.code]
 
 
 def test_an_accepted_line_after_the_last_hit_asks_nothing() -> None:
     questions = StartQuestions(
         StatePublisher(TapState(0, TapStep.CHECKING, "m")), "R", [SPINDLE_TURNING.code], asks=False
     )
-    questions.check_after(record_at_rest({16.0: 2.0}))
+    questions.check_after(record_at_rest({16.0: 2.0}), record_at_rest({}))
     assert questions.left_open == []
 
 
@@ -280,7 +299,7 @@ class SlowHands(Simulated):
         super().__init__(signal, EMULATED_CHANNELS)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("begin", "is_left_open"), [(6.0, True), (np.inf, False)])
+@pytest.mark.parametrize(("begin", "is_left_open"), [(6.0, True), pytest.param(np.inf, False, marks=pytest.mark.long)])
 def test_a_spindle_that_starts_slowly_during_the_test_leaves_a_question(
     folder: MachineFolder, session_of: Callable[..., Any], begin: float, is_left_open: bool
 ) -> None:

@@ -19,6 +19,7 @@ from lobewatch.commands.shared_options import (
     Flutes,
     FolderArgument,
     add_file_options,
+    parse_speeds,
     rpm,
 )
 from lobewatch.show.terminal.output import (
@@ -61,7 +62,7 @@ def listen(
     power: CutPower = None,
     teeth: Flutes = None,
     speeds: Annotated[
-        str, Option(help='Speeds of the machine (rpm): "8000 24000". Default: 0.5 to 1.5 times --speed.')
+        str, Option(help='Speeds of the machine (rpm): "8000-24000". Default: 0.5 to 1.5 times --speed.')
     ] = "",
     file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,
     date: CutDate = None,
@@ -96,7 +97,7 @@ def listen(
 
     Examples
     --------
-      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds "8000 24000" --depth 1
+      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds 8000-24000 --depth 1
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
@@ -118,7 +119,8 @@ def listen(
         others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
         _reject_options(others | {"date": date}, "needs a machine folder")
         description = file_options.description(tacho=tacho, pulses=pulses)
-        _listen_to_file(machine, description, CutFileRequest(teeth, speed, depth, speeds), out, as_json)
+        request = CutFileRequest(teeth, speed, depth, parse_speeds(speeds) if speeds else None)
+        _listen_to_file(machine, description, request, out, as_json)
         return
     _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
     logbook = Logbook.open(machine)

@@ -49,7 +49,7 @@ def lobes(
     ] = None,
     direction: shared.MillingDirection = None,
     speeds: Annotated[
-        str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000 24000".')
+        str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000-24000".')
     ] = "",
     speed: Annotated[
         float | None, Option(parser=shared.rpm, help="Spindle speed of a cut to check (rpm), with --mode.")
@@ -134,7 +134,8 @@ def _show_stated(
     if stated["direction"]:
         cut = cut._replace(direction=stated["direction"])
     if stated["speeds"]:
-        cut = cut.with_speeds(stated["speeds"])
+        low, high = shared.parse_speeds(stated["speeds"])
+        cut = cut._replace(low_rpm=low, high_rpm=high)
     x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
     with show_progress("searching stable pockets"), time_step("lobes"):
         comparison = compare_stated_modes(cut, x, y, stated["speed"], stated["depth"], method)

@@ -78,6 +78,16 @@ def rpm(text: str | float) -> float:
         raise BadParameter(str(error)) from None
 
 
+def parse_speeds(text: str) -> tuple[float, float]:
+    """Parse the option --speeds: lowest and highest spindle speed (rpm)."""
+    from lobewatch.machine.settings.speed_range import parse_speed_range
+
+    try:
+        return parse_speed_range(text)
+    except ValueError as error:
+        raise ValueError(f"--speeds {error}") from None
+
+
 def mass(text: str | float) -> float:
     """Parse a mass of the check with a known mass (kg), within its limits."""
     from lobewatch.tap.mass_check import read_mass

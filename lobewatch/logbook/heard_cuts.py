@@ -35,8 +35,8 @@ class CutFileRequest(NamedTuple):
     """Set spindle speed (rpm); None if not given."""
     depth_mm: float | None = None
     """Axial depth of cut (mm); None if unknown."""
-    speeds: str = ""
-    """Slowest and fastest speed of the machine (rpm); empty if unknown."""
+    range_rpm: tuple[float, float] | None = None
+    """Slowest and fastest speed of the machine (rpm); None if unknown."""
 
     def check(self) -> tuple[int, float, float, tuple[float, float]]:
         """Return teeth, speed (rpm), depth (m, NaN if unknown) and speed range (rpm); ValueError for bad values."""
@@ -51,18 +51,12 @@ class CutFileRequest(NamedTuple):
         return self.teeth, self.speed_rpm, depth, self._range_rpm(self.speed_rpm)
 
     def _range_rpm(self, speed_rpm: float) -> tuple[float, float]:
-        if not self.speeds:
+        if self.range_rpm is None:
             return ASSUMED_RANGE[0] * speed_rpm, ASSUMED_RANGE[1] * speed_rpm
-        example = 'Give the slowest and the fastest speed: "8000 24000".'
-        try:
-            low, high = (float(word) for word in self.speeds.replace(",", " ").split())
-        except ValueError:
-            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not two numbers. {example}") from None
-        if not 0 < low < high < math.inf:
-            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not a rising range above 0. {example}")
+        low, high = self.range_rpm
         if not low <= speed_rpm <= high:
             raise ValueError(
-                f"CutFileRequest.speed_rpm {speed_rpm:g} is outside CutFileRequest.speeds {low:g}..{high:g}. "
+                f"CutFileRequest.speed_rpm {speed_rpm:g} is outside CutFileRequest.range_rpm {low:g}..{high:g}. "
                 "Correct one of them."
             )
         return low, high

@@ -64,7 +64,7 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def request(self) -> CutFileRequest:
         """The same facts as of a recording on the command line."""
-        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
+        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, self.range_rpm)
 
 
 LABELS = {

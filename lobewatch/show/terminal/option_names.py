@@ -38,6 +38,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "CutFileRequest.range_rpm": "--speeds",
     "CutFileRequest.speed_rpm": "--speed",
     "CutFileRequest.teeth": "--teeth",
+    "cut_recording.acquire_cut": "lobewatch listen",
     "decide_hits.accept": "--accept-hit",
     "decide_hits.undo": "lobewatch modes MACHINE TAP --undo-hit",
     "Description.averages": "--averages",

@@ -72,6 +72,12 @@ def test_a_file_without_a_machine_gives_chatter_and_the_next_speeds(tmp_path: Pa
     assert run(*arguments).exit_code == 0
 
 
+@pytest.mark.parametrize("speeds", ["5,000 24,000", "5000-24000", "5000..24000 rpm"])
+def test_speeds_are_read_like_those_of_a_machine(tmp_path: Path, speeds: str) -> None:
+    arguments = ("listen", sound(tmp_path / "cut.wav"), "--teeth", 2, "--speed", RPM, "--speeds", speeds, "--json")
+    assert json.loads(run(*arguments).stdout)["range_rpm"] == [5000, 24000]
+
+
 def test_air_is_missed_only_where_it_matters(tmp_path: Path) -> None:
     arguments = ("--teeth", 2, "--speed", RPM, "--json")
     stable = json.loads(run("listen", sound(tmp_path / "a.wav", None), *arguments).stdout)
@@ -142,7 +148,10 @@ def test_without_a_tap_test_only_the_cut_at_that_speed_decides(untapped: Shop) -
     program = check(untapped)
     assert (program["verdict"], program["decided_by"]) == ("doubtful", "no-tap-test")
     assert (program["limit_mm"], program["stable"]) == (None, None)
-    assert [remark["code"] for remark in program["remarks"]] == ["no-tap-test"]
+    (remark,) = program["remarks"]
+    assert remark["code"] == "no-tap-test"
+    assert "_" not in remark["text"] + remark["cure"]  # no name of the library
+    assert "lobewatch listen" in remark["cure"]
     assert run("observe", untapped.path, "--program", "A", "--depth", 1.2, "--stable").exit_code == 0
     assert (check(untapped)["verdict"], check(untapped)["decided_by"]) == ("stable", None)
     for value in (("--depth", 1.3), ("--speed", 18100, "--depth", 1), ("--direction", "up"), ("--radial", 15)):

@@ -171,7 +171,7 @@ def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
     newest = comparisons[-1]
     texts = [text for text in recording_texts(comparisons) if isinstance(text, str)]
     finding = reason_text(newest) if newest.detected.verdict == "cannot tell" else ""
-    sentence, *_ = [text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)]
+    sentence = next((text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)), "")
     more = {"finding": finding, "texts": texts, "next_text": sentence}
     return recorded_cut_json(newest) | next_speeds_json(found) | more
 

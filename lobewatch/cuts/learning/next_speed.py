@@ -91,7 +91,7 @@ class NextSpeeds(NamedTuple):
 
     reason: str
     """Code of the reason. Empty, or "no-deep-speed" with a smaller depth: there are speeds. Without speeds: "stable"
-    (nothing left to try), "no-chatter-frequency", "no-speed-in-range" (no pocket inside)."""
+    (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency", "no-speed-in-range" (no pocket inside)."""
     range_rpm: tuple[float, float]
     """Slowest and fastest speed (rpm) searched."""
     speeds: tuple[NextSpeed, ...] = ()
@@ -122,6 +122,8 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     low, high = range_rpm
     if not (teeth >= 1 and 0 < low < high < math.inf):
         raise ValueError(f"teeth={teeth}, range_rpm={low:g}..{high:g} are invalid. Give teeth >= 1 and a rising range.")
+    if not cuts:
+        return NextSpeeds("no-verdict", range_rpm)
     valid, contradicting = _drop_contradicted(cuts)
     modes = _find_modes(valid, teeth)
     reason = _find_reason(valid, modes, teeth, range_rpm)

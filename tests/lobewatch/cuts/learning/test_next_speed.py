@@ -89,7 +89,7 @@ def test_a_stable_cut_ends_the_search_and_a_contradicting_one_begins_it_again() 
 @pytest.mark.parametrize(
     ("cuts", "reason"),
     [
-        ([], "no-chatter-frequency"),
+        ([], "no-verdict"),
         ([chatter(18000, math.nan)], "no-chatter-frequency"),
         ([HeardCut(18000, "stable")], "stable"),
     ],

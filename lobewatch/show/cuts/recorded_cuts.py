@@ -92,6 +92,8 @@ def _fault_text(comparison: CutComparison) -> str:
             remedy = (
                 f"Use a sample rate of {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
             )
+        case "overload" if comparison.sensor == "microphone":
+            finding, remedy = "the recording is overloaded", "Hold the microphone or phone further away"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
             distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz,"

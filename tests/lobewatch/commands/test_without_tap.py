@@ -83,7 +83,16 @@ def test_air_is_missed_only_where_it_matters(tmp_path: Path) -> None:
     stable = json.loads(run("listen", sound(tmp_path / "a.wav", None), *arguments).stdout)
     assert (stable["word"], stable["next_reason"]) == ("stable", "stable")
     tone = json.loads(run("listen", sound(tmp_path / "b.wav", None, tone=1234.0), *arguments).stdout)
-    assert (tone["word"], tone["reason"], tone["next_reason"]) == ("cannot tell", "no-air", "no-chatter-frequency")
+    assert (tone["word"], tone["reason"], tone["next_reason"]) == ("cannot tell", "no-air", "no-verdict")
+
+
+def test_an_overloaded_sound_names_no_accelerometer_and_no_next_speed(tmp_path: Path) -> None:
+    rate, values = scipy.io.wavfile.read(sound(tmp_path / "cut.wav"))
+    scipy.io.wavfile.write(tmp_path / "cut.wav", rate, np.clip(20 * values, -1, 1))
+    arguments = ("listen", tmp_path / "cut.wav", "--teeth", 2, "--speed", RPM)
+    told = json.loads(run(*arguments, "--json").stdout)
+    assert (told["word"], told["reason"], told["next_reason"]) == ("cannot tell", "overload", "no-verdict")
+    assert "accelerometer" not in run(*arguments).stdout
 
 
 def test_a_motion_needs_no_sensor_option(tmp_path: Path) -> None:
@@ -124,7 +133,7 @@ def test_a_missing_file_is_named_and_a_folder_takes_no_flutes(untapped: Shop, tm
 
 def test_cuts_are_kept_until_one_is_stable(untapped: Shop, tmp_path: Path) -> None:
     start = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
-    assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-chatter-frequency")
+    assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-verdict")
     file = sound(tmp_path / "cut.wav")
     dry, kept = (
         json.loads(run("listen", untapped.path, *arguments, "--json").stdout)

@@ -223,7 +223,8 @@ def _suggest_untapped(
     setting = comparisons[-1].setting
     if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
         return {}, []
-    made = [comparison.to_recorded_cut(datetime.now(UTC)) for comparison in comparisons]
+    now = datetime.now(UTC)
+    made = [comparison.to_recorded_cut(now) for comparison in comparisons]
     found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
     return next_speeds_json(found), next_speeds_texts(found)
 

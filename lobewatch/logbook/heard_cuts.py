@@ -18,7 +18,7 @@ from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
-from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import CutSetting
 
@@ -141,13 +141,13 @@ def find_heard_cuts(setting: CutSetting, cuts: Iterable[CutEntry], since: dateti
         Time of the newest baseline, before which cuts do not count; None without one.
     """
     key = setting.tool, geometry_key(setting.cut), setting.material, setting.feed
-    return [
-        HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth)
+    same = [
+        cut
         for cut in cuts
-        if cut.is_usable
-        and (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key
-        and (since is None or cut.at >= since)
+        if (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key and (since is None or cut.at >= since)
     ]
+    decisive = list_decisive_cuts(same)
+    return [HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth) for cut in decisive]
 
 
 def is_untapped(logbook: Logbook) -> bool:

@@ -34,6 +34,16 @@ def sound(path: Path, chatter: float | None = CHATTER, *, flutes: int = 2, tone:
     return path
 
 
+def passes(folder: Path, chatters: list[float | None], *, tone: float = 0.0) -> Path:
+    """Write a sound file of several cuts with air, and a tone throughout if it is given (Hz)."""
+    cuts = [scipy.io.wavfile.read(sound(folder / "part.wav", chatter))[1] for chatter in chatters]
+    silence = np.random.default_rng(1).normal(scale=2e-4, size=RATE)
+    signal = np.concatenate([silence, *(part for cut in cuts for part in (cut, silence))])
+    signal += 3.0 / 200 * bool(tone) * np.sin(2 * np.pi * tone * np.arange(signal.size) / RATE)
+    scipy.io.wavfile.write(folder / "passes.wav", RATE, signal.astype(np.float32))
+    return folder / "passes.wav"
+
+
 def run(*arguments: object) -> Result:
     result = CliRunner().invoke(app, [*map(str, arguments)])
     if isinstance(result.exception, ValueError | OSError):
@@ -181,3 +191,36 @@ def test_a_cut_of_another_kind_proves_nothing(untapped: Shop, more: str) -> None
     assert run("observe", untapped.path, "--program", "A", "--stable").exit_code == 0
     untapped.edit('name = "A"', f'name = "B"\n{more}')
     assert check(untapped)["verdict"] == "doubtful"
+
+
+def test_a_stable_cut_after_chatter_leaves_the_program_doubtful(untapped: Shop) -> None:
+    for word in ("--chatter", "--stable"):
+        assert run("observe", untapped.path, "--program", "A", word).exit_code == 0
+    program = check(untapped)
+    assert (program["verdict"], program["decided_by"]) == ("doubtful", "no-tap-test")
+    assert [remark["code"] for remark in program["remarks"]] == ["no-tap-test", "cuts-contradict"]
+    assert run("exclude", untapped.path, "c1", "--reason", "x").exit_code == 0
+    assert check(untapped)["verdict"] == "stable"
+
+
+@pytest.mark.parametrize("chatters", [[CHATTER, None], [None, CHATTER]])
+def test_the_worst_pass_decides_on_a_recording(untapped: Shop, tmp_path: Path, chatters: list[float | None]) -> None:
+    file = passes(tmp_path, chatters)
+    told = json.loads(run("listen", file, "--teeth", 2, "--speed", RPM, "--json").stdout)
+    assert sorted(cut["word"] for cut in told["cuts"]) == ["chatter", "stable"]
+    assert (told["word"], told["next_reason"], told["contradicting_rpm"]) == ("chatter", "", [])
+    arguments = ("--program", "A", "--file", file, "--sensor", "microphone", "--json")
+    stored = json.loads(run("listen", untapped.path, *arguments).stdout)
+    assert (stored["next_reason"], stored["contradicting_rpm"]) == ("", [])
+    assert check(untapped)["verdict"] == "not stable"
+
+
+def test_air_of_an_earlier_cut_serves_a_tool_without_a_tap_test(untapped: Shop, tmp_path: Path) -> None:
+    tone, common = 1234.0, ("--program", "A", "--sensor", "microphone", "--json")
+    alone = sound(tmp_path / "alone.wav", None, tone=tone)
+    missed = json.loads(run("listen", untapped.path, *common, "--file", alone, "--dry-run").stdout)
+    assert (missed["word"], missed["reason"]) == ("cannot tell", "no-air")
+    first = json.loads(run("listen", untapped.path, *common, "--file", passes(tmp_path, [None], tone=tone)).stdout)
+    assert (first["word"], first["air_from"]) == ("stable", None)
+    again = json.loads(run("listen", untapped.path, *common, "--file", alone, "--dry-run").stdout)
+    assert (again["word"], again["air_from"]) == ("stable", first["id"])

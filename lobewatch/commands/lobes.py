@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from typer import Option
+from typer import Context, Option
 
 from lobewatch.commands import shared_options as shared
 from lobewatch.commands.shared_options import Now
@@ -20,7 +20,14 @@ DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
+MACHINE_OPTIONS = ("machine", "cut", "tool", "source", "radial", "waterfall", "now")
+"""Names of the options that only a machine folder has."""
+STATED_OPTIONS = ("mode_y", "teeth", "material", "diameter", "radial_depth", "direction", "speeds", "speed", "depth")
+"""Names of the options that only --mode has."""
+
+
 def lobes(
+    ctx: Context,
     machine: Annotated[
         Path | None, shared.FolderArgument(help="Machine folder with at least one tap test. None with --mode.")
     ] = None,
@@ -83,10 +90,10 @@ def lobes(
     stated: dict[str, Any] = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
     stated |= {"direction": direction, "speed": speed, "depth": depth, "mode-y": mode_y, "speeds": speeds}
     if mode:
-        _reject_options({"tool": tool, "radial": radial, "waterfall": waterfall, "MACHINE": machine}, "with --mode")
+        shared.reject_options(ctx, MACHINE_OPTIONS, "cannot be used with --mode")
         _show_stated(mode, stated, LobeMethod(method), figure, as_json)
         return
-    _reject_options(stated, "without --mode")
+    shared.reject_options(ctx, STATED_OPTIONS, "cannot be used without --mode")
     if machine is None:
         raise ValueError("neither a machine folder nor --mode is given. Give one of them.")
     logbook = Logbook.open(machine, now)
@@ -112,14 +119,6 @@ def _show(comparison: "LobeComparison", remarks: "Sequence[Remark]", as_json: bo
     from lobewatch.show.programs.advice import comparison_json, comparison_texts
 
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))
-
-
-def _reject_options(options: Mapping[str, Any], problem: str) -> None:
-    """Raise ValueError for any option that is given."""
-    for name, value in options.items():
-        if value not in (None, "", []):
-            option = name if name.isupper() else f"--{name}"
-            raise ValueError(f"{option} cannot be used {problem}. Leave out this option.")
 
 
 def _show_stated(

@@ -10,7 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from typer import Argument, BadParameter, Option
+from typer import Argument, BadParameter, Context, Option
 
 import acquisition
 from lobewatch.machine.folder_files import to_folder_path
@@ -239,11 +239,24 @@ def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Comm
     return decorate
 
 
-def reject_file_options(options: FileOptions, **others: Any) -> None:
-    """Raise ValueError for any option on a file, because a stored tap test needs none."""
-    for name, value in (vars(options) | others).items():
-        if value is not None and value not in ("", False):
-            raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave out this option.")
+GENERAL_OPTIONS = ("as_json", "quiet", "verbose")
+"""Names of the options that apply to all uses of a command."""
+
+
+def reject_options(ctx: Context, names: Iterable[str], problem: str) -> None:
+    """Raise ValueError for the first of these options and arguments that is on the command line."""
+    rejected = set(names)
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(str(parameter.name))
+        if parameter.name in rejected and source is not None and source.name == "COMMANDLINE":
+            label = max(parameter.opts, key=len)
+            given = label if label.startswith("-") else label.upper()
+            raise ValueError(f"{given} {problem}. Leave out {given}.")
+
+
+def allow_options(ctx: Context, names: Iterable[str], problem: str) -> None:
+    """Raise ValueError for any other option that is on the command line, except for `GENERAL_OPTIONS`."""
+    reject_options(ctx, {str(each.name) for each in ctx.command.params}.difference(names, GENERAL_OPTIONS), problem)
 
 
 def join_hit_files(

@@ -141,6 +141,33 @@ def test_a_missing_file_is_named_and_a_folder_takes_no_flutes(untapped: Shop, tm
     assert "--teeth" in str(run("listen", untapped.path, "--program", "A", "--teeth", 2).exception)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "rejected"),
+    [
+        (("cut.wav", "--seconds", 5), "--seconds"),
+        (("cut.wav", "--cuts", 3), "--cuts"),
+        (("cut.wav", "--sensor", "accelerometer"), "--sensor"),
+        (("--page", "--teeth", 4), "--teeth"),
+        (("--page", "--out", "a.png"), "--out"),
+        (("--page", "--dry-run"), "--dry-run"),
+        (("--page", "cut.wav"), "MACHINE"),
+        (("folder", "--rate", 5000), "--rate"),
+        (("folder", "--http-port", 8080), "--http-port"),
+        (("folder", "--file", "cut.wav", "--seconds", 120), "--seconds"),
+        (("nosuch", "--teeth", 4), "nosuch: no such file or folder"),
+    ],
+)
+def test_an_option_that_does_not_apply_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[object, ...], rejected: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    Path("cut.wav").touch()
+    error = run("listen", *arguments).exception
+    assert isinstance(error, ValueError)
+    assert str(error).startswith(rejected)
+
+
 def test_cuts_are_kept_until_one_is_stable(untapped: Shop, tmp_path: Path) -> None:
     start = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
     assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-verdict")

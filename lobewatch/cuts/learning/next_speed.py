@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
 from lobewatch.cuts.learning.sampled_lobes import SampledLobes, sample_lobes
 from lobewatch.machine.journal.entries import CutVerdict
@@ -23,6 +23,8 @@ SAME_MODE_TOLERANCE, SIDEBAND_TOLERANCE = 0.15, 0.02
 """Logarithmic distances within which a chatter frequency, or a side band of it, belongs to a known mode; chosen."""
 CHATTER_OVER_NATURAL = 1.015
 """Mean chatter frequency over natural frequency; chosen on simulated cuts (docs/studies/cuts.md)."""
+CLASSIC_TOLERANCE = 0.025
+"""Relative distance of the first suggested speed below that of the classic rule; chosen."""
 MAX_MODES = 4
 """Largest number of modes in a search."""
 LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.02
@@ -128,7 +130,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
         raise ValueError(f"teeth={teeth}, range_rpm={low:g}..{high:g} are invalid. Give teeth >= 1 and a rising range.")
     valid, contradicting = _drop_contradicted(cuts)
     modes = _find_modes(valid, teeth)
-    if cuts and not cuts[-1].has_chatter:
+    if valid and not valid[-1].has_chatter:
         return NextSpeeds("stable", range_rpm, (), contradicting)
     if not modes:
         return NextSpeeds("no-chatter-frequency", range_rpm, (), contradicting)
@@ -203,11 +205,21 @@ def _find_deepest_speeds(
         if cut.has_chatter and not cut.depth > depth / NEXT_DEPTH_FACTOR * (1 + TRIED_TOLERANCE):
             score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
     found = list[NextSpeed]()
+    if len(cuts) == 1:
+        score[~_follow_classic_rule(speeds, cuts[0].frequency, teeth)] = -np.inf
     while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
         place = int(np.argmax(score))
         found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
         score[_find_pocket(chance, place)] = -np.inf
     return tuple(found)
+
+
+def _follow_classic_rule(speeds: Floats, frequency: float, teeth: int) -> Flags:
+    """Return where tooth passing is close below a whole share of a chatter frequency; everywhere if nowhere."""
+    waves = 60 * frequency / (teeth * speeds)
+    whole = np.maximum(np.floor(waves), 1)
+    is_near = np.abs(np.log(waves / whole)) < CLASSIC_TOLERANCE
+    return is_near if np.any(is_near) else np.ones_like(is_near)
 
 
 def _relative_depth(depth: float, cuts: Sequence[HeardCut]) -> float:

@@ -229,13 +229,11 @@ def _suggest_untapped(
 
     stored: all cuts of the journal. None to add these cuts to those of the logbook.
     """
-    from acquisition import DataError
-    from lobewatch.logbook import Analysis
-    from lobewatch.logbook.heard_cuts import suggest_by_sound
+    from lobewatch.logbook.heard_cuts import is_tool_untapped, suggest_by_sound
     from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
 
     setting = comparisons[-1].setting
-    if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
+    if not is_tool_untapped(logbook, setting.tool):
         return {}, []
     now = datetime.now(UTC)
     made = [comparison.to_recorded_cut(now) for comparison in comparisons]

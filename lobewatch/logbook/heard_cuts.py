@@ -15,6 +15,7 @@ from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
 from lobewatch.history.tap_measurements import NotTappedError
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
@@ -162,6 +163,19 @@ def is_untapped(logbook: Logbook) -> bool:
         return not logbook.newest_tap()
     except NotTappedError:
         return True
+
+
+def is_tool_untapped(logbook: Logbook, tool: str) -> bool:
+    """Return whether a tool has no usable tap test since the baseline, nor modes that another tool gives.
+
+    Parameters
+    ----------
+    logbook
+        Logbook of the machine.
+    tool
+        Name of the tool.
+    """
+    return isinstance(logbook.query(Analysis.assembly_or_reason, tool), NotTappedError)
 
 
 def suggest_by_sound(logbook: Logbook, setting: CutSetting, cuts: Iterable[CutEntry]) -> NextSpeeds:

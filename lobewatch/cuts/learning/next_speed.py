@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
 from lobewatch.cuts.learning.sampled_lobes import SampledLobes, sample_lobes
 from lobewatch.machine.journal.entries import CutVerdict
@@ -23,12 +23,14 @@ SAME_MODE_TOLERANCE, SIDEBAND_TOLERANCE = 0.15, 0.02
 """Logarithmic distances within which a chatter frequency, or a side band of it, belongs to a known mode; chosen."""
 CHATTER_OVER_NATURAL = 1.015
 """Mean chatter frequency over natural frequency; chosen on simulated cuts (docs/studies/cuts.md)."""
+CLASSIC_TOLERANCE = 0.025
+"""Relative distance of the first suggested speed below that of the classic rule; chosen."""
 MAX_MODES = 4
 """Largest number of modes in a search."""
 LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.02
 """Logarithmic uncertainty of a stability limit and of a chatter frequency; chosen."""
-UNEXPLAINED = 0.1
-"""Likelihood of a chatter frequency of another cause over that of the best one; chosen."""
+UNEXPLAINED, SIDEBAND_LIKELIHOOD = 0.1, 0.4
+"""Likelihood of a chatter frequency of another cause, and of a side band, over that of the best one; chosen."""
 MAX_LOBE_GAIN = 20.0
 """Largest limit over the lowest one that counts."""
 SPEED_STEP = 0.005
@@ -130,7 +132,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
         return NextSpeeds("no-verdict", range_rpm)
     valid, contradicting = _drop_contradicted(cuts)
     modes = _find_modes(valid, teeth)
-    if not cuts[-1].has_chatter:
+    if valid and not valid[-1].has_chatter:
         return NextSpeeds("stable", range_rpm, (), contradicting)
     if not modes:
         return NextSpeeds("no-chatter-frequency", range_rpm, (), contradicting)
@@ -194,7 +196,7 @@ def _find_deepest_speeds(
     speeds = np.geomspace(*range_rpm, math.ceil(math.log(range_rpm[1] / range_rpm[0]) / SPEED_STEP) + 1)
     lobes = sample_lobes(modes[:MAX_MODES], teeth, speeds)
     depths = np.geomspace(1, MAX_LOBE_GAIN, len(lobes.limits))
-    weights = _weigh_samples(cuts, lobes, speeds, depths)
+    weights = _weigh_samples(cuts, teeth, lobes, speeds, depths)
     level = np.asarray(weights @ np.log(lobes.limits))
     chance = _average_over_speeds(_find_chance(weights, lobes.limits, depths * _relative_depth(depth, cuts)))
     newest = next(cut for cut in reversed(cuts) if cut.has_chatter)
@@ -205,11 +207,21 @@ def _find_deepest_speeds(
         if cut.has_chatter and not cut.depth > depth / NEXT_DEPTH_FACTOR * (1 + TRIED_TOLERANCE):
             score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
     found = list[NextSpeed]()
+    if len(cuts) == 1:
+        score[~_follow_classic_rule(speeds, cuts[0].frequency, teeth)] = -np.inf
     while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
         place = int(np.argmax(score))
         found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
         score[_find_pocket(chance, place)] = -np.inf
     return tuple(found)
+
+
+def _follow_classic_rule(speeds: Floats, frequency: float, teeth: int) -> Flags:
+    """Return where tooth passing is close below a whole share of a chatter frequency; everywhere if nowhere."""
+    waves = 60 * frequency / (teeth * speeds)
+    whole = np.maximum(np.floor(waves), 1)
+    is_near = np.abs(np.log(waves / whole)) < CLASSIC_TOLERANCE
+    return is_near if np.any(is_near) else np.ones_like(is_near)
 
 
 def _relative_depth(depth: float, cuts: Sequence[HeardCut]) -> float:
@@ -218,7 +230,7 @@ def _relative_depth(depth: float, cuts: Sequence[HeardCut]) -> float:
     return ratio if math.isfinite(ratio) else 1.0
 
 
-def _weigh_samples(cuts: Sequence[HeardCut], lobes: SampledLobes, speeds: Floats, depths: Floats) -> Floats:
+def _weigh_samples(cuts: Sequence[HeardCut], teeth: int, lobes: SampledLobes, speeds: Floats, depths: Floats) -> Floats:
     """Return the probability of each sample, by verdict and chatter frequency of each cut."""
     logarithm = np.zeros(depths.size)
     for cut in cuts:
@@ -226,10 +238,19 @@ def _weigh_samples(cuts: Sequence[HeardCut], lobes: SampledLobes, speeds: Floats
         excess = np.log(depths * _relative_depth(cut.depth, cuts) / lobes.limits[:, place]) / LIMIT_UNCERTAINTY
         logarithm -= np.logaddexp(0, -excess if cut.has_chatter else excess)
         if cut.has_chatter and math.isfinite(cut.frequency):
-            distance = np.log(cut.frequency / lobes.frequencies[:, place]) / FREQUENCY_UNCERTAINTY
-            logarithm += np.log(UNEXPLAINED + np.exp(-(np.nan_to_num(distance, nan=np.inf) ** 2) / 2))
+            logarithm += np.log(_explain_frequency(cut, teeth, lobes.frequencies[:, place]))
     probability = np.exp(logarithm - np.max(logarithm))
     return np.asarray(probability / np.sum(probability))
+
+
+def _explain_frequency(cut: HeardCut, teeth: int, expected: Floats) -> Floats:
+    """Return the likelihood of a chatter frequency or its nearest side bands, by the frequency of each sample (Hz)."""
+    tooth = teeth * cut.speed_rpm / 60
+    likelihood = np.full(expected.shape, UNEXPLAINED)
+    for band, share in zip((0, -1, 1), (1.0, SIDEBAND_LIKELIHOOD, SIDEBAND_LIKELIHOOD), strict=True):
+        distance = np.abs(cut.frequency + band * tooth) / expected - 1
+        likelihood += share * np.exp(-(np.nan_to_num(distance / FREQUENCY_UNCERTAINTY, nan=np.inf) ** 2) / 2)
+    return likelihood
 
 
 def _find_chance(weights: Floats, limits: Floats, depths: Floats) -> Floats:

@@ -17,10 +17,10 @@ from lobes import Cut, Direction
 from lobes.tooth_force import mean_force
 from lobewatch.arrays import Complexes, Floats
 
-N_SAMPLES, SEED = 400, 0
+N_SAMPLES, SEED = 600, 0
 """Number of samples, and the seed that makes them the same each time."""
-HEARD_FREQUENCY, HEARD_FREQUENCY_STD = 1.015, 0.025
-"""Mean and standard deviation of a natural frequency over its first estimate; chosen."""
+HEARD_FREQUENCY_STD = 0.025
+"""Relative standard deviation of a natural frequency around its first estimate; chosen."""
 UNHEARD_PROBABILITY, UNHEARD_FREQUENCY, UNHEARD_STIFFNESS = 0.4, (0.4, 2.5), (1.0, 6.0)
 """Probability of one more mode, its frequency and stiffness over those of the first; chosen."""
 RIGID = 1e6
@@ -114,7 +114,7 @@ def sample_lobes(modes: Sequence[float], teeth: int, speeds: Floats) -> SampledL
 def _draw_heard_and_unheard(draw: np.random.Generator, modes: Sequence[float]) -> SampledModes:
     """Draw the modes in x: those that were heard, and with some probability one more."""
     count = len(modes)
-    heard = HEARD_FREQUENCY * np.array(modes) * np.exp(HEARD_FREQUENCY_STD * draw.normal(size=(N_SAMPLES, count)))
+    heard = np.array(modes) * np.exp(HEARD_FREQUENCY_STD * draw.normal(size=(N_SAMPLES, count)))
     stiffness = _log_uniform(draw, 1 / HEARD_STIFFNESS, HEARD_STIFFNESS, count)
     stiffness[:, 0] = 1
     more, its_stiffness = (

@@ -45,8 +45,7 @@ def evaluate_by_sound(
     program = verdict.program
     if asked := find_program_questions(machine, program, on_model=False):
         return replace(verdict, remarks=(*verdict.remarks, *(question.remark for question in asked)))
-    recent = [cut for cut in cuts if since is None or cut.at >= since]
-    found = [cut for cut in list_decisive_cuts(recent) if _decides(cut, program, machine)]
+    found = find_deciding_cuts(program, machine, cuts, since)
     drive_limit = float(drive_depth_limit(machine, program, np.array([program.speed_rpm]))[0])
     others = tuple(remark for remark in verdict.remarks if remark.code not in ("not-checked", "no-tap"))
     remarks = tuple(_explain(found, program))
@@ -55,6 +54,26 @@ def evaluate_by_sound(
     return replace(
         verdict, stability=stability, decisive_cause=cause, drive_limit=drive_limit, remarks=(*remarks, *others)
     )
+
+
+def find_deciding_cuts(
+    program: ProgramTable, machine: Machine, cuts: Sequence[CutEntry], since: datetime | None = None
+) -> list[CutEntry]:
+    """Find the test cuts that decide on a program (see `evaluate_by_sound`), oldest first.
+
+    Parameters
+    ----------
+    program
+        Program.
+    machine
+        Machine.
+    cuts
+        Cuts of the journal, oldest first.
+    since
+        Time of the newest baseline; None without one.
+    """
+    recent = [cut for cut in cuts if since is None or cut.at >= since]
+    return [cut for cut in list_decisive_cuts(recent) if _decides(cut, program, machine)]
 
 
 def _classify(found: Sequence[CutEntry]) -> Stability:

@@ -15,7 +15,7 @@ REASON_TEXTS: Mapping[str, str] = {
     "no-verdict": "",
     "stable": "Stable at this speed and depth. Keep this speed, or cut a little deeper to find the limit.",
     "no-chatter-frequency": "No next speed: no cut gave a chatter frequency yet. Record a chattering cut.",
-    "no-speed-in-range": "No next speed: no stable pocket lies between {low} and {high} rpm. Cut less deep.",
+    "no-speed-in-range": "No stable pocket lies between {low} and {high} rpm. Cut less deep.",
     "no-deep-speed": "No speed between {low} and {high} rpm is deep enough. Try again less deep:",
 }
 """Sentence for each reason of `NextSpeeds`; empty if the cut itself says what to do."""

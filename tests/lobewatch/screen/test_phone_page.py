@@ -241,7 +241,8 @@ def test_an_impossible_value_is_named_before_the_recording_is_read(
 
 def test_the_page_states_the_range_of_speeds_that_is_assumed() -> None:
     page = resources.files("lobewatch.screen").joinpath("static/phone.html").read_text("utf-8")
-    assert re.findall(r'name="(?:low|high)_rpm".*placeholder="([\d.]+) \u00d7 speed"', page) == [*map(str, ASSUMED_RANGE)]
+    found = re.findall(r'name="(?:low|high)_rpm".*placeholder="([\d.]+) \u00d7 speed"', page)
+    assert found == [*map(str, ASSUMED_RANGE)]
 
 
 def test_the_dashboard_serves_the_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

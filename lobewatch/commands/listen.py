@@ -143,13 +143,8 @@ def listen(
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
             _start_screen(screens, publisher, server)
-        signals = screens.enter_context(
-            contextlib.closing(
-                recorder.acquire_cut(
-                    logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
-                )
-            )
-        )
+        how = file, port, seconds, description, notes.print, publisher.show
+        signals = screens.enter_context(contextlib.closing(recorder.acquire_cut(logbook.folder, setting, *how)))
         limit = cuts or (None if notes.is_terminal and sys.stdin.isatty() else 1)
         for signal in itertools.islice(signals, limit):
             comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)

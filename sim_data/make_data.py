@@ -56,8 +56,8 @@ DEPTHS = {"stable": 0.5, "chatter": 2.0}
 """Depth of each cut over its stability limit."""
 SOUND_RATE = 12_800
 """Sample rate of the cuts (Hz)."""
-FULL_SCALE = 50 * STANDARD_GRAVITY
-"""Acceleration at the largest value of a WAV file (m/s^2)."""
+FULL_SCALE = 300 * STANDARD_GRAVITY
+"""Acceleration at the largest value of a WAV file (m/s^2), 1.2 times the loudest sample of both cuts."""
 
 
 def build_structure(frequency: float) -> Structure:
@@ -111,7 +111,9 @@ def write_cuts(folder: Path) -> None:
 
 def write_sound(path: Path, acceleration: NDArray[np.float64]) -> None:
     """Write acceleration (m/s^2) as a mono WAV file of 16 bits."""
-    codes = np.clip(np.round(acceleration / FULL_SCALE * 32767), -32768, 32767).astype("<i2")
+    if np.max(np.abs(acceleration)) >= FULL_SCALE:
+        raise ValueError(f"{path.name} clips at {FULL_SCALE:g} m/s^2. Raise FULL_SCALE.")
+    codes = np.round(acceleration / FULL_SCALE * 32767).astype("<i2")
     with wave.open(str(path), "wb") as file:
         file.setparams((1, 2, SOUND_RATE, 0, "NONE", ""))
         file.writeframes(codes.tobytes())

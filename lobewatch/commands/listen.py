@@ -4,12 +4,12 @@ import contextlib
 import itertools
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Never
+from typing import TYPE_CHECKING, Annotated, Never
 
-from typer import Option
+from typer import Context, Option
 
 from lobewatch.commands.shared_options import (
     CutDate,
@@ -19,6 +19,9 @@ from lobewatch.commands.shared_options import (
     Flutes,
     FolderArgument,
     add_file_options,
+    allow_options,
+    parse_speeds,
+    reject_options,
     rpm,
 )
 from lobewatch.show.terminal.output import (
@@ -47,8 +50,17 @@ if TYPE_CHECKING:
     from lobewatch.tap.state import StatePublisher
 
 
+SERVER_OPTIONS = ("listen", "http_port", "token", "watch_token")
+"""Names of the options on a server of pages."""
+DEVICE_OPTIONS = ("port", "seconds", "cuts", "screen")
+"""Names of the options on a recording with a device."""
+HEARD_OPTIONS = ("machine", "teeth", "speed", "speeds", "depth", "tacho", "pulses", "out", "dry_run")
+"""Names of the options on a recorded cut of any machine, besides those on a file."""
+
+
 @add_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force", "one_test", "axes"])
 def listen(
+    ctx: Context,
     machine: Annotated[
         Path | None, FolderArgument(help="Machine folder, or a recorded cut of any machine. Not with --page.")
     ] = None,
@@ -61,7 +73,7 @@ def listen(
     power: CutPower = None,
     teeth: Flutes = None,
     speeds: Annotated[
-        str, Option(help='Speeds of the machine (rpm): "8000 24000". Default: 0.5 to 1.5 times --speed.')
+        str, Option(help='Speeds of the machine (rpm): "8000-24000". Default: 0.5 to 1.5 times --speed.')
     ] = "",
     file: Annotated[Path | None, Option(help="Recording of the cut, instead of the device.")] = None,
     date: CutDate = None,
@@ -96,7 +108,7 @@ def listen(
 
     Examples
     --------
-      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds "8000 24000" --depth 1
+      lobewatch listen cut.wav --teeth 2 --speed 18000 --speeds 8000-24000 --depth 1
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
@@ -105,39 +117,34 @@ def listen(
       lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
       lobewatch listen --page --listen 0.0.0.0 --http-port 8080
     """
-    if page or machine is None:
-        options: ServerOptions = {"listen": listen, "port": http_port, "token": token, "watch_token": watch_token}
-        _serve_page(page, machine, as_json, options)
+    server: ServerOptions = {"listen": listen, "port": http_port, "token": token, "watch_token": watch_token}
+    if page:
+        allow_options(ctx, ["page", *SERVER_OPTIONS], "does not apply to --page")
+        _serve_page(as_json, server)
+    machine = _find_path(machine)
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
     from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
     from lobewatch.tap import cut_recording as recorder
 
-    if _is_recording(machine):
-        others = {"program": program, "cut": cut, "power": power, "file": file, "port": port, "screen": screen}
-        _reject_options(others | {"date": date}, "needs a machine folder")
+    if machine.is_file():
+        allow_options(ctx, [*HEARD_OPTIONS, *vars(file_options)], "needs a machine folder")
         description = file_options.description(tacho=tacho, pulses=pulses)
-        _listen_to_file(machine, description, CutFileRequest(teeth, speed, depth, speeds), out, as_json)
+        request = CutFileRequest(teeth, speed, depth, parse_speeds(speeds) if speeds else None)
+        _listen_to_file(machine, description, request, out, as_json)
         return
-    _reject_options({"teeth": teeth, "speeds": speeds}, "works only with a recorded cut instead of a machine folder")
+    _reject_folder_options(ctx, vars(file_options), has_file=file is not None, screen=screen)
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth, power)
     if not dry_run:
         logbook.folder.refuse_damage()
-    if screen and file is not None:
-        raise ValueError("--screen needs a device instead of a file. Leave out --screen or --file.")
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
-            _start_screen(screens, publisher, {"listen": listen, "token": token, "watch_token": watch_token})
-        signals = screens.enter_context(
-            contextlib.closing(
-                recorder.acquire_cut(
-                    logbook.folder, setting, file, port, seconds, description, notes.print, publisher.show
-                )
-            )
-        )
+            _start_screen(screens, publisher, server)
+        how = file, port, seconds, description, notes.print, publisher.show
+        signals = screens.enter_context(contextlib.closing(recorder.acquire_cut(logbook.folder, setting, *how)))
         limit = cuts or (None if notes.is_terminal and sys.stdin.isatty() else 1)
         for signal in itertools.islice(signals, limit):
             comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
@@ -149,12 +156,28 @@ def listen(
                 _store(logbook, comparisons, signal, date, publisher, as_json)
 
 
-def _serve_page(wanted: bool, machine: Path | None, as_json: bool, options: "ServerOptions") -> Never:
-    """Serve the page that takes recordings of a phone, until Ctrl-C; ValueError if it is not wanted."""
-    if not wanted:
+def _find_path(path: Path | None) -> Path:
+    """Return the path of a machine folder or a recording; ValueError if it does not exist."""
+    if path is None:
         raise ValueError("no machine folder or recording. Name one of them, or use --page.")
-    if machine is not None:
-        raise ValueError(f"--page evaluates without a machine folder. Leave out {machine}.")
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder. Name a machine folder or a recorded cut.")
+    return path
+
+
+def _reject_folder_options(ctx: Context, file_options: Iterable[str], *, has_file: bool, screen: bool) -> None:
+    """Raise ValueError for an option that does not apply to a cut of a machine folder."""
+    reject_options(ctx, ["teeth", "speeds"], "works only with a recorded cut instead of a machine folder")
+    if has_file:
+        reject_options(ctx, DEVICE_OPTIONS, "needs a device instead of --file")
+    else:
+        reject_options(ctx, file_options, "works only with --file")
+    if not screen:
+        reject_options(ctx, SERVER_OPTIONS, "works only with --screen or --page")
+
+
+def _serve_page(as_json: bool, options: "ServerOptions") -> Never:
+    """Serve the page that takes recordings of a phone, until Ctrl-C."""
     from lobewatch.screen import RecordingServer  # imports aiohttp
 
     with RecordingServer(**options) as server:
@@ -180,18 +203,6 @@ def _save_figure(comparisons: "Sequence[CutComparison]", out: Path | None) -> No
         save_cut_spectrum(comparisons, out)
 
 
-def _is_recording(path: Path) -> bool:
-    """Return whether the first argument is a recorded cut, or the name of one that does not exist."""
-    return path.is_file() or (bool(path.suffix) and not path.exists())
-
-
-def _reject_options(options: Mapping[str, Any], problem: str) -> None:
-    """Raise ValueError for any option that is given."""
-    for name, value in options.items():
-        if value not in (None, "", False):
-            raise ValueError(f"--{name} {problem}. Leave out this option.")
-
-
 def _listen_to_file(
     path: Path, description: "Description", request: "CutFileRequest", out: Path | None, as_json: bool
 ) -> None:
@@ -213,15 +224,14 @@ def _suggest_untapped(
 
     stored: all cuts of the journal. None to add these cuts to those of the logbook.
     """
-    from acquisition import DataError
-    from lobewatch.logbook import Analysis
-    from lobewatch.logbook.heard_cuts import suggest_by_sound
+    from lobewatch.logbook.heard_cuts import is_tool_untapped, suggest_by_sound
     from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
 
     setting = comparisons[-1].setting
-    if not isinstance(logbook.query(Analysis.assembly_or_reason, setting.tool), DataError):
+    if not is_tool_untapped(logbook, setting.tool):
         return {}, []
-    made = [comparison.to_recorded_cut(datetime.now(UTC)) for comparison in comparisons]
+    now = datetime.now(UTC)
+    made = [comparison.to_recorded_cut(now) for comparison in comparisons]
     found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
     return next_speeds_json(found), next_speeds_texts(found)
 

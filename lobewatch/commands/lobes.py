@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from typer import Option
+from typer import Context, Option
 
 from lobewatch.commands import shared_options as shared
 from lobewatch.commands.shared_options import Now
@@ -20,7 +20,14 @@ DynamicsName = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
+MACHINE_OPTIONS = ("machine", "cut", "tool", "source", "radial", "waterfall", "now")
+"""Names of the options that only a machine folder has."""
+STATED_OPTIONS = ("mode_y", "teeth", "material", "diameter", "radial_depth", "direction", "speeds", "speed", "depth")
+"""Names of the options that only --mode has."""
+
+
 def lobes(
+    ctx: Context,
     machine: Annotated[
         Path | None, shared.FolderArgument(help="Machine folder with at least one tap test. None with --mode.")
     ] = None,
@@ -49,7 +56,7 @@ def lobes(
     ] = None,
     direction: shared.MillingDirection = None,
     speeds: Annotated[
-        str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000 24000".')
+        str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000-24000".')
     ] = "",
     speed: Annotated[
         float | None, Option(parser=shared.rpm, help="Spindle speed of a cut to check (rpm), with --mode.")
@@ -83,10 +90,10 @@ def lobes(
     stated: dict[str, Any] = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
     stated |= {"direction": direction, "speed": speed, "depth": depth, "mode-y": mode_y, "speeds": speeds}
     if mode:
-        _reject_options({"tool": tool, "radial": radial, "waterfall": waterfall, "MACHINE": machine}, "with --mode")
+        shared.reject_options(ctx, MACHINE_OPTIONS, "cannot be used with --mode")
         _show_stated(mode, stated, LobeMethod(method), figure, as_json)
         return
-    _reject_options(stated, "without --mode")
+    shared.reject_options(ctx, STATED_OPTIONS, "cannot be used without --mode")
     if machine is None:
         raise ValueError("neither a machine folder nor --mode is given. Give one of them.")
     logbook = Logbook.open(machine, now)
@@ -114,14 +121,6 @@ def _show(comparison: "LobeComparison", remarks: "Sequence[Remark]", as_json: bo
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))
 
 
-def _reject_options(options: Mapping[str, Any], problem: str) -> None:
-    """Raise ValueError for any option that is given."""
-    for name, value in options.items():
-        if value not in (None, "", []):
-            option = name if name.isupper() else f"--{name}"
-            raise ValueError(f"{option} cannot be used {problem}. Leave out this option.")
-
-
 def _show_stated(
     modes: Sequence[str], stated: Mapping[str, Any], method: "LobeMethod", figure: Path | None, as_json: bool
 ) -> None:
@@ -134,7 +133,8 @@ def _show_stated(
     if stated["direction"]:
         cut = cut._replace(direction=stated["direction"])
     if stated["speeds"]:
-        cut = cut.with_speeds(stated["speeds"])
+        low, high = shared.parse_speeds(stated["speeds"])
+        cut = cut._replace(low_rpm=low, high_rpm=high)
     x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
     with show_progress("searching stable pockets"), time_step("lobes"):
         comparison = compare_stated_modes(cut, x, y, stated["speed"], stated["depth"], method)

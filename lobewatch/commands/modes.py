@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from typer import Argument, Option
+from typer import Argument, Context, Option
 
 from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit
@@ -17,8 +17,13 @@ if TYPE_CHECKING:
     from modal import ModeEdits
 
 
+FIT_OPTIONS = ("band", "window", "window_start", "hit_at", "averages", "accept", "conjugate", "sensor_mass", "hammer")
+"""Names of the options on the fit of a file."""
+
+
 @shared.add_file_options(without=["averages"])
 def modes(
+    ctx: Context,
     file: Annotated[
         Path,
         Argument(help="Machine folder, or recorded hits or FRF: UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
@@ -101,8 +106,7 @@ def modes(
     file, tap, hit_files = _resolve_names(file, names or (), one_test=file_options.one_test)
     taken_off = Window.from_options(window, window_start, hit_at)
     if tap:
-        others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
-        shared.reject_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
+        shared.reject_options(ctx, [*vars(file_options), *FIT_OPTIONS], "does not apply to a stored tap test")
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
         with nullcontext() if choice is None and not decisions else publish_on_change(logbook):

@@ -10,7 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from typer import Argument, BadParameter, Option
+from typer import Argument, BadParameter, Context, Option
 
 import acquisition
 from lobewatch.machine.folder_files import to_folder_path
@@ -76,6 +76,16 @@ def rpm(text: str | float) -> float:
         return read_numbers([str(text).strip()], [(ranges["low_rpm"].low, ranges["high_rpm"].high)])[0]
     except ValueError as error:
         raise BadParameter(str(error)) from None
+
+
+def parse_speeds(text: str) -> tuple[float, float]:
+    """Parse the option --speeds: lowest and highest spindle speed (rpm)."""
+    from lobewatch.machine.settings.speed_range import parse_speed_range
+
+    try:
+        return parse_speed_range(text)
+    except ValueError as error:
+        raise ValueError(f"--speeds {error}") from None
 
 
 def mass(text: str | float) -> float:
@@ -234,11 +244,24 @@ def add_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Comm
     return decorate
 
 
-def reject_file_options(options: FileOptions, **others: Any) -> None:
-    """Raise ValueError for any option on a file, because a stored tap test needs none."""
-    for name, value in (vars(options) | others).items():
-        if value is not None and value not in ("", False):
-            raise ValueError(f"--{name.replace('_', '-')} does not apply to a stored tap test. Leave out this option.")
+GENERAL_OPTIONS = ("as_json", "quiet", "verbose")
+"""Names of the options that apply to all uses of a command."""
+
+
+def reject_options(ctx: Context, names: Iterable[str], problem: str) -> None:
+    """Raise ValueError for the first of these options and arguments that is on the command line."""
+    rejected = set(names)
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(str(parameter.name))
+        if parameter.name in rejected and source is not None and source.name == "COMMANDLINE":
+            label = max(parameter.opts, key=len)
+            given = label if label.startswith("-") else label.upper()
+            raise ValueError(f"{given} {problem}. Leave out {given}.")
+
+
+def allow_options(ctx: Context, names: Iterable[str], problem: str) -> None:
+    """Raise ValueError for any other option that is on the command line, except for `GENERAL_OPTIONS`."""
+    reject_options(ctx, {str(each.name) for each in ctx.command.params}.difference(names, GENERAL_OPTIONS), problem)
 
 
 def join_hit_files(

@@ -23,7 +23,7 @@ from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.remembered_air import find_remembered_air
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import lobewatch_version, resolve_cutting_time, store_cut
-from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.machine.journal.entries import CutEntry, CutVerdict
 from lobewatch.machine.settings.drive_power import CutPower
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tool.assembly import Assembly
@@ -98,6 +98,21 @@ class CutComparison:
             reason=self.detected.reason,
             parts=tuple(part.shift(-begin) for part in self.detected.part_verdicts),
         )
+
+
+SEVERITIES: tuple[CutVerdict, ...] = ("stable", "cannot tell", "flip", "chatter")
+"""Verdicts from best to worst."""
+
+
+def find_worst_cut(comparisons: Sequence[CutComparison]) -> CutComparison:
+    """Return the first of the worst cuts in a recording, whose verdict is that of the recording.
+
+    Parameters
+    ----------
+    comparisons
+        Cuts in the recording, at least one.
+    """
+    return max(comparisons, key=lambda cut: SEVERITIES.index(cut.detected.verdict))
 
 
 def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> list[CutComparison]:

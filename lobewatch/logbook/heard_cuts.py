@@ -15,10 +15,11 @@ from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
 from lobewatch.history.tap_measurements import NotTappedError
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
-from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import CutSetting
 
@@ -35,8 +36,8 @@ class CutFileRequest(NamedTuple):
     """Set spindle speed (rpm); None if not given."""
     depth_mm: float | None = None
     """Axial depth of cut (mm); None if unknown."""
-    speeds: str = ""
-    """Slowest and fastest speed of the machine (rpm); empty if unknown."""
+    range_rpm: tuple[float, float] | None = None
+    """Slowest and fastest speed of the machine (rpm); None if unknown."""
 
     def check(self) -> tuple[int, float, float, tuple[float, float]]:
         """Return teeth, speed (rpm), depth (m, NaN if unknown) and speed range (rpm); ValueError for bad values."""
@@ -51,18 +52,12 @@ class CutFileRequest(NamedTuple):
         return self.teeth, self.speed_rpm, depth, self._range_rpm(self.speed_rpm)
 
     def _range_rpm(self, speed_rpm: float) -> tuple[float, float]:
-        if not self.speeds:
+        if self.range_rpm is None:
             return ASSUMED_RANGE[0] * speed_rpm, ASSUMED_RANGE[1] * speed_rpm
-        example = 'Give the slowest and the fastest speed: "8000 24000".'
-        try:
-            low, high = (float(word) for word in self.speeds.replace(",", " ").split())
-        except ValueError:
-            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not two numbers. {example}") from None
-        if not 0 < low < high < math.inf:
-            raise ValueError(f"CutFileRequest.speeds {self.speeds!r} is not a rising range above 0. {example}")
+        low, high = self.range_rpm
         if not low <= speed_rpm <= high:
             raise ValueError(
-                f"CutFileRequest.speed_rpm {speed_rpm:g} is outside CutFileRequest.speeds {low:g}..{high:g}. "
+                f"CutFileRequest.speed_rpm {speed_rpm:g} is outside CutFileRequest.range_rpm {low:g}..{high:g}. "
                 "Correct one of them."
             )
         return low, high
@@ -147,13 +142,13 @@ def find_heard_cuts(setting: CutSetting, cuts: Iterable[CutEntry], since: dateti
         Time of the newest baseline, before which cuts do not count; None without one.
     """
     key = setting.tool, geometry_key(setting.cut), setting.material, setting.feed
-    return [
-        HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth)
+    same = [
+        cut
         for cut in cuts
-        if cut.is_usable
-        and (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key
-        and (since is None or cut.at >= since)
+        if (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key and (since is None or cut.at >= since)
     ]
+    decisive = list_decisive_cuts(same)
+    return [HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth) for cut in decisive]
 
 
 def is_untapped(logbook: Logbook) -> bool:
@@ -168,6 +163,19 @@ def is_untapped(logbook: Logbook) -> bool:
         return not logbook.newest_tap()
     except NotTappedError:
         return True
+
+
+def is_tool_untapped(logbook: Logbook, tool: str) -> bool:
+    """Return whether a tool has no usable tap test since the baseline, nor modes that another tool gives.
+
+    Parameters
+    ----------
+    logbook
+        Logbook of the machine.
+    tool
+        Name of the tool.
+    """
+    return isinstance(logbook.query(Analysis.assembly_or_reason, tool), NotTappedError)
 
 
 def suggest_by_sound(logbook: Logbook, setting: CutSetting, cuts: Iterable[CutEntry]) -> NextSpeeds:

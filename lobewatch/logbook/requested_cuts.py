@@ -10,9 +10,9 @@ import msgspec
 from acquisition import DataError, Remark
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.cuts.learning.program_learning import learn_spindle
-from lobewatch.cuts.learning.verdict_by_sound import evaluate_by_sound
+from lobewatch.cuts.learning.verdict_by_sound import evaluate_by_sound, find_deciding_cuts
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.logbook.heard_cuts import is_untapped
+from lobewatch.logbook.heard_cuts import is_tool_untapped, is_untapped
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.settings import requested_cut
@@ -80,7 +80,7 @@ class RequestedVerdicts(NamedTuple):
 def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str, Any]) -> RequestedVerdicts:
     """Evaluate a requested cut (see `build_requested_program`), else the named programs, else all programs.
 
-    Test cuts decide on a machine without a tap test. ValueError for an unknown name or an invalid cut, DataError
+    Test cuts decide on a tool without a tap test. ValueError for an unknown name or an invalid cut, DataError
     without a program.
     """
     machine = logbook.machine
@@ -104,11 +104,18 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
 
 
 def _evaluate_untapped(logbook: Logbook, verdicts: list[Verdict]) -> list[Verdict]:
-    """Evaluate verdicts by test cuts if the machine has no tap test; else return them unchanged."""
-    if not is_untapped(logbook):
-        return verdicts
-    since = logbook.files.baseline
-    return [evaluate_by_sound(verdict, logbook.machine, logbook.cuts, since) for verdict in verdicts]
+    """Return the verdicts, by test cuts only for tools without a tap test that have some, or without any tap test."""
+    machine, cuts, since = logbook.machine, logbook.cuts, logbook.files.baseline
+
+    def needs_cuts(program: ProgramTable) -> bool:
+        if is_untapped(logbook):
+            return True
+        return is_tool_untapped(logbook, program.tool) and bool(find_deciding_cuts(program, machine, cuts, since))
+
+    return [
+        evaluate_by_sound(verdict, machine, cuts, since) if needs_cuts(verdict.program) else verdict
+        for verdict in verdicts
+    ]
 
 
 def propose_requested_pitch(logbook: Logbook, cut: Mapping[str, Any]) -> PitchProposal:

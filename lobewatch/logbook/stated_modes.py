@@ -11,9 +11,6 @@ from lobewatch.logbook.chart_data import LobeComparison, no_pocket_remark
 from lobewatch.machine import Machine
 from lobewatch.machine.settings import requested_cut
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine_file
-from lobewatch.machine.settings.setup_tables import SpeedTable
-from lobewatch.machine.settings.toml import find_plausible_ranges
-from lobewatch.machine.setup_questions.draft import parse_numbers
 from lobewatch.tool import lobe_chart
 from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.verdicts import find_stable_pockets
@@ -117,13 +114,6 @@ class StatedCut(NamedTuple):
     """Lowest spindle speed (rpm)."""
     high_rpm: float = 24000.0
     """Highest spindle speed (rpm)."""
-
-    def with_speeds(self, text: str) -> "StatedCut":
-        """Return the cut with the lowest and highest speed of a text; ValueError for other texts."""
-        ranges = find_plausible_ranges(SpeedTable)
-        limits = [(ranges[key].low, ranges[key].high) for key in ("low_rpm", "high_rpm")]
-        low, high = parse_numbers(text, ("lowest speed", "highest speed"), limits=limits)
-        return self._replace(low_rpm=low, high_rpm=high)
 
 
 def build_stated_machine(cut: StatedCut) -> Machine:

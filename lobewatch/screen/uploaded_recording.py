@@ -16,6 +16,7 @@ from acquisition.files.readers.read_audio import MissingDecoderError, decode_aud
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
+from lobewatch.logbook.cut_comparison import find_worst_cut
 from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.setup_tables import SpeedTable
@@ -64,7 +65,7 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def request(self) -> CutFileRequest:
         """The same facts as of a recording on the command line."""
-        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, " ".join(map(str, self.range_rpm)))
+        return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, self.range_rpm)
 
 
 LABELS = {
@@ -168,12 +169,12 @@ def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
 def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
     loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
     comparisons, found = hear_signal(CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR), "recording", cut.request)
-    newest = comparisons[-1]
+    worst = find_worst_cut(comparisons)
     texts = [text for text in recording_texts(comparisons) if isinstance(text, str)]
-    finding = reason_text(newest) if newest.detected.verdict == "cannot tell" else ""
-    sentence, *_ = [text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)]
+    finding = reason_text(worst) if worst.detected.verdict == "cannot tell" else ""
+    sentence = next((text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)), "")
     more = {"finding": finding, "texts": texts, "next_text": sentence}
-    return recorded_cut_json(newest) | next_speeds_json(found) | more
+    return recorded_cut_json(worst) | next_speeds_json(found) | more
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import pytest
 from scipy.signal import welch
 
 import sim_data
-from acquisition import HitFlags, read_frf, read_tap
+from acquisition import Description, HitFlags, read_frf, read_tap
+from lobewatch.logbook.heard_cuts import CutFileRequest, hear_file
 from modal import fit_modes
 from sim_data.make_data import FULL_SCALE, SPEED_RPM, TEETH, write_cuts, write_tap_test
 
@@ -42,6 +43,14 @@ def test_chatter_is_loud_between_the_multiples_of_the_spindle_frequency(name: st
     turns = frequency / (SPEED_RPM / 60)
     is_between = (np.abs(turns - np.round(turns)) > 0.1) & (frequency > TEETH * SPEED_RPM / 60)
     assert bool(power[is_between].max() > 0.1 * power[~is_between].max()) is is_chatter
+
+
+@pytest.mark.parametrize(("name", "verdict"), [("stable", "stable"), ("chatter", "chatter")])
+def test_listen_gives_the_verdict_of_each_cut(name: str, verdict: str) -> None:
+    request = CutFileRequest(teeth=TEETH, speed_rpm=SPEED_RPM)
+    (comparison,), _ = hear_file(FOLDER / f"cut-{name}.wav", Description(), request)
+    assert comparison.detected.verdict == verdict
+    assert np.max(np.abs(read_sound(FOLDER / f"cut-{name}.wav")[0])) < FULL_SCALE
 
 
 def test_the_script_makes_the_same_recordings(tmp_path: Path) -> None:

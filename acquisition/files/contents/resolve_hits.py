@@ -178,7 +178,7 @@ def resolve_rate(signals: Sequence[Signal], used: Sequence[Signal], report: Impo
     times = [time for time in times if time.values.size in sizes]
     report.add_flaws([*used, *times])
     if sizes and min(sizes) < MIN_SAMPLES:
-        report.add_fault(f"{min(sizes)} samples are too few for a hit. Record at least {MIN_SAMPLES} samples")
+        report.add_fault(f"{min(sizes)} samples are too few. Record at least {MIN_SAMPLES} samples")
         return 0.0, used
     by_axis = _compute_rate_from_time(times, report)
     return _agree_on_rate(rates[0] if rates else by_axis, report), used

@@ -28,9 +28,12 @@ class MissingDecoderError(DataError):
 def read_audio(path: Path) -> Contents:
     """Read the channels as shares of the full scale, -1 to 1.
 
-    Raises DataError if the file is damaged or cut short, or its decoder is not installed.
+    Raises DataError if the file is no sound, damaged or cut short, or its decoder is not installed.
     """
-    rate, columns = decode_audio(path.read_bytes(), str(path))
+    content = path.read_bytes()
+    if not _has_signature(content[:12]):
+        raise DataError(f"{path}: not a {AUDIO_FORMAT.title}. Export WAV.")
+    rate, columns = decode_audio(content, str(path))
     signals = (Signal(f"channel {i}", column, rate=rate, per_full_scale=True) for i, column in enumerate(columns, 1))
     return Contents(tuple(signals))
 
@@ -133,10 +136,15 @@ def _find_demuxer(head: bytes) -> str:
     return "matroska" if head[:4] == b"\x1aE\xdf\xa3" else ""
 
 
-def _is_audio(head: bytes, _path: Path) -> bool:
+def _has_signature(head: bytes) -> bool:
     is_frame = int.from_bytes(head[:2], "big") & MP3_SYNC_BITS == MP3_SYNC_BITS and head[1] & 0x06 == 0x02
-    has_signature = _is_wav(head) or head[:4] in (b"fLaC", b"OggS") or head[:3] == b"ID3"
-    return has_signature or is_frame or bool(_find_demuxer(head))
+    has_magic = _is_wav(head) or head[:4] in (b"fLaC", b"OggS") or head[:3] == b"ID3"
+    return has_magic or is_frame or bool(_find_demuxer(head))
+
+
+def _is_audio(head: bytes, path: Path) -> bool:
+    """Return whether a file begins or is named like a sound file."""
+    return _has_signature(head) or path.suffix.lower() in AUDIO_FORMAT.extensions
 
 
 AUDIO_FORMAT = Format(

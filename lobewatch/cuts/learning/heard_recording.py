@@ -31,6 +31,8 @@ def hear_recording(
 ) -> HeardRecording:
     """Evaluate a recording of a cut on a machine that nobody tapped, and suggest the next speeds.
 
+    Its cuts have one speed and depth, so that a stable one counts only if all are stable.
+
     Parameters
     ----------
     recording
@@ -43,7 +45,8 @@ def hear_recording(
         Earlier cuts of the same tool and material, oldest first.
     """
     evaluations = evaluate_with_or_without_air(recording)
-    heard = [_to_heard_cut(found, depth) for found in evaluations if found.verdict != "cannot tell"]
+    words = {found.verdict for found in evaluations} - {"stable"} or {"stable"}
+    heard = [_to_heard_cut(found, depth) for found in evaluations if found.verdict in words - {"cannot tell"}]
     low, high = range_rpm or tuple(factor * recording.commanded_rpm for factor in ASSUMED_RANGE)
     return HeardRecording(evaluations, suggest_speeds([*earlier, *heard], recording.teeth, (low, high)))
 

@@ -11,28 +11,32 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
-from lobes import Cut, zero_order_lobes
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
+from lobewatch.cuts.learning.sampled_lobes import SampledLobes, sample_lobes
 from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, round_down_depth_mm
-from modal import Mode
 
 SAME_MODE_TOLERANCE, SIDEBAND_TOLERANCE = 0.15, 0.02
 """Logarithmic distances within which a chatter frequency, or a side band of it, belongs to a known mode; chosen."""
 CHATTER_OVER_NATURAL = 1.015
 """Mean chatter frequency over natural frequency; chosen on simulated cuts (docs/studies/cuts.md)."""
-TYPICAL_DAMPING = 0.03
-"""Damping ratio assumed for each mode; chosen."""
-SLOT_FORCES = (1e9, 3e8)
-"""Kt and Kr (Pa) of the lobes; only their ratio matters, chosen."""
+CLASSIC_TOLERANCE = 0.025
+"""Relative distance of the first suggested speed below that of the classic rule; chosen."""
+MAX_MODES = 4
+"""Largest number of modes in a search."""
+LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.02
+"""Logarithmic uncertainty of a stability limit and of a chatter frequency; chosen."""
+UNEXPLAINED, SIDEBAND_LIKELIHOOD = 0.1, 0.4
+"""Likelihood of a chatter frequency of another cause, and of a side band, over that of the best one; chosen."""
 MAX_LOBE_GAIN = 20.0
 """Largest limit over the lowest one that counts."""
-N_GRID_SPEEDS = 500
-"""Number of speeds in the range."""
+SPEED_STEP = 0.005
+"""Relative step of the searched speeds."""
 SPEED_UNCERTAINTY = 0.01
-"""Relative standard deviation of the pocket speeds, over which limits are averaged; chosen."""
+"""Relative standard deviation of the pocket speeds, over which chances are averaged; chosen."""
 TRIED_TOLERANCE = 0.02
 """Relative distance in speed within which chatter at the same depth, or a smaller one, excludes a speed; chosen."""
 N_SPEEDS = 3
@@ -41,8 +45,10 @@ WINDOW_SHARE = 0.8
 """Share of the largest limit that the window of a pocket holds."""
 MAX_CUTS_AT_DEPTH = 3
 """Number of chattering cuts at a depth after which no speed is deep enough; chosen."""
+MIN_CUTS_BEFORE_LESS = 2
+"""Number of chattering cuts after which each next one is less deep; chosen."""
 NEXT_DEPTH_FACTOR = 0.7
-"""Next depth over one at which no speed was stable; chosen."""
+"""Next depth over one that chattered; chosen."""
 
 
 class HeardCut(NamedTuple):
@@ -90,14 +96,14 @@ class NextSpeeds(NamedTuple):
     """Speeds to try next, best first, or the reason why there are none."""
 
     reason: str
-    """Code of the reason. Empty, or "no-deep-speed" with a smaller depth: there are speeds. Without speeds: "stable"
-    (nothing left to try), "no-chatter-frequency", "no-speed-in-range" (no pocket inside)."""
+    """Code of the reason. Empty, or with a smaller depth "no-deep-speed" or "no-speed-in-range" (no pocket inside):
+    there are speeds. Without speeds: "stable" (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency"."""
     range_rpm: tuple[float, float]
     """Slowest and fastest speed (rpm) searched."""
     speeds: tuple[NextSpeed, ...] = ()
     """Speeds to try."""
     contradicting: tuple[HeardCut, ...] = ()
-    """Earlier cuts that a later one contradicts; they do not count."""
+    """Stable cuts that a chattering one contradicts; they do not count."""
 
 
 def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float, float]) -> NextSpeeds:
@@ -122,19 +128,22 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     low, high = range_rpm
     if not (teeth >= 1 and 0 < low < high < math.inf):
         raise ValueError(f"teeth={teeth}, range_rpm={low:g}..{high:g} are invalid. Give teeth >= 1 and a rising range.")
+    if not cuts:
+        return NextSpeeds("no-verdict", range_rpm)
     valid, contradicting = _drop_contradicted(cuts)
     modes = _find_modes(valid, teeth)
-    reason = _find_reason(valid, modes, teeth, range_rpm)
-    if reason:
-        return NextSpeeds(reason, range_rpm, (), contradicting)
-    depth, is_deep = _choose_depth(valid)
-    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, depth)
-    return NextSpeeds("" if is_deep else "no-deep-speed", range_rpm, speeds, contradicting)
+    if valid and not valid[-1].has_chatter:
+        return NextSpeeds("stable", range_rpm, (), contradicting)
+    if not modes:
+        return NextSpeeds("no-chatter-frequency", range_rpm, (), contradicting)
+    reason = _find_remark(valid, modes, teeth, range_rpm)
+    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, _choose_depth(valid, reason))
+    return NextSpeeds(reason, range_rpm, speeds, contradicting)
 
 
 def _drop_contradicted(cuts: Sequence[HeardCut]) -> tuple[list[HeardCut], tuple[HeardCut, ...]]:
-    """Return the cuts that no later one contradicts, and the others."""
-    contradicting = [cut for place, cut in enumerate(cuts) if any(map(cut.contradicts, cuts[place + 1 :]))]
+    """Return the cuts without the stable ones that chatter contradicts, and these."""
+    contradicting = [cut for cut in cuts if not cut.has_chatter and any(map(cut.contradicts, cuts))]
     return [cut for cut in cuts if cut not in contradicting], tuple(contradicting)
 
 
@@ -161,56 +170,98 @@ def _distances(frequency: float, tooth: float, known: float) -> list[tuple[float
     return [own, *((abs(math.log(value / known)) / SIDEBAND_TOLERANCE, value) for value in sidebands)]
 
 
-def _find_reason(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
-    """Return the code of why there is no speed to try; empty if there is one."""
-    if cuts and not cuts[-1].has_chatter:
-        return "stable"
-    if not modes:
-        return "no-chatter-frequency"
+def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
+    """Return the code of why the next cut is less deep than the user wants; empty if it need not be."""
     bases = [60 * frequency / teeth for frequency in modes]
-    has_pocket = any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases)
-    return "" if has_pocket else "no-speed-in-range"
-
-
-def _choose_depth(cuts: Sequence[HeardCut]) -> tuple[float, bool]:
-    """Return the depth to try (m), and whether some speed may be stable at the depth of the newest cut."""
+    if not any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases):
+        return "no-speed-in-range"
     depth = cuts[-1].depth
     n_tries = sum(cut.has_chatter and not cut.depth > depth for cut in cuts)
-    if not math.isfinite(depth) or n_tries < MAX_CUTS_AT_DEPTH:
-        return depth, n_tries < MAX_CUTS_AT_DEPTH
-    return round_down_depth_mm(1e3 * NEXT_DEPTH_FACTOR * depth) / 1e3, False
+    return "no-deep-speed" if n_tries >= MAX_CUTS_AT_DEPTH else ""
+
+
+def _choose_depth(cuts: Sequence[HeardCut], reason: str) -> float:
+    """Return the depth to try (m): that of the first cut once, then always a smaller one."""
+    depth = cuts[-1].depth
+    n_chatter = sum(cut.has_chatter for cut in cuts)
+    if not math.isfinite(depth) or (n_chatter < MIN_CUTS_BEFORE_LESS and not reason):
+        return depth
+    return round_down_depth_mm(1e3 * NEXT_DEPTH_FACTOR * depth) / 1e3
 
 
 def _find_deepest_speeds(
     cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float], depth: float
 ) -> tuple[NextSpeed, ...]:
-    """Find the speeds with the largest estimated limits that were not tried at this depth."""
-    speeds = np.geomspace(*range_rpm, N_GRID_SPEEDS)
-    level = _average_log_limits(modes, teeth, speeds)
-    score = level.copy()
-    for cut in cuts:
-        if cut.has_chatter and not cut.depth > depth * (1 + TRIED_TOLERANCE):
-            score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
+    """Find the speeds most likely to be stable at this depth, if they were not tried at it."""
+    speeds = np.geomspace(*range_rpm, math.ceil(math.log(range_rpm[1] / range_rpm[0]) / SPEED_STEP) + 1)
+    lobes = sample_lobes(modes[:MAX_MODES], teeth, speeds)
+    depths = np.geomspace(1, MAX_LOBE_GAIN, len(lobes.limits))
+    weights = _weigh_samples(cuts, teeth, lobes, speeds, depths)
+    level = np.asarray(weights @ np.log(lobes.limits))
+    chance = _average_over_speeds(_find_chance(weights, lobes.limits, depths * _relative_depth(depth, cuts)))
     newest = next(cut for cut in reversed(cuts) if cut.has_chatter)
-    here, found = float(np.interp(newest.speed_rpm, speeds, level)), list[NextSpeed]()
+    here = float(np.interp(newest.speed_rpm, speeds, level))
+    worst = min(float(np.interp(cut.speed_rpm, speeds, level)) for cut in cuts if cut.has_chatter)
+    score = np.where((level > worst) | np.all(level <= worst), chance, -np.inf)
+    for cut in cuts:
+        if cut.has_chatter and not cut.depth > depth / NEXT_DEPTH_FACTOR * (1 + TRIED_TOLERANCE):
+            score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
+    found = list[NextSpeed]()
+    if len(cuts) == 1:
+        score[~_follow_classic_rule(speeds, cuts[0].frequency, teeth)] = -np.inf
     while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
         place = int(np.argmax(score))
         found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
-        score[_find_pocket(level, place)] = -np.inf
+        score[_find_pocket(chance, place)] = -np.inf
     return tuple(found)
 
 
-def _average_log_limits(modes: Sequence[float], teeth: int, speeds: Floats) -> Floats:
-    """Return the logarithm of the lowest lobe of all modes over its lowest limit, averaged over the uncertainty."""
-    slot, limits = Cut(teeth, 1.0, "up", *SLOT_FORCES), np.full(speeds.shape, MAX_LOBE_GAIN)
-    for frequency in modes:
-        sides = [Mode(frequency, TYPICAL_DAMPING, 1.0)]
-        depth = zero_order_lobes(sides, sides, slot, speeds).depth
-        limits = np.minimum(limits, depth / np.min(depth))
-    reach = math.ceil(2 * SPEED_UNCERTAINTY / math.log(speeds[1] / speeds[0]))
-    weights = np.exp(-(np.linspace(-2, 2, 2 * reach + 1) ** 2) / 2)
-    padded = np.pad(np.log(limits), reach, mode="edge")
-    return np.asarray(np.convolve(padded, weights / np.sum(weights), "valid"))
+def _follow_classic_rule(speeds: Floats, frequency: float, teeth: int) -> Flags:
+    """Return where tooth passing is close below a whole share of a chatter frequency; everywhere if nowhere."""
+    waves = 60 * frequency / (teeth * speeds)
+    whole = np.maximum(np.floor(waves), 1)
+    is_near = np.abs(np.log(waves / whole)) < CLASSIC_TOLERANCE
+    return is_near if np.any(is_near) else np.ones_like(is_near)
+
+
+def _relative_depth(depth: float, cuts: Sequence[HeardCut]) -> float:
+    """Return a depth over that of the first cut; 1 if unknown."""
+    ratio = depth / cuts[0].depth
+    return ratio if math.isfinite(ratio) else 1.0
+
+
+def _weigh_samples(cuts: Sequence[HeardCut], teeth: int, lobes: SampledLobes, speeds: Floats, depths: Floats) -> Floats:
+    """Return the probability of each sample, by verdict and chatter frequency of each cut."""
+    logarithm = np.zeros(depths.size)
+    for cut in cuts:
+        place = int(np.argmin(np.abs(np.log(speeds / cut.speed_rpm))))
+        excess = np.log(depths * _relative_depth(cut.depth, cuts) / lobes.limits[:, place]) / LIMIT_UNCERTAINTY
+        logarithm -= np.logaddexp(0, -excess if cut.has_chatter else excess)
+        if cut.has_chatter and math.isfinite(cut.frequency):
+            logarithm += np.log(_explain_frequency(cut, teeth, lobes.frequencies[:, place]))
+    probability = np.exp(logarithm - np.max(logarithm))
+    return np.asarray(probability / np.sum(probability))
+
+
+def _explain_frequency(cut: HeardCut, teeth: int, expected: Floats) -> Floats:
+    """Return the likelihood of a chatter frequency or its nearest side bands, by the frequency of each sample (Hz)."""
+    tooth = teeth * cut.speed_rpm / 60
+    likelihood = np.full(expected.shape, UNEXPLAINED)
+    for band, share in zip((0, -1, 1), (1.0, SIDEBAND_LIKELIHOOD, SIDEBAND_LIKELIHOOD), strict=True):
+        distance = np.abs(cut.frequency + band * tooth) / expected - 1
+        likelihood += share * np.exp(-(np.nan_to_num(distance / FREQUENCY_UNCERTAINTY, nan=np.inf) ** 2) / 2)
+    return likelihood
+
+
+def _find_chance(weights: Floats, limits: Floats, depths: Floats) -> Floats:
+    """Return the probability that a cut is stable at each speed, and at least half as deep as the best one."""
+    is_deep = depths >= np.minimum(np.max(limits, axis=1), MAX_LOBE_GAIN) / 2
+    return np.asarray(weights @ ((limits >= depths[:, np.newaxis]) & is_deep[:, np.newaxis]))
+
+
+def _average_over_speeds(chance: Floats) -> Floats:
+    """Return a chance averaged over the uncertainty of the speed."""
+    return np.asarray(gaussian_filter1d(chance, SPEED_UNCERTAINTY / SPEED_STEP, mode="nearest"))
 
 
 def _find_pocket(level: Floats, place: int) -> slice:

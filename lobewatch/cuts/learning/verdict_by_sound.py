@@ -1,6 +1,6 @@
 """Verdict on a program whose machine was never tapped, by its test cuts only."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
 
@@ -10,7 +10,7 @@ from acquisition import Remark
 from lobewatch.cuts.learning.cut_likelihood import REPEAT_SPEED_TOLERANCE
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
 from lobewatch.machine import Machine, ProgramTable, drive_depth_limit
-from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.verdicts.uncertainty_causes import NO_TAP_TEST
 from lobewatch.verdicts.verdict import Stability, Verdict
@@ -27,9 +27,9 @@ def evaluate_by_sound(
     """Evaluate a program by the test cuts at its speed: stable, not stable, else doubtful.
 
     It is stable at or below a depth that was stable at its very speed, and not stable at or above one that chattered
-    within 1 % of it. The newest such cut
-    counts. Tool, engagement, material, feed axis and feed per tooth must be those of the program, and the cut not older
-    than the newest baseline. A worn edge, a thin wall and a corner count only in a cut of the program itself.
+    within 1 % of it. The newest such cut counts. A stable one after chatter leaves the program doubtful. Tool,
+    engagement, material, feed axis and feed per tooth must be those of the program, and the cut not older than the
+    newest baseline. A worn edge, a thin wall and a corner count only in a cut of the program itself.
 
     Parameters
     ----------
@@ -45,21 +45,65 @@ def evaluate_by_sound(
     program = verdict.program
     if asked := find_program_questions(machine, program, on_model=False):
         return replace(verdict, remarks=(*verdict.remarks, *(question.remark for question in asked)))
-    found = [cut for cut in cuts if (since is None or cut.at >= since) and _decides(cut, program, machine)]
+    found = find_deciding_cuts(program, machine, cuts, since)
     drive_limit = float(drive_depth_limit(machine, program, np.array([program.speed_rpm]))[0])
     others = tuple(remark for remark in verdict.remarks if remark.code not in ("not-checked", "no-tap"))
-    if not found:
-        text, cure = NO_TAP_TEST.sentence, NO_TAP_TEST.remedy.format(tool=repr(program.tool), program=program.name)
-        stability, cause = Stability.DOUBTFUL, NO_TAP_TEST.name
-    else:
-        cut, cure, cause = found[-1], "Tap the tool to know the depth margin", ""
-        stability = Stability.NOT_STABLE if cut.has_chatter else Stability.STABLE
-        word = "chatter" if cut.has_chatter else "stable"
-        text = f"verdict based only on cut {cut.id} ({word} at {1e3 * cut.depth:.4g} mm), without a tap test"
-    remark = Remark("no-tap-test", program.name, text, cure)
+    remarks = tuple(_explain(found, program))
+    stability = _classify(found)
+    cause = NO_TAP_TEST.name if stability is Stability.DOUBTFUL else ""
     return replace(
-        verdict, stability=stability, decisive_cause=cause, drive_limit=drive_limit, remarks=(remark, *others)
+        verdict, stability=stability, decisive_cause=cause, drive_limit=drive_limit, remarks=(*remarks, *others)
     )
+
+
+def find_deciding_cuts(
+    program: ProgramTable, machine: Machine, cuts: Sequence[CutEntry], since: datetime | None = None
+) -> list[CutEntry]:
+    """Find the test cuts that decide on a program (see `evaluate_by_sound`), oldest first.
+
+    Parameters
+    ----------
+    program
+        Program.
+    machine
+        Machine.
+    cuts
+        Cuts of the journal, oldest first.
+    since
+        Time of the newest baseline; None without one.
+    """
+    recent = [cut for cut in cuts if since is None or cut.at >= since]
+    return [cut for cut in list_decisive_cuts(recent) if _decides(cut, program, machine)]
+
+
+def _classify(found: Sequence[CutEntry]) -> Stability:
+    """Return the stability by the decisive cuts, oldest first."""
+    if found and found[-1].has_chatter:
+        return Stability.NOT_STABLE
+    return Stability.STABLE if found and not _find_chatter(found) else Stability.DOUBTFUL
+
+
+def _find_chatter(found: Sequence[CutEntry]) -> CutEntry | None:
+    """Return the newest cut that chattered, or None."""
+    return next((cut for cut in reversed(found) if cut.has_chatter), None)
+
+
+def _explain(found: Sequence[CutEntry], program: ProgramTable) -> Iterator[Remark]:
+    """Explain the stability by the decisive cuts, oldest first."""
+    if not found:
+        cure = NO_TAP_TEST.remedy.format(tool=repr(program.tool), program=program.name)
+        yield Remark("no-tap-test", program.name, NO_TAP_TEST.sentence, cure)
+        return
+    cut, chatter = found[-1], _find_chatter(found)
+    text = f"verdict based only on {_describe(cut)}, without a tap test"
+    yield Remark("no-tap-test", program.name, text, "Tap the tool to know the depth margin")
+    if chatter is not None and not cut.has_chatter:
+        cure = "Repeat this cut, then exclude the wrong one"
+        yield Remark("cuts-contradict", chatter.id, f"contradicted by {_describe(chatter)} at this speed", cure)
+
+
+def _describe(cut: CutEntry) -> str:
+    return f"cut {cut.id} ({'chatter' if cut.has_chatter else 'stable'} at {1e3 * cut.depth:.4g} mm)"
 
 
 def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:

@@ -128,6 +128,27 @@ class CutEntry:
         return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
 
 
+def list_decisive_cuts(cuts: Sequence[CutEntry]) -> list[CutEntry]:
+    """List the usable cuts without stable ones whose recording has another verdict, in a part or in another pass.
+
+    Parameters
+    ----------
+    cuts
+        Cuts of the journal, oldest first.
+    """
+    worse = {_recording_key(cut) for cut in cuts if not cut.excluded and cut.by != "ear" and cut.word != "stable"}
+    return [cut for cut in cuts if cut.is_usable and (cut.has_chatter or _is_stable_throughout(cut, worse))]
+
+
+def _recording_key(cut: CutEntry) -> tuple[datetime, str, float, float]:
+    """Return the facts that all passes of a recording share."""
+    return cut.at, cut.by, cut.commanded_rpm, cut.depth
+
+
+def _is_stable_throughout(cut: CutEntry, worse: set[tuple[datetime, str, float, float]]) -> bool:
+    return _recording_key(cut) not in worse and all(part.verdict == "stable" for part in cut.parts)
+
+
 def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
     """Return the properties that cuts with the same cutter and immersion share."""
     return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch

@@ -15,6 +15,9 @@ NUMBER_TOKEN_PATTERN = re.compile(rf"\d+(?:[.,{GROUP_SIGNS}]\d+)*(?:[eE][+-]?\d+
 """Number with any signs between its digits, except for a blank, which ends it."""
 DECIMAL_SIGNS = (",.", ",", ".", "")
 """Signs that may be decimal in one answer. The other ones separate thousands."""
+ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
+ANSWER_UNITS |= {"teeth", "flutes"}
+"""Units that may stand between numbers."""
 ValueLimits = tuple[float, float]
 """Smallest and largest plausible value."""
 
@@ -63,7 +66,26 @@ def read_numbers(texts: Sequence[str], limits: Sequence[ValueLimits | None] = ()
         return list(found.pop())
     for text in texts:
         require_one_reading(text)
-    raise ValueError(f"the decimal signs of {' and '.join(texts)} differ. Write all numbers with a decimal point.")
+    listed = " and ".join(map(repr, texts))
+    raise ValueError(f"{listed} have different decimal signs. Write all numbers with a decimal point.")
+
+
+def parse_numbers(
+    answer: str, names: Sequence[str], least: int | None = None, limits: Sequence[ValueLimits | None] = ()
+) -> list[float]:
+    """Parse the numbers of an answer, at least `least` or one per name; ValueError names them.
+
+    limits: plausible range of each number, which tells a decimal sign from a separator of thousands.
+    """
+    words = NUMBER_TOKEN_PATTERN.sub(" ", answer)
+    strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
+    if strange:
+        raise ValueError(f"{answer!r}: {strange[0]!r} is neither a number nor a unit. Enter {', '.join(names)}.")
+    numbers = NUMBER_TOKEN_PATTERN.findall(answer)
+    if not (len(names) if least is None else least) <= len(numbers) <= len(names):
+        count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
+        raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces only between them.")
+    return read_numbers(numbers, limits)
 
 
 def require_one_reading(text: str) -> None:

@@ -1,7 +1,6 @@
 """Draft of machine.toml during setup: detected DAQs, questions and parsed answers."""
 
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -17,7 +16,7 @@ from acquisition import (
 )
 from acquisition.devices.registry import convert_driver_errors
 from lobewatch.machine.settings.machine_file import parse_machine_file
-from lobewatch.machine.settings.number_text import NUMBER_TOKEN_PATTERN, ValueLimits, format_number, read_numbers
+from lobewatch.machine.settings.number_text import format_number
 from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
 
 
@@ -163,32 +162,11 @@ class SetupQuestion:
 
 OPEN_ANSWER = "-"
 """Answer that leaves a question open."""
-ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
-ANSWER_UNITS |= {"teeth", "flutes"}
-"""Units that may stand between numbers."""
 
 
 def is_open_answer(answer: str) -> bool:
     """Tell whether an answer leaves a question open."""
     return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
-
-
-def parse_numbers(
-    answer: str, names: Sequence[str], least: int | None = None, limits: Sequence[ValueLimits | None] = ()
-) -> list[float]:
-    """Parse the numbers of an answer, at least `least` or one per name; ValueError names them.
-
-    limits: plausible range of each number, which tells a decimal sign from a separator of thousands.
-    """
-    words = NUMBER_TOKEN_PATTERN.sub(" ", answer)
-    strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
-    if strange:
-        raise ValueError(f"{answer!r}: {strange[0]!r} is neither a number nor a unit. Enter {', '.join(names)}.")
-    numbers = NUMBER_TOKEN_PATTERN.findall(answer)
-    if not (len(names) if least is None else least) <= len(numbers) <= len(names):
-        count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
-        raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces only between them.")
-    return read_numbers(numbers, limits)
 
 
 def format_answer(*values: float) -> str:

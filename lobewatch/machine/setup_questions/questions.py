@@ -7,13 +7,14 @@ from typing import Any, get_args
 from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
 from lobewatch.machine.settings.cut_tables import CutTable, DriveTable
-from lobewatch.machine.settings.number_text import ValueLimits
+from lobewatch.machine.settings.number_text import ValueLimits, parse_numbers
 from lobewatch.machine.settings.setting_questions import (
     DEPTH_RATIO_RANGE,
     RADIAL_DEPTH_RATIO_RANGE,
     TEMPLATE_COEFFICIENTS,
 )
 from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable, SensorMounting, SpeedTable, TapTable
+from lobewatch.machine.settings.speed_range import parse_speed_range
 from lobewatch.machine.settings.toml import TomlTable, TomlValue, find_plausible_ranges
 from lobewatch.machine.setup_questions import draft as setup
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion
@@ -60,7 +61,7 @@ def _set_port(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 def _parse_rate(answer: str) -> float:
-    return setup.parse_numbers(answer, ("sample rate in Hz",), limits=_limits(DaqTable, "sample_rate_hz"))[0]
+    return parse_numbers(answer, ("sample rate in Hz",), limits=_limits(DaqTable, "sample_rate_hz"))[0]
 
 
 def _limits(table: type[TomlTable], *keys: str) -> list[ValueLimits | None]:
@@ -96,7 +97,7 @@ def _set_sensor(quantity: str, draft: MachineDraft, answer: str) -> MachineDraft
         draft = draft.set("tap", hammer=None)
     names = ("DAQ input", f"sensitivity in {'mV/N' if quantity == 'force' else 'mV/g'}", "range in V")
     limits = _limits(ChannelTable, "input", SENSITIVITY_KEYS[quantity], "range_v")
-    number, sensitivity, reach = setup.parse_numbers(answer, names, limits=limits)
+    number, sensitivity, reach = parse_numbers(answer, names, limits=limits)
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is not a whole number. Enter 0 for the first input.")
     values: dict[str, TomlValue] = {"input": int(number), "quantity": quantity, SENSITIVITY_KEYS[quantity]: sensitivity}
@@ -122,7 +123,7 @@ def _set_mounting(draft: MachineDraft, answer: str) -> MachineDraft:
     mountings = [word for word in words if word in MOUNTINGS]
     rest = " ".join(word for word in words if word not in MOUNTINGS)
     names = (f"the mass in g and one of {', '.join(MOUNTINGS)}",)
-    mass = setup.parse_numbers(rest, names, 0 if mountings else 1, _limits(TapTable, "sensor_mass_g"))
+    mass = parse_numbers(rest, names, 0 if mountings else 1, _limits(TapTable, "sensor_mass_g"))
     return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
 
 
@@ -147,12 +148,8 @@ def _current_speeds(draft: MachineDraft) -> str:
 
 
 def _set_speeds(draft: MachineDraft, answer: str) -> MachineDraft:
-    names, limits = ("lowest speed in rpm", "highest speed in rpm"), _limits(SpeedTable, "low_rpm", "high_rpm")
-    speeds = setup.parse_numbers(answer, names, limits=limits)
-    for name, speed, (least, most) in zip(names, speeds, filter(None, limits), strict=True):
-        if not least <= speed <= most:
-            raise ValueError(f"{answer!r}: {name} is {speed:g}, outside {least:g} to {most:g}. Write speeds as 18000.")
-    return draft.set("speed", low_rpm=speeds[0], high_rpm=speeds[1])
+    low, high = parse_speed_range(answer)
+    return draft.set("speed", low_rpm=low, high_rpm=high)
 
 
 def _current_drive(draft: MachineDraft) -> str:
@@ -165,7 +162,7 @@ def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
     names, limits = ("power in kW", "torque in N m"), _limits(DriveTable, "power_kw", "torque_nm")
-    power, torque = setup.parse_numbers(answer, names, limits=limits)
+    power, torque = parse_numbers(answer, names, limits=limits)
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
@@ -187,7 +184,7 @@ def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
     numbers, made_of = _split_tool_answer(answer)
     names = ("flutes", "diameter in mm", "helix in deg", length)
     limits = [*_limits(CutTable, "teeth", "tool_diameter_mm", "helix_deg"), *_limits(TapTable, "stick_out_mm")]
-    teeth, diameter, helix, *stick_out = setup.parse_numbers(numbers, names, 3, limits)
+    teeth, diameter, helix, *stick_out = parse_numbers(numbers, names, 3, limits)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Begin with a whole number.")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
@@ -221,7 +218,7 @@ def _set_material(draft: MachineDraft, answer: str) -> MachineDraft:
     values: dict[str, TomlValue] = {"material": None}
     limits = _limits(CutTable, *SETUP_COEFFICIENT_KEYS)
     try:
-        numbers = setup.parse_numbers(answer, ("Kt", "Kr"), limits=limits)
+        numbers = parse_numbers(answer, ("Kt", "Kr"), limits=limits)
         values |= dict(zip(SETUP_COEFFICIENT_KEYS, numbers, strict=True))
     except ValueError:
         values |= {"material": answer.strip(), **dict.fromkeys(SETUP_COEFFICIENT_KEYS)}
@@ -256,7 +253,7 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (optional)")
     cut = draft.table("reference_cut")
     limits = _program_limits(draft, cut["tool_diameter_mm"])
-    speed, depth, radial, *feed = setup.parse_numbers(numbers, names, 3, limits)
+    speed, depth, radial, *feed = parse_numbers(numbers, names, 3, limits)
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
     name = name.strip() if colon else "first cut"
     setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}

@@ -8,16 +8,17 @@ from lobewatch.cuts.learning.next_speed import NextSpeed, NextSpeeds
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.show.cuts.recorded_cuts import observe_text
 from lobewatch.show.programs.advice import format_rpm
-from lobewatch.show.terminal.output import JsonObject, Texts, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table
 
 REASON_TEXTS: Mapping[str, str] = {
     "": "Next speeds to try, best first:",
+    "no-verdict": "",
     "stable": "Stable at this speed and depth. Keep this speed, or cut a little deeper to find the limit.",
     "no-chatter-frequency": "No next speed: no cut gave a chatter frequency yet. Record a chattering cut.",
-    "no-speed-in-range": "No next speed: no stable pocket lies between {low} and {high} rpm. Cut less deep.",
+    "no-speed-in-range": "No stable pocket lies between {low} and {high} rpm. Cut less deep.",
     "no-deep-speed": "No speed between {low} and {high} rpm is deep enough. Try again less deep:",
 }
-"""Sentence for each reason of `NextSpeeds`."""
+"""Sentence for each reason of `NextSpeeds`; empty if the cut itself says what to do."""
 MAX_SHOWN_GAIN = 10.0
 """Largest relative depth that is shown as a number."""
 
@@ -46,7 +47,8 @@ def _next_speed_json(found: NextSpeed) -> JsonObject:
 def next_speeds_texts(found: NextSpeeds) -> Texts:
     """Return the next speeds to try as a table, with what to expect; else why there are none."""
     low, high = (format_rpm(round(speed)) for speed in found.range_rpm)
-    texts: Texts = [*_contradiction_lines(found), REASON_TEXTS[found.reason].format(low=low, high=high)]
+    sentence = REASON_TEXTS[found.reason].format(low=low, high=high)
+    texts: Texts = [*_contradiction_lines(found), *filter(None, [sentence])]
     if not found.speeds:
         return texts
     table = new_table("speed (rpm)", "depth (mm)", "stable depth / here", "pocket (rpm)", "waves per flute")
@@ -81,7 +83,7 @@ def _next_cut(setting: CutSetting, found: NextSpeeds) -> tuple[float, float] | N
     """Return speed (rpm) and depth (m) of the next cut; that of the program before any chatter, or None."""
     if found.speeds:
         return found.speeds[0].speed_rpm, found.speeds[0].depth
-    return (setting.speed_rpm, setting.depth) if found.reason == "no-chatter-frequency" else None
+    return (setting.speed_rpm, setting.depth) if found.reason in ("no-verdict", "no-chatter-frequency") else None
 
 
 def _gain_text(gain: float) -> str:
@@ -90,5 +92,6 @@ def _gain_text(gain: float) -> str:
 
 def _contradiction_lines(found: NextSpeeds) -> Iterator[str]:
     if found.contradicting:
-        speeds = ", ".join(format_rpm(round(cut.speed_rpm)) for cut in found.contradicting)
-        yield f"A later cut contradicts the cut at {speeds} rpm, which does not count."
+        speeds = ", ".join(dict.fromkeys(format_rpm(round(cut.speed_rpm)) for cut in found.contradicting))
+        count = count_noun(len(found.contradicting), "cut")
+        yield f"Not counted: {count} at {speeds} rpm, contradicted by a later cut."

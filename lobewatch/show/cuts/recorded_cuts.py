@@ -16,7 +16,7 @@ from lobewatch.cuts.learning.pocket_depth import MAX_POCKET_CUTS, PocketDepth
 from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
-from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.logbook.cut_comparison import CutComparison, find_worst_cut
 from lobewatch.machine import ProgramTable
 from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, parts_texts, recorded_cut_remarks
 from lobewatch.show.programs.advice import format_rpm
@@ -92,6 +92,8 @@ def _fault_text(comparison: CutComparison) -> str:
             remedy = (
                 f"Use a sample rate of {2 * MIN_TOOTH_HARMONICS * comparison.tooth_passing_frequency:.0f} Hz or more"
             )
+        case "overload" if comparison.sensor == "microphone":
+            finding, remedy = "the recording is overloaded", "Hold the microphone or phone further away"
         case "unexplained-tone":
             mode, tone = comparison.nearest_mode_frequency(detected.tone), detected.tone
             distance = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz,"
@@ -214,11 +216,13 @@ def recorded_cut_json(comparison: CutComparison) -> JsonObject:
 
 
 def recording_json(comparisons: Sequence[CutComparison], more: Sequence[Mapping[str, Any]] = ()) -> JsonObject:
-    """Return the cut in a recording, several as a list in `cuts`; more: further keys of each."""
+    """Return the cut in a recording, several as a list in `cuts` with the worst `word`; more: further keys of each."""
     cuts = [recorded_cut_json(comparison) for comparison in comparisons]
     for cut, keys in zip(cuts, more, strict=False):
         cut |= {**keys, "remarks": [*cut["remarks"], *keys.get("remarks", ())]}
-    return cuts[0] if len(cuts) == 1 else {"cuts": cuts}
+    if len(cuts) == 1:
+        return cuts[0]
+    return {"word": find_worst_cut(comparisons).detected.verdict, "cuts": cuts}
 
 
 def _round_to_mm(depth: float) -> float:

@@ -34,6 +34,16 @@ def sound(path: Path, chatter: float | None = CHATTER, *, flutes: int = 2, tone:
     return path
 
 
+def passes(folder: Path, chatters: list[float | None], *, tone: float = 0.0) -> Path:
+    """Write a sound file of several cuts with air, and a tone throughout if it is given (Hz)."""
+    cuts = [scipy.io.wavfile.read(sound(folder / "part.wav", chatter))[1] for chatter in chatters]
+    silence = np.random.default_rng(1).normal(scale=2e-4, size=RATE)
+    signal = np.concatenate([silence, *(part for cut in cuts for part in (cut, silence))])
+    signal += 3.0 / 200 * bool(tone) * np.sin(2 * np.pi * tone * np.arange(signal.size) / RATE)
+    scipy.io.wavfile.write(folder / "passes.wav", RATE, signal.astype(np.float32))
+    return folder / "passes.wav"
+
+
 def run(*arguments: object) -> Result:
     result = CliRunner().invoke(app, [*map(str, arguments)])
     if isinstance(result.exception, ValueError | OSError):
@@ -72,12 +82,27 @@ def test_a_file_without_a_machine_gives_chatter_and_the_next_speeds(tmp_path: Pa
     assert run(*arguments).exit_code == 0
 
 
+@pytest.mark.parametrize("speeds", ["5,000 24,000", "5000-24000", "5000..24000 rpm"])
+def test_speeds_are_read_like_those_of_a_machine(tmp_path: Path, speeds: str) -> None:
+    arguments = ("listen", sound(tmp_path / "cut.wav"), "--teeth", 2, "--speed", RPM, "--speeds", speeds, "--json")
+    assert json.loads(run(*arguments).stdout)["range_rpm"] == [5000, 24000]
+
+
 def test_air_is_missed_only_where_it_matters(tmp_path: Path) -> None:
     arguments = ("--teeth", 2, "--speed", RPM, "--json")
     stable = json.loads(run("listen", sound(tmp_path / "a.wav", None), *arguments).stdout)
     assert (stable["word"], stable["next_reason"]) == ("stable", "stable")
     tone = json.loads(run("listen", sound(tmp_path / "b.wav", None, tone=1234.0), *arguments).stdout)
-    assert (tone["word"], tone["reason"], tone["next_reason"]) == ("cannot tell", "no-air", "no-chatter-frequency")
+    assert (tone["word"], tone["reason"], tone["next_reason"]) == ("cannot tell", "no-air", "no-verdict")
+
+
+def test_an_overloaded_sound_names_no_accelerometer_and_no_next_speed(tmp_path: Path) -> None:
+    rate, values = scipy.io.wavfile.read(sound(tmp_path / "cut.wav"))
+    scipy.io.wavfile.write(tmp_path / "cut.wav", rate, np.clip(20 * values, -1, 1))
+    arguments = ("listen", tmp_path / "cut.wav", "--teeth", 2, "--speed", RPM)
+    told = json.loads(run(*arguments, "--json").stdout)
+    assert (told["word"], told["reason"], told["next_reason"]) == ("cannot tell", "overload", "no-verdict")
+    assert "accelerometer" not in run(*arguments).stdout
 
 
 def test_a_motion_needs_no_sensor_option(tmp_path: Path) -> None:
@@ -116,9 +141,36 @@ def test_a_missing_file_is_named_and_a_folder_takes_no_flutes(untapped: Shop, tm
     assert "--teeth" in str(run("listen", untapped.path, "--program", "A", "--teeth", 2).exception)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "rejected"),
+    [
+        (("cut.wav", "--seconds", 5), "--seconds"),
+        (("cut.wav", "--cuts", 3), "--cuts"),
+        (("cut.wav", "--sensor", "accelerometer"), "--sensor"),
+        (("--page", "--teeth", 4), "--teeth"),
+        (("--page", "--out", "a.png"), "--out"),
+        (("--page", "--dry-run"), "--dry-run"),
+        (("--page", "cut.wav"), "MACHINE"),
+        (("folder", "--rate", 5000), "--rate"),
+        (("folder", "--http-port", 8080), "--http-port"),
+        (("folder", "--file", "cut.wav", "--seconds", 120), "--seconds"),
+        (("nosuch", "--teeth", 4), "nosuch: no such file or folder"),
+    ],
+)
+def test_an_option_that_does_not_apply_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[object, ...], rejected: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("folder").mkdir()
+    Path("cut.wav").touch()
+    error = run("listen", *arguments).exception
+    assert isinstance(error, ValueError)
+    assert str(error).startswith(rejected)
+
+
 def test_cuts_are_kept_until_one_is_stable(untapped: Shop, tmp_path: Path) -> None:
     start = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
-    assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-chatter-frequency")
+    assert (start["suggested"], start["next_reason"]) == ({"speed_rpm": RPM, "depth_mm": 1.0}, "no-verdict")
     file = sound(tmp_path / "cut.wav")
     dry, kept = (
         json.loads(run("listen", untapped.path, *arguments, "--json").stdout)
@@ -142,7 +194,10 @@ def test_without_a_tap_test_only_the_cut_at_that_speed_decides(untapped: Shop) -
     program = check(untapped)
     assert (program["verdict"], program["decided_by"]) == ("doubtful", "no-tap-test")
     assert (program["limit_mm"], program["stable"]) == (None, None)
-    assert [remark["code"] for remark in program["remarks"]] == ["no-tap-test"]
+    (remark,) = program["remarks"]
+    assert remark["code"] == "no-tap-test"
+    assert "_" not in remark["text"] + remark["cure"]  # no name of the library
+    assert "lobewatch listen" in remark["cure"]
     assert run("observe", untapped.path, "--program", "A", "--depth", 1.2, "--stable").exit_code == 0
     assert (check(untapped)["verdict"], check(untapped)["decided_by"]) == ("stable", None)
     for value in (("--depth", 1.3), ("--speed", 18100, "--depth", 1), ("--direction", "up"), ("--radial", 15)):
@@ -163,3 +218,36 @@ def test_a_cut_of_another_kind_proves_nothing(untapped: Shop, more: str) -> None
     assert run("observe", untapped.path, "--program", "A", "--stable").exit_code == 0
     untapped.edit('name = "A"', f'name = "B"\n{more}')
     assert check(untapped)["verdict"] == "doubtful"
+
+
+def test_a_stable_cut_after_chatter_leaves_the_program_doubtful(untapped: Shop) -> None:
+    for word in ("--chatter", "--stable"):
+        assert run("observe", untapped.path, "--program", "A", word).exit_code == 0
+    program = check(untapped)
+    assert (program["verdict"], program["decided_by"]) == ("doubtful", "no-tap-test")
+    assert [remark["code"] for remark in program["remarks"]] == ["no-tap-test", "cuts-contradict"]
+    assert run("exclude", untapped.path, "c1", "--reason", "x").exit_code == 0
+    assert check(untapped)["verdict"] == "stable"
+
+
+@pytest.mark.parametrize("chatters", [[CHATTER, None], [None, CHATTER]])
+def test_the_worst_pass_decides_on_a_recording(untapped: Shop, tmp_path: Path, chatters: list[float | None]) -> None:
+    file = passes(tmp_path, chatters)
+    told = json.loads(run("listen", file, "--teeth", 2, "--speed", RPM, "--json").stdout)
+    assert sorted(cut["word"] for cut in told["cuts"]) == ["chatter", "stable"]
+    assert (told["word"], told["next_reason"], told["contradicting_rpm"]) == ("chatter", "", [])
+    arguments = ("--program", "A", "--file", file, "--sensor", "microphone", "--json")
+    stored = json.loads(run("listen", untapped.path, *arguments).stdout)
+    assert (stored["next_reason"], stored["contradicting_rpm"]) == ("", [])
+    assert check(untapped)["verdict"] == "not stable"
+
+
+def test_air_of_an_earlier_cut_serves_a_tool_without_a_tap_test(untapped: Shop, tmp_path: Path) -> None:
+    tone, common = 1234.0, ("--program", "A", "--sensor", "microphone", "--json")
+    alone = sound(tmp_path / "alone.wav", None, tone=tone)
+    missed = json.loads(run("listen", untapped.path, *common, "--file", alone, "--dry-run").stdout)
+    assert (missed["word"], missed["reason"]) == ("cannot tell", "no-air")
+    first = json.loads(run("listen", untapped.path, *common, "--file", passes(tmp_path, [None], tone=tone)).stdout)
+    assert (first["word"], first["air_from"]) == ("stable", None)
+    again = json.loads(run("listen", untapped.path, *common, "--file", alone, "--dry-run").stdout)
+    assert (again["word"], again["air_from"]) == ("stable", first["id"])

@@ -5,9 +5,11 @@ from __future__ import annotations
 import http.client
 import io
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -19,6 +21,7 @@ import soundfile
 from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.readers.read_audio import decode_audio
+from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer, RecordingServer, phone_page, uploaded_recording
 
@@ -234,6 +237,12 @@ def test_an_impossible_value_is_named_before_the_recording_is_read(
     status, told = send(server, b"sound", **changes)
     assert status == 409
     assert told["error"].endswith(".")
+
+
+def test_the_page_states_the_range_of_speeds_that_is_assumed() -> None:
+    page = resources.files("lobewatch.screen").joinpath("static/phone.html").read_text("utf-8")
+    found = re.findall(r'name="(?:low|high)_rpm".*placeholder="([\d.]+) \u00d7 speed"', page)
+    assert found == [*map(str, ASSUMED_RANGE)]
 
 
 def test_the_dashboard_serves_the_page_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

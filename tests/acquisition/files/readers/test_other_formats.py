@@ -145,6 +145,12 @@ def test_vectors_over_time_with_a_rate(tmp_path: Path) -> None:
     assert hit.force == pytest.approx(force * 4.4482216152605)
 
 
+def test_a_text_with_the_name_of_a_sound_file_is_no_sound(tmp_path: Path) -> None:
+    (tmp_path / "a.wav").write_text("time [s],force [N]\n0,1\n")
+    with pytest.raises(DataError, match="WAV"):
+        read_hits(tmp_path / "a.wav")
+
+
 @pytest.mark.parametrize("kind", [np.int16, np.int32, np.float32])
 def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
     shares = np.stack([0.5 * np.sin(np.arange(4000) / 9), 0.25 * np.cos(np.arange(4000) / 7)], axis=1)

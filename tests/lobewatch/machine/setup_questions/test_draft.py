@@ -6,7 +6,8 @@ from importlib import resources
 
 import pytest
 
-from lobewatch.machine.setup_questions.draft import MachineDraft, is_open_answer, parse_numbers
+from lobewatch.machine.settings.number_text import parse_numbers
+from lobewatch.machine.setup_questions.draft import MachineDraft, is_open_answer
 from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
 
 pytestmark = pytest.mark.quick

@@ -228,9 +228,7 @@ def _relative_depth(depth: float, cuts: Sequence[HeardCut]) -> float:
     return ratio if math.isfinite(ratio) else 1.0
 
 
-def _weigh_samples(
-    cuts: Sequence[HeardCut], teeth: int, lobes: SampledLobes, speeds: Floats, depths: Floats
-) -> Floats:
+def _weigh_samples(cuts: Sequence[HeardCut], teeth: int, lobes: SampledLobes, speeds: Floats, depths: Floats) -> Floats:
     """Return the probability of each sample, by verdict and chatter frequency of each cut."""
     logarithm = np.zeros(depths.size)
     for cut in cuts:

@@ -11,6 +11,7 @@ import msgspec
 
 from acquisition import Conditions, Remark
 from dsm import format_rounded
+from lobewatch.cuts.learning.verdict_by_sound import make_contradiction_remark
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
@@ -103,9 +104,8 @@ def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:
 
 def contradiction_remark(cut: CutEntry) -> Remark:
     """Return a remark on an earlier cut with another result at the same point."""
-    text = f"contradicts another test cut at the same speed and depth ({cut_summary_text(cut)})"
     cure = f"Exclude the wrong test cut, for example with lobewatch exclude MACHINE {cut.id} --reason TEXT"
-    return Remark("cuts-contradict", cut.id, text, cure)
+    return make_contradiction_remark(cut.id, cut_summary_text(cut), cure)
 
 
 VALUE_SCALES = {"frequency_hz": 1.0, "damping_ratio": 0.01, "stiffness_n_per_m": 1e6}

@@ -95,15 +95,30 @@ def _explain(found: Sequence[CutEntry], program: ProgramTable) -> Iterator[Remar
         yield Remark("no-tap-test", program.name, NO_TAP_TEST.sentence, cure)
         return
     cut, chatter = found[-1], _find_chatter(found)
-    text = f"verdict based only on {_describe(cut)}, without a tap test"
+    text = f"verdict based only on cut {cut.id} ({_describe(cut)}), without a tap test"
     yield Remark("no-tap-test", program.name, text, "Tap the tool to know the depth margin")
     if chatter is not None and not cut.has_chatter:
-        cure = "Repeat this cut, then exclude the wrong one"
-        yield Remark("cuts-contradict", chatter.id, f"contradicted by {_describe(chatter)} at this speed", cure)
+        yield make_contradiction_remark(chatter.id, _describe(chatter))
+
+
+def make_contradiction_remark(cut: str, summary: str, cure: str = "Exclude the wrong test cut") -> Remark:
+    """Return a remark on a cut with another result at the same point.
+
+    Parameters
+    ----------
+    cut
+        Identity of the cut.
+    summary
+        Text that describes it.
+    cure
+        Remedy.
+    """
+    text = f"contradicts another test cut at the same speed and depth ({summary})"
+    return Remark("cuts-contradict", cut, text, cure)
 
 
 def _describe(cut: CutEntry) -> str:
-    return f"cut {cut.id} ({'chatter' if cut.has_chatter else 'stable'} at {1e3 * cut.depth:.4g} mm)"
+    return f"{'chatter' if cut.has_chatter else 'stable'} at {1e3 * cut.depth:.4g} mm"
 
 
 def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:

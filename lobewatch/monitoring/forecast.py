@@ -155,6 +155,8 @@ class PastFit(NamedTuple):
     """Value of the first point."""
     spread: float
     """Standard deviation of the points around the shapes without random walk, in the unit of the series."""
+    n_fitted: int
+    """Number of fitted points, one less than that of the dates if the newest one is left out."""
 
     def forecast(self, horizon: float) -> Forecast:
         """Forecast until a date."""
@@ -190,7 +192,8 @@ def fit_past(dates: Floats, readings: Readings) -> PastFit:
     kept, weight = _select_heaviest([*families, *trend_shapes.fit_random_walks(base, places)])
     first = average_neighbors(y)[0]
     fitted = weight @ np.concatenate([family.predict(at)[0] for family in kept]) + first
-    return PastFit(kept, weight, fitted, dates, float(first), _point_spread(families) * np.sqrt(at.size / places.size))
+    spread = _point_spread(families) * np.sqrt(at.size / places.size)
+    return PastFit(kept, weight, fitted, dates, float(first), spread, at.size)
 
 
 def _point_spread(families: Sequence[trend_shapes.ShapeFits]) -> float:

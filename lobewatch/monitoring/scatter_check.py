@@ -7,6 +7,7 @@ import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.forecast import PastFit
+from lobewatch.monitoring.series_points import MAD_TO_STD, MAX_OUTLIER_DISTANCE
 from lobewatch.monitoring.trend_shapes import RandomWalkFits
 
 MIN_CHECKED_POINTS = 20
@@ -59,9 +60,16 @@ def check_scatter(percents: Floats, past: PastFit | None, *, has_changed: bool) 
     line = np.polynomial.Polynomial.fit(past.dates, percents, 1)(past.dates)
     left = percents - (line if fitted is None else fitted)
     left -= left.mean()
-    squares = max(float(left @ left), np.finfo(float).tiny)
-    correlation = float(left[1:] @ left[:-1]) / squares + N_LINE_COLUMNS / n
+    correlation = _correlate_neighbors(left) + N_LINE_COLUMNS / n
     return ScatterCheck(correlation, correlation * math.sqrt(n) > CORRELATION_SCORE, _find_groups(left))
+
+
+def _correlate_neighbors(left: Floats) -> float:
+    """Return the correlation of neighbours of what the line leaves (n,), which two outliers alone do not make."""
+    limit = MAX_OUTLIER_DISTANCE * MAD_TO_STD * float(np.median(np.abs(left - np.median(left))))
+    near = np.clip(left, -limit, limit)
+    near -= near.mean()
+    return float(near[1:] @ near[:-1]) / max(float(near @ near), np.finfo(float).tiny)
 
 
 def _fit_without_walks(past: PastFit) -> Floats | None:

@@ -209,7 +209,7 @@ def _model_short_series(readings: Readings, errors: Floats) -> DropModel:
 def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
     """Start at the highest of the fitted line at the first eight points, with the scatter around the line."""
     base, freedom = build_level_model(readings), readings.y.size - 2.0
-    effects, rest = _fit_effects(base, readings, past.fitted)
+    effects, rest = _fit_effects(base, readings, past)
     start, variance = _fit_start(past)
     spread = max(past.spread, MIN_SCATTER)
     kept = base.columns[:, : 1 + base.n_temperature_columns]
@@ -220,13 +220,10 @@ def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
     return DropModel(start + rest, lever, 0.0, scatter, effects)
 
 
-def _fit_effects(base: LevelModel, readings: Readings, fitted: Floats) -> tuple[ConditionEffects, float]:
-    """Fit the effects of the conditions to what the fitted line (n,) leaves, and return its mean too.
-
-    Without the newest point, which the line may not follow yet.
-    """
-    columns, n_warm = base.columns[:-1, 1:], base.n_temperature_columns
-    left = (base.y + readings.y[0] - fitted)[:-1]
+def _fit_effects(base: LevelModel, readings: Readings, past: PastFit) -> tuple[ConditionEffects, float]:
+    """Fit the effects of the conditions to what the line leaves of its points, and return the mean of that too."""
+    columns, n_warm = base.columns[: past.n_fitted, 1:], base.n_temperature_columns
+    left = (base.y + readings.y[0] - past.fitted)[: past.n_fitted]
     rest = float(left.mean())
     if not columns.size:
         return NO_EFFECTS, rest

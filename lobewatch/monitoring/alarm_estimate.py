@@ -61,7 +61,7 @@ DROP_FAMILIES = (
 """All families of shapes: drops with one date, and with two."""
 MIN_POINTS_BEHIND = 2
 """Smallest number of points of a new level, and of points after the first one of a new rate; chosen."""
-NEGLIGIBLE_WEIGHT = 1e-5
+NEGLIGIBLE_WEIGHT = 1e-4
 """Weight relative to that of the heaviest shape below which a shape is left out; chosen."""
 SIZE_QUANTILES = (0.025, 0.975)
 """Quantiles of the 95 % interval of a size."""

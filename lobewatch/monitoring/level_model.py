@@ -17,7 +17,7 @@ STEEL_FREQUENCY_PER_KELVIN = -0.015
 """Change of the natural frequency with Young's modulus of steel (%/K), and its standard deviation."""
 
 MIN_SCATTER = 1e-3
-"""Smallest scatter of a point (%); chosen below what any tap test resolves, so that rounding of equal values is none."""
+"""Smallest scatter of a point (%), above rounding; chosen below what any tap test resolves."""
 MIN_POINT_VARIANCE = MIN_SCATTER**2
 """Smallest variance of a point (%^2)."""
 OPERATOR_SPREAD = 1.0

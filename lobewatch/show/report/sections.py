@@ -309,7 +309,7 @@ INDEPENDENT_CONFIDENCE = "False alarms: 5 of 100 healthy series within 60 clampi
 def _alarm_confidence(trend: Trend | None) -> str:
     """Return rule and confidence of the alarm."""
     if trend is None or len(trend.points) < MIN_MONITORED_POINTS:
-        return f"needs {MIN_MONITORED_POINTS} clampings"
+        return f"needs {MIN_MONITORED_POINTS} clampings, except at the fixed limits"
     check = trend.scatter_check
     if check is None or not check.is_correlated:
         return f"{ALARM_RULE}. {INDEPENDENT_CONFIDENCE}"

@@ -19,7 +19,7 @@ from lobewatch.monitoring.status_rules import Alarm, add_acknowledgements
 from lobewatch.monitoring.threshold_dates import LimitForecasts, ProgramForecast
 
 SUMMARY_FILE_NAME = "standing.json"
-SUMMARY_FORMAT_NUMBER = 3
+SUMMARY_FORMAT_NUMBER = 4
 """Number of the file format. A file of another format is rebuilt."""
 SUMMARY_LIFETIME = timedelta(days=7)
 """Time that a summary and its forecast are valid; chosen."""

@@ -7,7 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats, Indices
-from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior, guard_first_points, winsorize
+from lobewatch.monitoring.series_points import (
+    NO_SCATTER_PRIOR,
+    Readings,
+    ScatterPrior,
+    find_first_outliers,
+    guard_first_points,
+    winsorize,
+)
 
 MIN_TEMPERATURE_POINTS = 12
 """Smallest number of points with a temperature to fit its effect; chosen."""
@@ -40,6 +47,8 @@ class LevelModel:
     """Number of temperature columns."""
     scatter_prior: ScatterPrior = NO_SCATTER_PRIOR
     """Prior scatter from point to point."""
+    first_distance: float = 0.0
+    """Distance of the first point from the next ones (%) if it is an outlier, else 0."""
 
     def precision(self, n: Indices) -> Floats:
         """Return the prior precision of the coefficients times the variance of n (r,) points, shape (r, p, p)."""
@@ -242,5 +251,6 @@ def build_level_model(readings: Readings) -> LevelModel:
         rest -= STEEL_FREQUENCY_PER_KELVIN * columns[-1]
     names = dict.fromkeys(filter(None, readings.operators))
     columns += [np.array([held == name for held in readings.operators], dtype=np.float64) for name in names]
-    rest = guard_first_points(rest)
-    return LevelModel(winsorize(rest), rest, np.column_stack(columns), int(is_warm), readings.scatter_prior.single)
+    away, rest = find_first_outliers(rest).get(0, 0.0), guard_first_points(rest)
+    known = readings.scatter_prior.single
+    return LevelModel(winsorize(rest), rest, np.column_stack(columns), int(is_warm), known, away)

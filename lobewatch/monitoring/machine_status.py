@@ -24,7 +24,7 @@ from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.drop_text import format_below_start
 from lobewatch.monitoring.scatter_check import ScatterCheck
 from lobewatch.monitoring.series_drop import SeriesDrop
-from lobewatch.monitoring.series_history import SeriesHistory, build_series_history
+from lobewatch.monitoring.series_history import SeriesHistory, ValueHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.status_rules import Alarm, StatusLevel, TriggeredAlarm, add_acknowledgements
 from lobewatch.monitoring.trend import Trend
@@ -61,6 +61,16 @@ def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str =
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
     if trend.detection.rise is not None:
         yield rules.FREQUENCY_ROSE.remark(name, event=event, drop=text)
+
+
+def _first_test_remarks(name: str, history: ValueHistory, path: Path | str) -> Iterator[Remark]:
+    """Remark on a first test that counts as badly clamped: a drop right after it would look the same."""
+    if history.trend is not None and history.trend.drop_model.first_distance:
+        model, folder = history.trend.drop_model, shlex.quote(str(path))
+        texts = {"tap_id": history.first_row_of(model.first_outlier).tap_id, "folder": folder}
+        calls = {name: call.format(**texts) for name, call in rules.OUTLIER_CALLS.items()}
+        side, distance = "above" if model.first_distance > 0 else "below", abs(model.first_distance)
+        yield rules.FIRST_TEST_DIFFERS.remark(name, distance=distance, side=side, **texts, **calls)
 
 
 def _scatter_remarks(name: str, check: ScatterCheck | None) -> Iterator[Remark]:
@@ -131,9 +141,9 @@ class SeriesStatus:
 
     @property
     def is_change_proven(self) -> bool:
-        """True if the frequency has changed for certain: an open alarm, a rise, or a drop with the score of one."""
-        detected = self.trend is not None and (self.trend.open_drop or self.trend.detection.rise)
-        return self.drop.is_proven or bool(detected)
+        """True if the frequency has changed for certain: an open alarm, a rise, or two points that prove a drop."""
+        trend = self.trend
+        return trend is not None and bool(trend.open_drop or trend.detection.rise or trend.is_drop_proven)
 
     @property
     def is_baseline(self) -> bool:
@@ -257,6 +267,7 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
     of_watch = [*_trend_remarks(name, trend, drop, path)] if trend else []
     remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
+    remarks += _first_test_remarks(name, frequency, path)
     remarks += _scatter_remarks(name, trend.scatter_check) if trend else []
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
     pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]

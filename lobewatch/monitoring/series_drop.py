@@ -21,7 +21,7 @@ from lobewatch.monitoring.level_model import (
     LevelModel,
     build_level_model,
 )
-from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, Readings, ScatterPrior
+from lobewatch.monitoring.series_points import MIN_CLAMPING_ERROR, NO_SCATTER_PRIOR, Readings, ScatterPrior
 
 USUAL_SCATTER = 0.05, 0.6
 """Range of the scatter of f1 from reclamping (%) before it is measured: 0.05 to 0.5 is usual, and the upper end is
@@ -162,6 +162,11 @@ class DropModel:
     """Posterior of the scatter of a point."""
     effects: ConditionEffects = NO_EFFECTS
     """Effects of the conditions."""
+    first_distance: float = 0.0
+    """Distance of one of the first points from the next ones (%) that counts as badly clamped, else 0. The start may
+    be there."""
+    first_outlier: int = 0
+    """Index of that point."""
     is_short: bool = False
     """True if the scatter is not measured, so that it does not contain the errors of the tap tests."""
 
@@ -170,13 +175,17 @@ class DropModel:
         return -100 * math.expm1((percent - self.effects.at(temperature, operator)[0] - self.start) / 100)
 
     def drop_at(self, value: float, temperature: float, operator: str, error: float) -> SeriesDrop:
-        """Return a drop (%) with its interval; error: standard error of the value from its tap test alone (%)."""
+        """Return a drop (%) with its interval; error: standard error of the value from its tap test alone (%).
+
+        The interval also contains the drop from a first test that counts as badly clamped.
+        """
         lever = 1 + self.start_variance + self.effects.at(temperature, operator)[1]
         alone = math.hypot(self.start_error, np.nan_to_num(error) if self.is_short else 0.0)
         ratio, change = 1 - value / 100, abs(100 * math.log1p(-value / 100))
-        std = ratio * math.hypot(math.sqrt(lever) * self.scatter.percent, alone)
-        is_proven = self.scatter.tail(change, lever, alone) < scipy.special.ndtr(-PROVEN_DROP_SCORE)
-        return SeriesDrop(value, std, ratio * self.scatter.half_width(lever, alone), bool(is_proven))
+        doubt = abs(self.first_distance)
+        std = ratio * math.hypot(math.sqrt(lever) * self.scatter.percent, alone, doubt / 2)
+        is_proven = self.scatter.tail(change - doubt, lever, alone) < scipy.special.ndtr(-PROVEN_DROP_SCORE)
+        return SeriesDrop(value, std, ratio * (self.scatter.half_width(lever, alone) + doubt), bool(is_proven))
 
     def std(self, error: float) -> float:
         """Return the standard error of one value with reclamping (%); error: from its tap test alone."""
@@ -202,7 +211,10 @@ def _model_short_series(readings: Readings, errors: Floats) -> DropModel:
     scatter = ScatterPosterior.of(squares, y.size - 1.0, known, math.sqrt(apart) * USUAL_SCATTER[1])
     at = int(np.argmax(first))
     error = float(np.nan_to_num(errors[at]))
-    return DropModel(float(first[at]), HIGHEST_SQUARE[first.size - 1], error, scatter, is_short=True)
+    above = float(first[at] - np.sort(first)[-2]) if first.size == N_START_POINTS else 0.0
+    doubt = above if above > MIN_CLAMPING_ERROR else 0.0
+    variance = HIGHEST_SQUARE[first.size - 1]
+    return DropModel(float(first[at]), variance, error, scatter, NO_EFFECTS, doubt, at, is_short=True)
 
 
 def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
@@ -216,7 +228,7 @@ def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
     of_operators = float(base.inverse_normal_matrix[0, 0] - alone)
     lever = max(variance / spread**2 - of_operators, 1 / base.y.size)
     scatter = ScatterPosterior.of(freedom * spread**2, freedom, readings.scatter_prior.single)
-    return DropModel(start + rest, lever, 0.0, scatter, effects)
+    return DropModel(start + rest, lever, 0.0, scatter, effects, base.first_distance)
 
 
 def _fit_effects(base: LevelModel, readings: Readings, past: PastFit) -> tuple[ConditionEffects, float]:

@@ -114,11 +114,27 @@ class ValueHistory:
         drop = self.drop_at(self.rows[-1])
         return Estimate(-drop.value + 0.0, drop.std)
 
+    def first_row_of(self, point: int) -> HistoryRow:
+        """Return the row of the first tap test of a point of the trend."""
+        return self.trend_values[0][0 if self.trend is None else self.trend.points[point].taps[0]]
+
+    @cached_property
+    def _point_numbers(self) -> dict[str, int]:
+        """Number of the point of the trend by the id of its tap tests; empty for values other than the frequency."""
+        if self.trend is None or self.name != "frequency":
+            return {}
+        rows = self.trend_values[0]
+        return {rows[tap].tap_id: number for number, point in enumerate(self.trend.points) for tap in point.taps}
+
     def drop_at(self, row: HistoryRow) -> SeriesDrop:
         """Return the drop (%) from the start to a row; unknown if the row has no value.
 
-        The interval of a value other than the frequency is unknown below 8 points, as its usual scatter is.
+        Tap tests of one point have its drop, none if it is the first. The interval of a value other than the
+        frequency is unknown below 8 points, as its usual scatter is.
         """
+        point = self._point_numbers.get(row.tap_id)
+        if point is not None and self.trend is not None:
+            return self.trend.drop_at(point) if point or self.trend.points[0].taps[0] else NO_DROP
         percent, trend = self.percent_below_start(row), self._reference_trend
         if trend is None or math.isnan(percent):
             return UNKNOWN_DROP
@@ -131,6 +147,9 @@ class ValueHistory:
 
     def percent_below_start(self, row: HistoryRow) -> float:
         """Return the drop (%) of a row without its interval; NaN if the row has no value."""
+        point = self._point_numbers.get(row.tap_id)
+        if point is not None and self.trend is not None:
+            return float(self.trend.drops[point])
         trend, number = self._reference_trend, float(getattr(row, self.name).value)
         if trend is None or not number > 0:
             return math.nan
@@ -197,8 +216,7 @@ class SeriesHistory:
         trend = self.frequency.trend
         if trend is None or trend.open_drop is None:
             return None
-        rows, _ = self.frequency.trend_values
-        return rows[trend.points[trend.open_drop.triggered_at].taps[0]]
+        return self.frequency.first_row_of(trend.open_drop.triggered_at)
 
 
 def build_series_history(
@@ -252,8 +270,11 @@ def compare_bearings(series: SeriesHistory, machine: Machine) -> BearingChange |
     """Compare the bearing stiffness with that at the start, by the drop of the frequency.
 
     None where no two tests gave a bearing stiffness, or not the newest, or where one of the frequencies leaves it
-    open or belongs to another model.
+    open or belongs to another model, or until a second clamping confirms the newest test.
     """
+    trend = series.frequency.trend
+    if trend is not None and trend.needs_repeat:
+        return None
     stiffness, drop = series.values["bearing_stiffness"], series.drop
     if machine.spindle is None or drop.interval is None or len(stiffness.reference_rows) < 2:
         return None

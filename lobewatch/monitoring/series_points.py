@@ -148,22 +148,30 @@ MIN_CLAMPING_ERROR = 2.0
 and a bad clamping of 3 %, which does not."""
 
 
-def guard_first_points(y: Floats) -> Floats:
-    """Set each of the first points of a series (n,) that no neighbour confirms to the third point after it.
+def find_first_outliers(y: Floats) -> dict[int, float]:
+    """Find which of the first points of a series (n,) no neighbour confirms, and how far each is from the others.
 
-    From eight points on. The first eight decide, so that no later point changes it again. The median of the others
-    in its place would make the scatter too small.
+    From eight points on. The first eight decide, so that no later point changes it again.
     """
-    if y.size < N_GUARDING_POINTS:
-        return y
-    guarded, first = y.copy(), y[:N_GUARDING_POINTS]
-    for i in range(N_GUARDED_POINTS):
+    first, found = y[:N_GUARDING_POINTS], dict[int, float]()
+    for i in range(N_GUARDED_POINTS if y.size >= N_GUARDING_POINTS else 0):
         others = np.delete(first, i)
         middle = np.median(others)
         limit = max(MAX_FIRST_DISTANCE * float(np.std(others, ddof=1)), MIN_CLAMPING_ERROR)
         away, around = first[i] - middle, np.delete(first[: i + 2], i)[-2:] - middle
         if abs(away) > limit and (around / away < CONFIRMED_DISTANCE_SHARE).all():
-            guarded[i] = y[i + N_GUARDED_POINTS]
+            found[i] = float(away)
+    return found
+
+
+def guard_first_points(y: Floats) -> Floats:
+    """Set each of the first points of a series (n,) that no neighbour confirms to the third point after it.
+
+    The median of the others in its place would make the scatter too small.
+    """
+    outliers = np.array([*find_first_outliers(y)], dtype=np.intp)
+    guarded = y.copy()
+    guarded[outliers] = y[outliers + N_GUARDED_POINTS]
     return guarded
 
 

@@ -170,6 +170,12 @@ DOUBTFUL_DECAY = StatusRule(
     "frequency of the newest test is lower than in earlier tests",
     "Reclamp the tool, then run TapSession.run {folder} Conditions.reclamped to check the drop",
 )
+FIRST_TEST_DIFFERS = StatusRule(
+    "first-test-differs",
+    WARN,
+    "frequency of one of the first tests ({tap_id}) is {distance:.1f} % {side} the others, so the start is uncertain",
+    "Check if the spindle changed after this test. If it did, run {event}, else {exclude}",
+)
 MODE_LOST = StatusRule(
     "mode-lost",
     WARN,
@@ -219,6 +225,11 @@ FOLDER_COPIED = StatusRule(
 )
 EVENT_CALL = 'folder_updates.add_event {folder} "what was done" add_event.new_baseline'
 """Call that records a repair in the journal of a folder."""
+OUTLIER_CALLS = {
+    "event": EVENT_CALL,
+    "exclude": 'folder_updates.exclude_entry {folder} {tap_id} exclude_entry.reason "badly clamped"',
+}
+"""Calls that begin a new series, or exclude a tap test."""
 
 
 def _rules_of(*codes: str) -> list[StatusRule]:
@@ -232,7 +243,7 @@ STATUS_RULES = (
     *_rules_of("file-damaged", "cut-damaged", "cut-unlisted"),
     *(FREQUENCY_WARNING, DOUBTFUL_DECAY),
     *_rules_of("frequency-jump"),
-    MODE_LOST,
+    *(FIRST_TEST_DIFFERS, MODE_LOST),
     *_rules_of("wrong-quantity", "wrong-unit"),
     *_rules_of("no-mode-in-band", "no-mode-to-follow", "other-band", "stiffness-jump", "stiffness-off-model"),
     *_rules_of("direction-stiffness", "same-direction", "tool-compliance"),

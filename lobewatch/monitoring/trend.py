@@ -17,7 +17,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, Forecast, PastFit
 from lobewatch.monitoring.level_model import build_level_model
 from lobewatch.monitoring.newest_point import fit_confirmed_past, measure_newest_distance
 from lobewatch.monitoring.scatter_check import ScatterCheck, check_scatter
-from lobewatch.monitoring.series_drop import DropModel, model_drop
+from lobewatch.monitoring.series_drop import DropModel, SeriesDrop, model_drop
 from lobewatch.monitoring.series_points import (
     MAX_OUTLIER_DISTANCE,
     NO_SERIES_PRIOR,
@@ -36,6 +36,8 @@ DAYS_PER_MONTH = 30.44
 """Mean length of a month (days)."""
 FORECAST_HORIZON_DAYS = 36 * DAYS_PER_MONTH
 """Longest forecast after the last point (days); chosen."""
+MAX_STEADY_WEIGHT = 0.05
+"""Largest weight of a steady series with which a shape is stated; chosen."""
 MAX_RUN_IN_RATE = 0.4
 """Present rate of a drop over its mean rate, below which it has slowed down; chosen."""
 
@@ -140,6 +142,26 @@ class Trend:
         model = self.drop_model
         return np.array([model.percent_below_start(it.percent, it.temperature, it.operator) for it in self.points])
 
+    def drop_at(self, point: int) -> SeriesDrop:
+        """Return the drop of a point with its interval; point: its index."""
+        it = self.points[point]
+        return self.drop_model.drop_at(float(self.drops[point]), it.temperature, it.operator, it.error)
+
+    @property
+    def is_drop_proven(self) -> bool:
+        """True if the last two points both prove a drop, or both a rise."""
+        last = [self.drop_at(point) for point in range(max(len(self.points) - 2, 0), len(self.points))]
+        return len(last) > 1 and all(one.is_proven and one.value * last[-1].value > 0 for one in last)
+
+    @property
+    def has_certain_shape(self) -> bool:
+        """True if a steady series has a weight of at most 5 %, so that a shape and its beginning can be stated."""
+        past = self.past_fit
+        if past is None:
+            return False
+        kinds = np.array([shape.kind for family in past.families for shape in family.shapes])
+        return float(past.weight[kinds == "none"].sum()) <= MAX_STEADY_WEIGHT
+
     @cached_property
     def scatter_check(self) -> ScatterCheck | None:
         """Check of the scatter for independence; None below 20 points."""
@@ -175,15 +197,23 @@ class Trend:
         """Present change (% per month) with its 95 % interval; None below 8 points."""
         return None if self.past_fit is None else Rate(*(DAYS_PER_MONTH * rate for rate in self.past_fit.rate))
 
-    @property
+    @cached_property
     def open_drop(self) -> DetectedDrop | None:
-        """Newest drop with an open alarm; None without alarm."""
-        return next(reversed(self.detection.open_drops), None)
+        """Newest drop with an open alarm; None without alarm. A newest point that nothing confirms does not count."""
+        drop = next(reversed(self.detection.open_drops), None)
+        if drop is None or self.past_fit is None or self.past_fit.n_fitted == len(self.points):
+            return drop
+        return replace(drop, readings=drop.readings.until(drop.readings.y.size - 1))
 
     @property
     def is_run_in(self) -> bool:
-        """True if the open drop began among the first points and has slowed down, as of bearings that run in."""
+        """True if the open drop began among the first points and has slowed down, as of bearings that run in.
+
+        A step never does: its rate is 0 after it.
+        """
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
+            return False
+        if self.open_drop.change.kind == "step":
             return False
         mean = (self.start - float(self.past_fit.fitted[-1])) / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
         return -self.past_fit.rate.value < MAX_RUN_IN_RATE * mean

@@ -63,7 +63,10 @@ def _drop_json(trend: Trend) -> JsonObject | None:
     drop, since = trend.open_drop, trend.drop_since
     if drop is None:
         return None
-    return {"kind": drop.change.kind, "since": since and since.isoformat(), "size_percent": drop.change.size}
+    change = drop.change
+    interval = change.size - change.half_width, change.size + change.half_width
+    row = {"kind": change.kind, "since": since and since.isoformat(), "size_percent": change.size}
+    return row | {"size_interval_percent": interval}
 
 
 def _scatter_json(trend: Trend) -> JsonObject:
@@ -202,6 +205,8 @@ def trend_text(series: SeriesStatus) -> str:
         return "no change proven"
     if trend.open_drop is not None:
         return _alarm_course_text(trend)
+    if not trend.has_certain_shape:
+        return "date of the change unknown"
     return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
 
 
@@ -212,7 +217,7 @@ def _alarm_course_text(trend: Trend) -> str:
         return ""
     words = {"step": "dropped at once before", "slope": "dropping since", "mixed": "dropped at once and steadily since"}
     course = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
-    return f"{course}, slower now (run-in)" if trend.is_run_in else course
+    return f"{course}, slower now (may be run-in)" if trend.is_run_in else course
 
 
 def _shape_text(shape: TrendShape, falls: bool) -> str:

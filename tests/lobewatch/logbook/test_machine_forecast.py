@@ -176,6 +176,9 @@ def test_trend_in_json(worn: Shop) -> None:
     assert found["points"][10]["percent"] == pytest.approx(100 * np.log((1 - 0.03 + 0.0003) / 1.0003), abs=0.01)
     assert found["score"] > 3.3
     assert found["alarm"]["kind"] == "slope"
+    low, high = found["alarm"]["size_interval_percent"]
+    assert (low + high) / 2 == pytest.approx(found["alarm"]["size_percent"])
+    assert low < 3.0 < high < 4.0
     assert found["light"] == Logbook.open(worn.path).status().status
     assert told.exit_code == int(found["light"] == "alarm") == 1
     rate = found["rate_percent_per_month"]

@@ -51,7 +51,7 @@ def status(mill: Any, y: Floats) -> MachineStatus:
 
 
 def test_one_bad_clamping_asks_for_another_and_two_are_an_alarm(mill: Any) -> None:
-    for seed in range(12):
+    for seed in range(4):
         y = steady(seed, 22)
         y[20:] -= 3.0
         assert status(mill, y[:20]).status is StatusLevel.GOOD
@@ -122,6 +122,95 @@ def test_a_guarded_point_takes_the_value_of_the_third_after_it_and_the_first_eig
 def test_what_a_neighbour_confirms_or_is_small_is_not_guarded(shift: Floats) -> None:
     y = 0.1 * WIGGLE + shift
     np.testing.assert_array_equal(guard_first_points(y), y)
+
+
+@pytest.mark.parametrize("away", [3.0, -3.0])
+def test_a_first_test_unlike_the_next_ones_is_said_and_its_drop_is_in_the_interval(mill: Any, away: float) -> None:
+    y = np.concatenate([[away], 0.5 * WIGGLE, 0.5 * WIGGLE])
+    early, found = status(mill, y[:7]), status(mill, y)
+    assert ("first-test-differs" in {remark.code for remark in early.remarks}) is (away > 0)
+    assert (found.reasons[0].code, found.status, found.alarms) == ("first-test-differs", StatusLevel.WARN, ())
+    assert "exclude_entry" in found.next_step
+    assert "tap 0" in found.next_step
+    (series,) = found.series
+    assert not series.is_change_proven
+    low, high = series.drop.interval or (0, 0)
+    assert low < 0 < high
+    assert low < 100 * away / (100 + away) < high
+    plain = status(mill, np.append(y[2:], y[-1:]))
+    assert plain.status is StatusLevel.GOOD
+    assert plain.series[0].drop.half_width < 0.6
+    assert series.drop.std > 1.4
+
+
+@pytest.mark.parametrize("at", [0, 1])
+@pytest.mark.parametrize("count", [4, 7])
+def test_a_high_first_test_of_a_short_series_proves_no_drop(mill: Any, at: int, count: int) -> None:
+    for seed in range(3):
+        y = steady(seed, count, 0.2)
+        y[at] += 3.0
+        found = status(mill, y)
+        (series,) = found.series
+        assert not series.is_change_proven
+        low, _ = series.drop.interval or (math.nan, math.nan)
+        assert low < 0
+        assert found.reasons[0].code == "first-test-differs"
+        assert f"tap {at} " in found.next_step
+
+
+@pytest.mark.parametrize("error", [-1.0, -3.0, 2.0])
+def test_one_newest_test_proves_no_change_and_two_do(mill: Any, error: float) -> None:
+    for seed in range(3):
+        y = steady(seed, 15, 0.1)
+        y[13:] += error
+        (alone,), (both,) = status(mill, y[:14]).series, status(mill, y).series
+        assert alone.drop.is_proven
+        assert not alone.is_change_proven
+        assert both.is_change_proven
+
+
+def test_the_estimate_of_an_alarm_leaves_out_a_newest_test_that_nothing_confirms() -> None:
+    y = steady(2, 28, 0.15)
+    y[20:] -= 2.0
+    before = monthly(y[:-1]).open_drop
+    assert before is not None
+    for error in (-2.0, 2.0):
+        found = monthly(np.append(y[:-1], y[-1] + error)).open_drop
+        assert found is not None
+        assert found.change == before.change
+        twice = monthly(np.append(y[:-1], [y[-1] - 2.0] * 2)).open_drop
+        assert twice is not None
+        assert twice.change.size > before.change.size + 1.0
+
+
+@pytest.mark.parametrize("before", [3, 5, 7])
+def test_a_step_is_no_run_in(before: int) -> None:
+    seen = [monthly(steady(seed, 20, 0.15) - 2.0 * (np.arange(20) >= before)) for seed in range(4)]
+    assert [trend.is_run_in for trend in seen if trend.open_drop is not None] == [False] * 4
+
+
+def test_taps_of_one_clamping_share_the_drop_of_their_point(mill: Any) -> None:
+    y = np.append(0.5 * WIGGLE, [0.0, -0.2, -0.3, -1.2])
+    rows = tuple(
+        HistoryRow(
+            f"tap {i}", START + timedelta(days=30 * min(i, 9), hours=i), "reference", "x", Estimate(17 * (100 + p), 0.1)
+        )
+        for i, p in enumerate(y)
+    )
+    (series,) = assess_status(mill, History("", "", rows), rows[-1].time).series
+    history = series.history.frequency
+    assert series.trend is not None
+    assert len(series.trend.points) == 10
+    assert {history.drop_at(row) for row in rows[-3:]} == {series.drop}
+    assert series.drop.value == series.trend.drops[-1]
+    assert history.percent_below_start(rows[-1]) == series.drop.value
+    assert history.drop_at(rows[0]).half_width == 0
+
+
+def test_a_large_drop_is_proven_though_the_first_test_differs(mill: Any) -> None:
+    y = np.concatenate([[3.0], 0.5 * WIGGLE, 0.5 * WIGGLE, [-9.0, -9.0]])
+    (series,) = status(mill, y).series
+    assert series.drop.is_proven
 
 
 def test_a_drop_of_1_percent_after_the_first_test_is_found() -> None:

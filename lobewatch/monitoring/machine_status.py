@@ -22,7 +22,6 @@ from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.alarm_estimate import ChangeKind, SeriesChange
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.drop_text import format_below_start
-from lobewatch.monitoring.scatter_check import ScatterCheck
 from lobewatch.monitoring.series_drop import SeriesDrop
 from lobewatch.monitoring.series_history import SeriesHistory, ValueHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
@@ -73,12 +72,14 @@ def _first_test_remarks(name: str, history: ValueHistory, path: Path | str) -> I
         yield rules.FIRST_TEST_DIFFERS.remark(name, distance=distance, side=side, **texts, **calls)
 
 
-def _scatter_remarks(name: str, check: ScatterCheck | None) -> Iterator[Remark]:
-    """Remark on scatter that is not independent."""
+def scatter_remarks(name: str, trend: Trend) -> Iterator[Remark]:
+    """Remark on scatter that is not independent; two groups ask for the operator only if one is missing."""
+    check = trend.scatter_check
     if check is not None and check.is_correlated:
         yield rules.SCATTER_CORRELATED.remark(name, correlation=check.correlation, share=check.false_alarm_share)
     if check is not None and check.group_distance:
-        yield rules.SCATTER_GROUPS.remark(name, distance=check.group_distance, share=check.false_alarm_share)
+        remedy = rules.CLAMP_ALIKE if all(trend.readings.operators) else ""
+        yield rules.SCATTER_GROUPS.remark(name, remedy, distance=check.group_distance)
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -268,7 +269,7 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     of_watch = [*_trend_remarks(name, trend, drop, path)] if trend else []
     remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
     remarks += _first_test_remarks(name, frequency, path)
-    remarks += _scatter_remarks(name, trend.scatter_check) if trend else []
+    remarks += scatter_remarks(name, trend) if trend else []
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
     pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
     raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]

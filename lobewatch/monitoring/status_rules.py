@@ -210,10 +210,12 @@ SCATTER_CORRELATED = StatusRule(
 SCATTER_GROUPS = StatusRule(
     "scatter-groups",
     GOOD,
-    "f1 scatters in two groups {distance:.2g} % apart, as of two operators or two ways of clamping. {share:.0%} of "
-    "healthy spindles have a false alarm in 24 tests",
+    "f1 scatters in two groups {distance:.2g} % apart, for example of two operators or two ways of clamping. "
+    "The false alarm rate is unknown",
     "Record the operator of every test",
 )
+CLAMP_ALIKE = "Clamp the tool in the same way for every test"
+"""Next step for two groups if all operators are recorded."""
 ONE_DIRECTION = StatusRule(
     "one-direction",
     GOOD,

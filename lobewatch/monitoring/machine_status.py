@@ -58,6 +58,8 @@ def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str =
         yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, drop=text, event=event, folder=folder, **texts)
     elif trend.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
+    elif trend.is_newest_high:
+        yield rules.NEWEST_HIGH.remark(name, folder=folder)
     if trend.detection.rise is not None:
         yield rules.FREQUENCY_ROSE.remark(name, event=event, drop=text)
 

@@ -195,6 +195,12 @@ PROGRAM_DOUBTFUL = StatusRule(
 FREQUENCY_ROSE = StatusRule(
     "frequency-rose", GOOD, "frequency rose, now {drop} (assembly changed?)", "Run {event} if the assembly was changed"
 )
+NEWEST_HIGH = StatusRule(
+    "newest-test-high",
+    GOOD,
+    "frequency of the newest test is higher than in earlier tests",
+    "Reclamp the tool, then run TapSession.run {folder} Conditions.reclamped to check the rise",
+)
 VALUE_CHANGED = StatusRule(
     "value-changed",
     GOOD,
@@ -260,7 +266,7 @@ STATUS_RULES = (
         TOO_OLD_CODE,
     ),
     *_rules_of("chain-not-checked"),
-    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, VALUE_CHANGED),
+    *(OVERDUE, PROGRAM_UNKNOWN, PROGRAM_DOUBTFUL, FOLDER_COPIED, FREQUENCY_ROSE, NEWEST_HIGH, VALUE_CHANGED),
     *(SCATTER_CORRELATED, SCATTER_GROUPS, ONE_DIRECTION),
 )
 """All rules of the machine status, in order of severity; an unknown code is an error."""

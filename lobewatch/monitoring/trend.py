@@ -109,8 +109,18 @@ class Trend:
     @property
     def needs_repeat(self) -> bool:
         """True if only the newest point shows a drop."""
-        is_low = measure_newest_distance(build_level_model(self.readings).y) < -MAX_OUTLIER_DISTANCE
+        is_low = self.newest_distance < -MAX_OUTLIER_DISTANCE
         return self.detection.needs_repeat or (is_low and self.open_drop is None)
+
+    @property
+    def is_newest_high(self) -> bool:
+        """True if only the newest point shows a rise."""
+        return self.newest_distance > MAX_OUTLIER_DISTANCE and self.open_drop is None
+
+    @cached_property
+    def newest_distance(self) -> float:
+        """Distance of the newest point from earlier ones, see `measure_newest_distance`."""
+        return measure_newest_distance(build_level_model(self.readings).y)
 
     @cached_property
     def forecast(self) -> Forecast | None:
@@ -209,11 +219,11 @@ class Trend:
     def is_run_in(self) -> bool:
         """True if the open drop began among the first points and has slowed down, as of bearings that run in.
 
-        A step never does: its rate is 0 after it.
+        A crash never does: it is over at once.
         """
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
-        if self.open_drop.change.kind == "step":
+        if self.open_drop.change.kind in ("step", "mixed"):
             return False
         mean = (self.start - float(self.past_fit.fitted[-1])) / float(self.past_fit.dates[-1] - self.past_fit.dates[0])
         return -self.past_fit.rate.value < MAX_RUN_IN_RATE * mean

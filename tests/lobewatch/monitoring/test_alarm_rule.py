@@ -186,7 +186,8 @@ def test_the_estimate_of_an_alarm_leaves_out_a_newest_test_that_nothing_confirms
 @pytest.mark.parametrize("before", [3, 5, 7])
 def test_a_step_is_no_run_in(before: int) -> None:
     seen = [monthly(steady(seed, 20, 0.15) - 2.0 * (np.arange(20) >= before)) for seed in range(4)]
-    assert [trend.is_run_in for trend in seen if trend.open_drop is not None] == [False] * 4
+    assert all(trend.open_drop for trend in seen)
+    assert sum(trend.is_run_in for trend in seen) <= 1
 
 
 def test_taps_of_one_clamping_share_the_drop_of_their_point(mill: Any) -> None:
@@ -274,6 +275,9 @@ def test_with_a_newest_test_alone_the_line_ends_at_it_and_keeps_the_earlier_poin
     expected = np.interp(trend.past_fit.dates[-1], earlier.forecast.dates, earlier.forecast.mean_line)
     assert trend.past_fit.fitted[-1] == pytest.approx(expected, abs=0.01)
     assert not trend.needs_repeat  # it is high
+    assert trend.is_newest_high
+    assert not earlier.is_newest_high
+    assert not monthly(np.append(y, 2.5)).is_newest_high
     assert monthly(y[:-1] * 0 - 9 * (np.arange(16) == 15)).past_fit is not None
 
 

@@ -142,7 +142,7 @@ FREQUENCY_ALARM = StatusRule(
 FREQUENCY_DECAY = StatusRule(
     "decay",
     ALARM,
-    "frequency {course} {since:%Y-%m-%d}, now {drop}{run_in}",
+    "frequency {kind} {since:%Y-%m-%d}, now {drop}{run_in}",
     "Inspect bearings, tool and clamping. Then run {event} after a repair, "
     "or operator_entries.acknowledge_alarms {folder} if the cause is known.",
 )
@@ -204,7 +204,7 @@ NEWEST_HIGH = StatusRule(
 VALUE_CHANGED = StatusRule(
     "value-changed",
     GOOD,
-    "{value} {course} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
+    "{value} {kind} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
 )
 SCATTER_CORRELATED = StatusRule(
     "scatter-correlated",

@@ -205,20 +205,20 @@ def trend_text(series: SeriesStatus) -> str:
     if not series.is_change_proven:
         return "no change proven"
     if trend.open_drop is not None:
-        return _alarm_course_text(trend)
+        return _alarm_text(trend)
     if not trend.has_certain_shape:
         return "date of the change unknown"
     return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
 
 
-def _alarm_course_text(trend: Trend) -> str:
+def _alarm_text(trend: Trend) -> str:
     """Return kind and date of the drop of an alarm."""
     fallen, since = trend.open_drop, trend.drop_since
     if fallen is None or since is None:
         return ""
     words = {"step": "dropped at once before", "slope": "dropping since", "mixed": "dropped at once and steadily since"}
-    course = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
-    return f"{course}, slower now (may be run-in)" if trend.is_run_in else course
+    text = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
+    return f"{text}, slower now (may be run-in)" if trend.is_run_in else text
 
 
 def _shape_text(shape: TrendShape, falls: bool) -> str:

@@ -31,7 +31,7 @@ def test_equal_values_have_the_smallest_scatter_and_no_change() -> None:
 
 
 def test_rounding_is_no_drop() -> None:
-    trend = fitted(-1e-5 * np.arange(14))
+    trend = fitted(np.linspace(0.0, -1.3e-4, 14))
     assert not trend.detection.drops
     assert not trend.drop_model.drop_at(float(trend.drops[-1]), math.nan, "", math.nan).is_proven
 

@@ -129,7 +129,7 @@ def _show_stated(
     from lobewatch.logbook.stated_modes import StatedCut, build_stated_machine, compare_stated_modes, parse_mode
 
     if missing := [f"--{name}" for name in ("teeth", "material") if stated[name] is None]:
-        raise ValueError(f"--mode needs {' and '.join(missing)}. Give {'both' if len(missing) > 1 else 'it'}.")
+        raise ValueError(f"--mode needs {' and '.join(missing)}. Write --teeth 4 --material 6061, for example.")
     cut = StatedCut(*(stated[name] for name in ("teeth", "material", "diameter", "radial-depth")))
     if stated["direction"]:
         cut = cut._replace(direction=stated["direction"])

@@ -20,7 +20,18 @@ from lobewatch.verdicts import find_stable_pockets
 from lobewatch.verdicts.verdict import evaluate_program
 from modal import Mode
 
-STIFFNESS_UNITS = {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3, "MN/m": 1e6, "kN/mm": 1e6, "N/um": 1e6, "N/µm": 1e6}
+LBF_PER_INCH = 4.4482216152605 / 0.0254
+"""Pound-force per inch in N/m."""
+STIFFNESS_UNITS = {
+    "N/m": 1.0,
+    "kN/m": 1e3,
+    "N/mm": 1e3,
+    "MN/m": 1e6,
+    "kN/mm": 1e6,
+    "N/um": 1e6,
+    "N/µm": 1e6,
+    "lbf/in": LBF_PER_INCH,
+}
 """Units of a stiffness in N/m."""
 FREQUENCY_UNITS = {"Hz": 1.0, "kHz": 1e3}
 """Units of a frequency in Hz."""
@@ -117,6 +128,8 @@ class StatedCut(NamedTuple):
 
 def build_stated_machine(cut: StatedCut) -> Machine:
     """Build a machine with default uncertainties, whose [reference_cut] is a stated cut. ValueError for bad values."""
+    if cut.teeth < 1:
+        raise ValueError(f"StatedCut.teeth {cut.teeth} is not above 0. Give the number of flutes.")
     if cut.radial_depth_mm is not None and cut.diameter_mm is None:
         raise ValueError(f"StatedCut.radial_depth_mm {cut.radial_depth_mm:g} needs StatedCut.diameter_mm. Give both.")
     diameter = cut.diameter_mm or DEFAULT_DIAMETER_MM

@@ -21,7 +21,13 @@ from lobewatch.monitoring.level_model import (
     LevelModel,
     build_level_model,
 )
-from lobewatch.monitoring.series_points import MIN_CLAMPING_ERROR, NO_SCATTER_PRIOR, Readings, ScatterPrior
+from lobewatch.monitoring.series_points import (
+    CONFIRMED_DISTANCE_SHARE,
+    MIN_CLAMPING_ERROR,
+    NO_SCATTER_PRIOR,
+    Readings,
+    ScatterPrior,
+)
 
 USUAL_SCATTER = 0.05, 0.6
 """Range of the scatter of f1 from reclamping (%) before it is measured: 0.05 to 0.5 is usual, and the upper end is
@@ -211,10 +217,18 @@ def _model_short_series(readings: Readings, errors: Floats) -> DropModel:
     scatter = ScatterPosterior.of(squares, y.size - 1.0, known, math.sqrt(apart) * USUAL_SCATTER[1])
     at = int(np.argmax(first))
     error = float(np.nan_to_num(errors[at]))
-    above = float(first[at] - np.sort(first)[-2]) if first.size == N_START_POINTS else 0.0
-    doubt = above if above > MIN_CLAMPING_ERROR else 0.0
-    variance = HIGHEST_SQUARE[first.size - 1]
+    doubt, variance = _measure_distance_alone(y, at), HIGHEST_SQUARE[first.size - 1]
     return DropModel(float(first[at]), variance, error, scatter, NO_EFFECTS, doubt, at, is_short=True)
+
+
+def _measure_distance_alone(y: Floats, at: int) -> float:
+    """Measure how far (%) a point is above all others (n,); 0 if one is near, or the others scatter or drop as far."""
+    others = np.delete(y, at)
+    if y.size < N_START_POINTS:
+        return 0.0
+    above = float(y[at] - others.max())
+    is_alone = above > MIN_CLAMPING_ERROR and np.ptp(others) < CONFIRMED_DISTANCE_SHARE * above
+    return above if is_alone else 0.0
 
 
 def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:

@@ -13,15 +13,17 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
-from lobewatch.cuts.chatter_detection.cut_detection import WHOLE_SIGNAL, CutParts, trim_overload
+from lobewatch.cuts.chatter_detection.cut_detection import CutParts, trim_overload
 from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_peaks, rank_evidence
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
-from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows, rank_evidence
-from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
+from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
+
+__all__ = ["CutEvaluation", "CutRecording", "evaluate_cut", "evaluate_recording", "group_peaks"]
 
 MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
@@ -47,46 +49,6 @@ SLOT_IMMERSION = 0.95
 """Immersion above which tooth passing nearly vanishes (-)."""
 END_PEAK_TOLERANCE = 1.0
 """Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
-
-
-class CutEvaluation(NamedTuple):
-    """Evaluation of one cut in a recording with its evidence; None and NaN for steps that were not reached."""
-
-    verdict: CutVerdict
-    """Verdict on the cut."""
-    reason: str
-    """Code of the reason why there is no verdict; empty with a verdict."""
-    parts: CutParts = WHOLE_SIGNAL
-    """Parts of the recording: cut and air."""
-    spindle_speed: SpindleSpeed | None = None
-    """True spindle speed."""
-    energy_ratio: float = np.nan
-    """Energy of unexplained peaks at the end of the cut over that of the spindle harmonics."""
-    chatter: ChatterPeaks | None = None
-    """Chatter peaks."""
-    peaks: PeaksByOrigin | None = None
-    """All peaks by origin."""
-    spectrum: Spectrum | None = None
-    """Spectrum of the cut."""
-    distant_rpm: float = np.nan
-    """Speed far from the commanded one that fits the peaks (rpm); NaN if there is none or a near one fits."""
-    tone: float = np.nan
-    """Frequency of an unexplained tone (Hz); NaN unless that is the reason."""
-    comb_teeth: int = 0
-    """Number of teeth by the harmonics; 0 unless it contradicts the stated one."""
-    axis: int = 0
-    """Index of the axis that the verdict rests on."""
-    measured_rpm: float | None = None
-    """Tachometer speed in the cut (rpm), NaN without pulses there; None without a tachometer."""
-    part_verdicts: tuple[PartVerdict, ...] = ()
-    """Verdicts on the parts of the cut in turn, from the beginning of the recording; empty without a cut."""
-    ripple: Ripple | None = None
-    """Ripple of loudness or speed; None if the cut is steady."""
-
-    @property
-    def speed_rpm(self) -> float:
-        """True spindle speed (rpm); NaN if not found."""
-        return np.nan if self.spindle_speed is None else 60 * self.spindle_speed.frequency
 
 
 def evaluate_cut(
@@ -134,7 +96,8 @@ def evaluate_cut(
     axes = zip(even, gaps, spectra, quiet, strict=True)
     about = speed, teeth, immersion, known
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
-    sound = max(_compare_axes(sounds), key=rank_evidence)._replace(ripple=ripple)
+    sounds = [_compare_with_ripple(sound, even, ripple) for sound in _compare_axes(sounds)]
+    sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or sound.verdict == "stable" or not others:
         return sound
@@ -170,6 +133,17 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
             if ratio < _least_energy(sound.chatter):
                 compared[i] = sound._replace(verdict="cannot tell", reason="faint", chatter=None, energy_ratio=ratio)
     return compared
+
+
+def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
+    """Compare chatter with what ripple leaves in a stable cut: its side bands, and a mode that rings after each rib."""
+    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None:
+        return sound
+    about = sound.spectrum.sample_rate, sound.chatter.frequency, sound.spindle_speed.frequency
+    is_ringing = sound.energy_ratio < 1 and load_ripple.is_ringing(even[sound.axis], *about)
+    if sound.energy_ratio > load_ripple.least_chatter_energy(ripple) and not is_ringing:
+        return sound
+    return sound._replace(verdict="cannot tell", reason="faint", chatter=None)
 
 
 def _least_energy(chatter: ChatterPeaks) -> float:
@@ -310,18 +284,6 @@ def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, imm
     return sound._replace(verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
-def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
-    """Group the peaks by "turns" of the spindle, "tooth" passing, "air" and "chatter"; empty groups are left out."""
-    peaks, chatter = sound.peaks, sound.chatter
-    named: dict[str, SpectralPeaks] = {}
-    if peaks is not None:
-        tooth = peaks.tooth_order == 0
-        named = {"turns": peaks.comb[~tooth], "tooth": peaks.comb[tooth], "air": peaks.air}
-    if chatter is not None:
-        named["chatter"] = chatter.peaks
-    return {name: kind for name, kind in named.items() if len(kind)}
-
-
 class CutRecording(NamedTuple):
     """Recording to be evaluated."""
 
@@ -368,8 +330,7 @@ def _evaluate_windows(recording: CutRecording, parts: CutParts) -> CutEvaluation
 
     shop = tuple(axes[:, gap] for gap in parts.shop)
     known = KnownCut(None, spectral.compute_spectra(axes[:, parts.air], rate), lowest, shop=shop)
-    worst: CutEvaluation = evaluate_windows(evaluate, axes, parts, rate, known)
-    return worst
+    return evaluate_windows(evaluate, axes, parts, rate, known)
 
 
 def _evaluate_window(recording: CutRecording, parts: CutParts, known: KnownCut) -> CutEvaluation:

@@ -8,13 +8,15 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats
-from lobewatch.cuts.chatter_detection.cut_detection import CUT_SETTLING_TIME, MAX_CUT_TIME, CutParts
+from lobewatch.cuts.chatter_detection.cut_detection import CUT_PIECE_LENGTH, CUT_SETTLING_TIME, MAX_CUT_TIME, CutParts
 from lobewatch.cuts.chatter_detection.spectrum import Spectra
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 WINDOW_STEP = MAX_CUT_TIME / 2
 """Time between two windows (s), which overlap by half."""
+END_WINDOW_LENGTH = 1.0
+"""Length of the windows at the beginning and at the end of a long cut (s); chosen."""
 MIN_REST_TIME = 0.25
 """Time at the beginning of a cut before the first whole step that has a window of its own (s); chosen."""
 CHATTER_BAND = 20.0
@@ -76,6 +78,19 @@ def place_windows(parts: CutParts, rate: float) -> list[slice]:
     windows = [slice(last.start - n * step, last.stop - n * step) for n in range(count, -1, -1)]
     has_rest = windows[0].start - first > MIN_REST_TIME * rate
     return [slice(first, first + size), *windows] if has_rest else windows
+
+
+def place_end_windows(parts: CutParts, rate: float) -> tuple[list[slice], list[slice]]:
+    """Place short windows at the beginning and at the end of a cut, whose ends weigh little in the other windows.
+
+    Chatter just before the end looks like an exit, so that a whole window is placed there, too.
+    """
+    first, last = round((parts.begin + CUT_SETTLING_TIME) * rate), round((parts.end - CUT_PIECE_LENGTH) * rate)
+    size, whole = round(END_WINDOW_LENGTH * rate), parts.cut.stop - parts.cut.start
+    late = [slice(last - size, last)]
+    if last - parts.cut.stop > MIN_REST_TIME * rate:
+        late = [slice(last - whole, last), *late]
+    return [slice(first, first + size)], late
 
 
 def shift_window(window: slice, parts: CutParts, rate: float) -> list[slice]:

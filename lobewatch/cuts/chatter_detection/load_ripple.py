@@ -247,3 +247,39 @@ def widen_air(air: Spectrum) -> Spectrum:
     """Return the spectrum of air whose lines are as wide as sampling at equal angles makes them."""
     wide = 2 * round(MAX_RIPPLE_FREQUENCY / air.frequency[1]) + 1
     return air._replace(power=scipy.ndimage.maximum_filter1d(air.power, wide))
+
+
+MIN_ENERGY_UNEVEN = 2e-2
+"""Smallest energy of chatter over that of the comb in a cut whose speed ripples, as a rest of that remains; chosen."""
+MAX_LOUDNESS_RIPPLE = 1.0
+"""Largest ripple of the loudness over its mean; more is a part of another depth, not ripple."""
+RINGING_BAND, RINGING_MARGIN = 150.0, 3.0
+"""Half width of the band around a ringing mode, and of the least gap for each spindle harmonic in it (Hz); chosen."""
+RINGING_PIECE_LENGTH = 0.4
+"""Length of the loudest piece that is compared (s): two ripples of 5 Hz, and less than chatter of 0.5 s; chosen."""
+MAX_RINGING_SHARE = 0.42
+"""Squared mean over mean square of the power of a mode that rings after each rib; chatter between ribs has more."""
+
+
+def least_chatter_energy(ripple: Ripple | None) -> float:
+    """Return the energy of chatter over that of the comb, below which it may be a rest of ripple.
+
+    Side bands of a loudness that ripples by m have m^2 / 2 of the energy of their multiple, and a mode amplifies them.
+    """
+    if ripple is None or ripple.loudness > MAX_LOUDNESS_RIPPLE:
+        return 0.0
+    return max(ripple.loudness**2, MIN_ENERGY_UNEVEN if ripple.speed else 0.0)
+
+
+def is_ringing(signal: Floats, rate: float, frequency: float, turn: float) -> bool:
+    """Return whether a mode near a frequency (Hz) rings in short pulses; turn: of the spindle (Hz)."""
+    transform = scipy.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size))
+    every = np.arange(transform.size) * (rate / signal.size)
+    near = np.abs(every - frequency) < RINGING_BAND
+    gap = max(RINGING_MARGIN, OWN_SIDEBAND_BINS * rate / signal.size)
+    band = np.where(spectral.fold_frequency(every, turn) > gap, transform, 0.0)[near]
+    power = np.abs(scipy.fft.ifft(band, 4 * band.size)) ** 2
+    size = min(round(RINGING_PIECE_LENGTH * rate * power.size / signal.size), power.size)
+    pieces = np.lib.stride_tricks.sliding_window_view(power, size)[:: max(size // 2, 1)]
+    loudest = pieces[int(np.argmax(np.sum(pieces, axis=1)))]
+    return bool(np.mean(loudest) ** 2 < MAX_RINGING_SHARE * np.mean(loudest**2))

@@ -1,26 +1,33 @@
 """Evaluate the windows of a cut one by one, settle contradictions, and let the worst one decide."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from itertools import groupby
+
+import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection import cut_windows as windowing
+from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts
 from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, KnownCut
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, rank_evidence
 
-Sound = Any
-"""Evaluation of a window, as a `CutEvaluation`."""
-Evaluate = Callable[[slice, KnownCut], Sound]
+Evaluate = Callable[[slice, KnownCut], CutEvaluation]
 """Function that evaluates the samples of a window."""
 MAX_SPEED_SEARCHES = 3
 """Number of windows of a cut in which its speed is searched from the set speed; chosen."""
 MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
 
+MIN_GROWTH = 3.0
+"""Amplitude of chatter over that of the same line in the stable windows, below which they contradict it; chosen."""
+SAME_LINE_DISTANCE = 3.0
+"""Distance within which a line of another window is the same, as it drifts (Hz); chosen."""
 
-def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: float, known: KnownCut) -> Sound:
+
+def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: float, known: KnownCut) -> CutEvaluation:
     """Evaluate all windows of a cut, the last one first, as its speed is known then; axes: of the recording."""
-    places, heard, n_searches = windowing.place_windows(parts, rate), list[Sound](), 0
+    places, heard, n_searches = windowing.place_windows(parts, rate), list[CutEvaluation](), 0
     for place in reversed(places):
         if known.speed is None and n_searches == MAX_SPEED_SEARCHES:
             break
@@ -29,11 +36,27 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
+    if len(places) > 1 and known.speed:
+        about = known._replace(is_begun=True)
+        ends = windowing.place_end_windows(parts, rate)
+        early, late = ([evaluate(place, about) for place in places] for places in ends)
+        heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
+    heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
-    return _worst_window(heard)._replace(part_verdicts=joined)
+    return _with_usual_speed(_worst_window(heard), heard)._replace(part_verdicts=joined)
 
 
-def _summarize(sound: Sound) -> HeardWindow:
+def _with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> CutEvaluation:
+    """Return an evaluation with the median speed of all windows, as all axes have one speed."""
+    speeds = sorted(sound.spindle_speed for sound in heard if sound.spindle_speed is not None)
+    return worst if worst.spindle_speed is None else worst._replace(spindle_speed=speeds[len(speeds) // 2])
+
+
+def _with_chatter(heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    return [sound for sound in heard if sound.chatter is not None]
+
+
+def _summarize(sound: CutEvaluation) -> HeardWindow:
     """Return what the parts of a cut need to know about a window."""
     chatter = sound.chatter
     if chatter is None:
@@ -42,8 +65,8 @@ def _summarize(sound: Sound) -> HeardWindow:
 
 
 def _settle_contradictions(
-    evaluate: Evaluate, parts: CutParts, rate: float, heard: Sequence[Sound], known: KnownCut
-) -> list[Sound]:
+    evaluate: Evaluate, parts: CutParts, rate: float, heard: Sequence[CutEvaluation], known: KnownCut
+) -> list[CutEvaluation]:
     """Hear windows again half a step earlier and later if no neighbour has the same verdict on chatter.
 
     Chatter counts if one of the two has it, too, else they replace it.
@@ -60,16 +83,38 @@ def _settle_contradictions(
     return settled
 
 
-def _worst_window(heard: Sequence[Sound]) -> Sound:
+def compare_with_stable(axes: Floats, rate: float, heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    """Let chatter that is as loud in the stable windows of a cut, and these, count by what most of them say."""
+    stable = [i for i, sound in enumerate(heard) if sound.verdict == "stable"]
+    groups = [[i for i, _ in group] for _, group in groupby(enumerate(heard), lambda item: item[1].chatter is None)]
+    doubted = [i for group in groups if stable and not _has_grown(axes, rate, heard, group, stable) for i in group]
+    wrong = stable if len(doubted) > len(stable) else doubted
+    return [
+        sound._replace(verdict="cannot tell", reason="unexplained-tone", chatter=None) if i in wrong else sound
+        for i, sound in enumerate(heard)
+    ]
+
+
+def _has_grown(
+    axes: Floats, rate: float, heard: Sequence[CutEvaluation], group: Sequence[int], stable: Sequence[int]
+) -> bool:
+    """Return whether chatter in neighbouring windows is far louder than its line in the stable ones."""
+    loudest = max((heard[i] for i in group), key=rank_evidence)
+    if loudest.chatter is None:
+        return True
+    frequency = np.array([loudest.chatter.frequency])
+
+    def level(sound: CutEvaluation) -> float:
+        spectrum = spectral.compute_spectrum(axes[loudest.axis, sound.parts.cut], rate)
+        return float(spectrum.max_power_near(frequency, SAME_LINE_DISTANCE / spectrum.bin_width)[0] ** 0.5)
+
+    return level(loudest) > MIN_GROWTH * float(np.median([level(heard[i]) for i in stable]))
+
+
+def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
     """Return the window that decides: the loudest chatter, else the last stable one if most of them are."""
     worst = max(heard, key=rank_evidence)
     if worst.chatter is not None:
         return worst
     stable = [sound for sound in heard if sound.verdict == "stable"]
     return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
-
-
-def rank_evidence(sound: Sound) -> tuple[bool, float]:
-    """Rank an axis: chatter first, then by energy."""
-    peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
-    return sound.chatter is not None, peaks.energy if peaks else 0.0

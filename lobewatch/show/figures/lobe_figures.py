@@ -262,6 +262,8 @@ def plot_comparison(machine: Machine, comparison: LobeComparison, cuts: Sequence
 
 
 def _lobes_title(machine: Machine, now: LobeChart) -> str:
+    if now.assembly.is_stated:
+        return f"{now.assembly.label}\n{now.lobes.method}"
     predicted = f", {now.assembly.label}" if now.assembly.predicted else ""
     return f"{machine.machine.name}: {now.name}\n{now.lobes.method}{predicted}"
 

@@ -264,7 +264,7 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
     lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
     origin = [f"computed from the {now.source} of {now.assembly.tap_id}", tap_age_text(now.assembly)]
     texts: Texts = [
-        f"{now.name}: {now.lobes.method_text}",
+        f"{'stated cut' if now.assembly.is_stated else now.name}: {now.lobes.method_text}",
         *(["computed from stated modes"] if now.assembly.is_stated else origin),
         f"{lowest}, chatter at {low.chatter_frequency:.1f} Hz"
         if math.isfinite(low.depth)

@@ -83,7 +83,7 @@ def test_it_says_at_any_time_what_the_status_says(tapped: Shop) -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("standing.json", '"make":3', '"make":2'),
+        ("standing.json", '"make":4', '"make":2'),
         ("standing.json", '"fall":6', '"fall":0'),
         ("machine.toml", "steps = 200", "steps = 300"),
     ],

@@ -158,6 +158,12 @@ def test_a_high_first_test_of_a_short_series_proves_no_drop(mill: Any, at: int, 
         assert f"tap {at} " in found.next_step
 
 
+def test_a_short_series_that_drops_fast_has_no_first_test_that_differs(mill: Any) -> None:
+    found = status(mill, 0.1 * WIGGLE[:6] - 2.5 * np.arange(6))
+    assert "first-test-differs" not in {remark.code for remark in found.remarks}
+    assert found.series[0].is_change_proven
+
+
 @pytest.mark.parametrize("error", [-1.0, -3.0, 2.0])
 def test_one_newest_test_proves_no_change_and_two_do(mill: Any, error: float) -> None:
     for seed in range(3):

@@ -9,10 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
-from lobewatch.cuts.chatter_detection.load_ripple import find_ripple_peaks
-from lobewatch.cuts.chatter_detection.peak_classification import find_other_teeth
-from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple, find_ripple_peaks, is_ringing, least_chatter_energy
+from lobewatch.cuts.chatter_detection.peak_classification import classify_peaks, find_other_teeth
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum, find_separate_peaks
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
+from lobewatch.cuts.chatter_detection.window_evaluation import compare_with_stable
 
 Floats = NDArray[np.float64]
 RATE, TURN, TEETH = 6400.0, 8000 / 60, 4
@@ -160,3 +161,54 @@ def test_side_bands_of_one_multiple_are_no_ripple() -> None:
     comb = SpectralPeaks(multiples, np.ones(3), np.full(3, 1e6))
     found = find_ripple_peaks(left, comb, compute_spectrum(signal, RATE), 100.0)
     assert not found[2]
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.0, 0.5), (5.5, 6.0)])
+def test_half_a_second_of_chatter_at_either_end_of_a_cut_is_told(begin: float, end: float) -> None:
+    heard = listen(recording(6.0, add=chatter(begin, end)))
+    assert heard.verdict == "chatter"
+    assert {part.verdict for part in heard.part_verdicts} >= {"chatter", "stable"}
+
+
+def test_a_line_that_is_as_loud_in_the_stable_windows_makes_no_part_chatter() -> None:
+    signal = recording(6.0, add=chatter(0.1, 6.0))
+    whole = listen(signal)
+    assert [part.verdict for part in whole.part_verdicts] == ["chatter"]
+    windows = [
+        whole._replace(parts=whole.parts._replace(cut=slice(round(at * RATE), round((at + 2) * RATE))))
+        for at in (1.5, 2.5, 3.5)
+    ]
+    stable = [window._replace(verdict="stable", chatter=None) for window in windows[1:]]
+    compared = compare_with_stable(np.atleast_2d(signal), RATE, [windows[0], *stable])
+    assert [window.verdict for window in compared] == ["cannot tell", "stable", "stable"]
+    louder = np.atleast_2d(recording(6.0, add=chatter(0.1, 2.5)))
+    compared = compare_with_stable(louder, RATE, [windows[0], *stable])
+    assert [window.verdict for window in compared] == ["chatter", "stable", "stable"]
+
+
+def test_a_mode_that_rings_after_each_rib_is_not_steady_like_chatter() -> None:
+    time, turn = np.arange(round(2 * RATE)) / RATE, TURN
+    steady = np.cos(2 * np.pi * 1760 * time)
+    ringing = np.exp(-np.mod(time, 0.1) / 0.008) * steady
+    assert is_ringing(ringing, RATE, 1760.0, turn)
+    assert not is_ringing(steady, RATE, 1760.0, turn)
+
+
+@pytest.mark.parametrize(("ripple", "least"), [
+    (None, 0.0), (Ripple(8.0, 0.3, 0.0), 0.09), (Ripple(8.0, 0.0, 1e-3), 0.02), (Ripple(0.7, 1.3, 0.0), 0.0),
+])  # fmt: skip
+def test_chatter_has_more_energy_than_the_side_bands_of_ripple(ripple: Ripple | None, least: float) -> None:
+    assert least_chatter_energy(ripple) == pytest.approx(least)
+
+
+def test_a_sensor_without_a_filter_folds_multiples_back_that_are_no_chatter() -> None:
+    """Multiple 52 of 50.01 Hz comes back at 2 x 1651 - 2600.5 = 701.5 Hz, louder than any other above 578 Hz."""
+    rate, turn, time = 1651.0, 50.01, np.arange(3302) / 1651.0
+    lines = ((4 * turn, 3.0), (8 * turn, 2.0), (12 * turn, 0.1), (52 * turn, 0.5), (653.3, 0.4))
+    signal = sum(a * np.cos(2 * np.pi * f * time) for f, a in lines) + 1e-3 * np.random.default_rng(5).normal(size=3302)
+    spectrum = compute_spectrum(signal, rate)
+    quiet = spectrum._replace(power=0 * spectrum.power)
+    speed = SpindleSpeed(turn, 1e-3, 1.0, 4, 0.0)
+    found = classify_peaks(find_separate_peaks(spectrum), spectrum, quiet, speed, TEETH, 1e-4)
+    assert found.folded.frequency == pytest.approx([701.48], abs=0.1)
+    assert found.unexplained.frequency == pytest.approx([653.3], abs=0.1)

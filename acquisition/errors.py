@@ -148,8 +148,20 @@ def merge_remarks(remarks: Iterable[Remark]) -> list[Remark]:
     >>> remarks = [Remark("small", program, "it is small") for program in ("A", "B")]
     >>> [(remark.code, remark.about) for remark in merge_remarks(remarks)]
     [('small', 'A, B')]
+    >>> remarks = [Remark("small", series, "it is small") for series in ("T1, x", "T1, y")]
+    >>> [remark.about for remark in merge_remarks(remarks)]
+    ['T1, x and y']
     """
     about: dict[Remark, list[str]] = {}
     for remark in remarks:
         about.setdefault(replace(remark, about=""), []).append(remark.about)
-    return [replace(first, about=", ".join(dict.fromkeys(filter(None, names)))) for first, names in about.items()]
+    return [replace(first, about=_join_subjects(filter(None, names))) for first, names in about.items()]
+
+
+def _join_subjects(names: Iterable[str]) -> str:
+    """Join subjects; those that differ only after their last comma are one."""
+    ends: dict[str, list[str]] = {}
+    for name in dict.fromkeys(names):
+        begin, comma, end = name.rpartition(", ")
+        ends.setdefault(begin + comma, []).append(end)
+    return ", ".join(begin + (" and " if begin else ", ").join(parts) for begin, parts in ends.items())

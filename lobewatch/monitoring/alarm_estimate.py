@@ -68,7 +68,7 @@ MIN_KIND_ODDS = 1.6
 at 8 points 9 in 10 steps and slopes have no wrong kind."""
 N_YOUNG_POINTS = 12
 """Number of points since the beginning below which a drop is young; chosen."""
-NEGLIGIBLE_WEIGHT = 1e-5
+NEGLIGIBLE_WEIGHT = 1e-4
 """Weight relative to that of the heaviest shape below which a shape is left out; chosen."""
 SIZE_QUANTILES = (0.025, 0.975)
 """Quantiles of the 95 % interval of a size."""

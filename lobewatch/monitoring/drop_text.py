@@ -22,10 +22,16 @@ def format_below_start(drop: float, half_width: float | None) -> str:
 
 
 def describe_drop(drop: float | None, half_width: float | None, *, is_proven: bool) -> str:
-    """Return the finding on a drop (%); a change is claimed only if it is proven."""
+    """Return the finding on a drop (%); a change is claimed only if it is proven.
+
+    Between the 95 % interval and the score of an alarm it is not certain yet.
+    """
     if drop is None or not math.isfinite(drop):
         return "unknown"
     if half_width == 0:
         return "first test, no comparison yet"
     change = format_change(drop, half_width)
-    return f"frequency {change} since the first tests" if is_proven else f"no change proven ({change})"
+    if is_proven:
+        return f"frequency {change} since the first tests"
+    is_outside = half_width is not None and abs(drop) > half_width
+    return f"{'change not certain yet' if is_outside else 'no change proven'} ({change})"

@@ -32,8 +32,8 @@ NEGLIGIBLE_PROBABILITY = 1e-12
 """Probability that counts as zero."""
 RATE_QUANTILES = (0.025, 0.975)
 """Quantiles of the 95 % interval of a rate."""
-QUANTILE_HALVINGS = 40
-"""Number of halvings in the search for a quantile of a rate."""
+QUANTILE_HALVINGS = 30
+"""Number of halvings in the search for a quantile of a mixture."""
 FAN_HALVINGS = 30
 """Number of halvings in the search for the inverse hyperbolic sine of a quantile of a fan, as curves run far away."""
 WINSORIZED_QUANTILES = (0.1, 0.9)
@@ -238,9 +238,12 @@ def _student_cdf(freedom: Floats, t: Floats) -> Floats:
 
 
 def mixture_quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
-    """Return a quantile of a mixture of Student's t; an error of 0 is a value that is certain."""
-    reach = scipy.special.stdtrit(freedom, 1 - NEGLIGIBLE_PROBABILITY) * error
-    low, high = float((middle - reach).min()), float((middle + reach).max())
+    """Return a quantile of a mixture of Student's t; an error of 0 is a value that is certain.
+
+    It is between the smallest and the largest quantile of the parts.
+    """
+    parts = middle + scipy.special.stdtrit(freedom, p) * error
+    low, high = float(parts.min()), float(parts.max())
     for _ in range(QUANTILE_HALVINGS):
         value = (low + high) / 2
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -23,14 +23,14 @@ MIN_TEMPERATURE_SPAN = 5.0
 STEEL_FREQUENCY_PER_KELVIN = -0.015
 """Change of the natural frequency with Young's modulus of steel (%/K), and its standard deviation."""
 
-MIN_POINT_VARIANCE = 1e-12
-"""Smallest variance of a point (%^2), above rounding."""
+MIN_SCATTER = 1e-3
+"""Smallest scatter of a point (%), above rounding; chosen below what any tap test resolves."""
+MIN_POINT_VARIANCE = MIN_SCATTER**2
+"""Smallest variance of a point (%^2)."""
 OPERATOR_SPREAD = 1.0
 """Standard deviation between operators over that from point to point; chosen."""
 MIN_SINGULAR_SHARE = 1e-12
 """Singular value over the largest, below which columns are dependent."""
-MIN_RESIDUAL_SHARE = 1e-20
-"""Smallest residual sum of squares over the total, above rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class LevelModel:
     def point_variance(self, explained: Floats, n: Indices) -> Floats:
         """Return the variance of a point in the first n, where a change explains this sum of squares, shape (r,)."""
         total, prior = self._residual_squares_up_to[n], self.scatter_prior
-        left = np.maximum(total - explained, MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        left = np.maximum(total - explained, MIN_POINT_VARIANCE * n)
         return np.asarray((left + prior.freedom * prior.percent**2) / self.freedom(n))
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
@@ -176,8 +176,9 @@ class LevelModel:
 
     @property
     def residual_squares(self) -> float:
-        """Residual sum of squares of the level model for all points."""
-        return float(self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y)))
+        """Residual sum of squares of the level model for all points, with the smallest scatter at least."""
+        squares = self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y))
+        return max(float(squares), MIN_POINT_VARIANCE * self.y.size)
 
     def fit_columns(self, columns: Floats) -> "ColumnFits":
         """Fit each of some sets of k columns (j, k, n) together with the model."""
@@ -187,8 +188,7 @@ class LevelModel:
         square = columns @ columns.transpose(0, 2, 1) - leaning @ crossed.transpose(0, 2, 1)
         inverse = np.asarray(np.linalg.pinv(square, rcond=MIN_SINGULAR_SHARE, hermitian=True), dtype=np.float64)
         size = (inverse @ product[..., np.newaxis])[..., 0]
-        total = self.residual_squares
-        rss = np.maximum(total - (size * product).sum(axis=1), MIN_RESIDUAL_SHARE * total + np.finfo(float).tiny)
+        rss = np.maximum(self.residual_squares - (size * product).sum(axis=1), MIN_POINT_VARIANCE * self.y.size)
         freedom = self.y.size - 1 - columns.shape[1]
         return ColumnFits(rss, size, inverse, leaning[..., 0], float(level[0]), float(base[0, 0]), freedom)
 

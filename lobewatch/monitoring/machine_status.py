@@ -22,7 +22,6 @@ from lobewatch.monitoring import status_rules as rules
 from lobewatch.monitoring.alarm_estimate import ChangeKind, SeriesChange
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS
 from lobewatch.monitoring.drop_text import format_below_start
-from lobewatch.monitoring.scatter_check import ScatterCheck
 from lobewatch.monitoring.series_drop import SeriesDrop
 from lobewatch.monitoring.series_history import SeriesHistory, ValueHistory, build_series_history
 from lobewatch.monitoring.series_points import ScatterPrior, SeriesScatterPrior
@@ -55,7 +54,7 @@ def _trend_remarks(name: str, trend: Trend, drop: SeriesDrop, path: Path | str =
     folder = shlex.quote(str(path))
     event = rules.EVENT_CALL.format(folder=folder)
     if trend.open_drop is not None:
-        texts = {"course": _describe_course(trend.open_drop.change), "run_in": RUN_IN_TEXT if trend.is_run_in else ""}
+        texts = {"kind": _describe_change(trend.open_drop.change), "run_in": RUN_IN_TEXT if trend.is_run_in else ""}
         yield rules.FREQUENCY_DECAY.remark(name, since=trend.drop_since, drop=text, event=event, folder=folder, **texts)
     elif trend.needs_repeat:
         yield rules.DOUBTFUL_DECAY.remark(name, folder=folder)
@@ -75,12 +74,14 @@ def _first_test_remarks(name: str, history: ValueHistory, path: Path | str) -> I
         yield rules.FIRST_TEST_DIFFERS.remark(name, distance=distance, side=side, **texts, **calls)
 
 
-def _scatter_remarks(name: str, check: ScatterCheck | None) -> Iterator[Remark]:
-    """Remark on scatter that is not independent."""
+def scatter_remarks(name: str, trend: Trend) -> Iterator[Remark]:
+    """Remark on scatter that is not independent; two groups ask for the operator only if one is missing."""
+    check = trend.scatter_check
     if check is not None and check.is_correlated:
         yield rules.SCATTER_CORRELATED.remark(name, correlation=check.correlation, share=check.false_alarm_share)
     if check is not None and check.group_distance:
-        yield rules.SCATTER_GROUPS.remark(name, distance=check.group_distance, share=check.false_alarm_share)
+        remedy = rules.CLAMP_ALIKE if all(trend.readings.operators) else ""
+        yield rules.SCATTER_GROUPS.remark(name, remedy, distance=check.group_distance)
 
 
 def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
@@ -90,21 +91,19 @@ def _value_change_remarks(name: str, series: SeriesHistory) -> Iterator[Remark]:
         if newest is not None and abs(newest[1].size) >= MIN_REPORTED_CHANGE:
             time, change = newest
             size = _describe_size(change)
-            yield rules.VALUE_CHANGED.remark(
-                name, value=label, since=time, course=_describe_course(change), change=size
-            )
+            yield rules.VALUE_CHANGED.remark(name, value=label, since=time, kind=_describe_change(change), change=size)
 
 
-def _describe_course(change: SeriesChange) -> str:
+def _describe_change(change: SeriesChange) -> str:
     """Describe the kind of a change."""
     past, present = ("dropped", "dropping") if change.size > 0 else ("rose", "rising")
-    courses: dict[ChangeKind, str] = {
+    texts: dict[ChangeKind, str] = {
         "step": f"{past} suddenly before",
         "slope": f"has been {present} since",
         "mixed": f"{past} suddenly and steadily since",
         "dropped": f"{past} since",
     }
-    return courses[change.kind]
+    return texts[change.kind]
 
 
 def _describe_size(change: SeriesChange) -> str:
@@ -228,8 +227,8 @@ def assess_status(
     series = [_assess_series(_series_history_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.interval_days
     series.sort(key=_severity_of_series)
-    remarks = [remark for standing in series for remark in standing.remarks]
-    raised = [alarm for standing in series for alarm in standing.triggered]
+    remarks = [remark for one in series for remark in one.remarks]
+    raised = [alarm for one in series for alarm in one.triggered]
     remarks += [rules.add_file_remedy(remark) for remark in files if remark.code in rules.STATUS_BY_CODE]
     remarks += question_remarks({row.tap_id: row.questions for row in history.rows}, path, [row.tap_id for row in rows])
     remarks += chain
@@ -266,13 +265,13 @@ def _assess_series(series: SeriesHistory, machine: Machine, now: datetime, path:
     first = (frequency.reference_rows or frequency.known_rows or series.rows)[0]
     trend = None if frequency.trend is None else frequency.trend.at_day(now)
     name = f"{newest.tool}, {newest.direction}"
-    of_limits = [*_newest_remarks(name, newest, drop, machine.limits)]
-    of_watch = [*_trend_remarks(name, trend, drop, path)] if trend else []
-    remarks = [*of_limits, *of_watch, *_value_change_remarks(name, series)]
+    limit_remarks = [*_newest_remarks(name, newest, drop, machine.limits)]
+    trend_remarks = [*_trend_remarks(name, trend, drop, path)] if trend else []
+    remarks = [*limit_remarks, *trend_remarks, *_value_change_remarks(name, series)]
     remarks += _first_test_remarks(name, frequency, path)
-    remarks += _scatter_remarks(name, trend.scatter_check) if trend else []
+    remarks += scatter_remarks(name, trend) if trend else []
     below, falling = series.first_below(machine.limits.frequency_alarm_percent), series.first_falling
-    pairs = [(remark, below) for remark in of_limits] + [(remark, falling) for remark in of_watch]
+    pairs = [(remark, below) for remark in limit_remarks] + [(remark, falling) for remark in trend_remarks]
     raised = [TriggeredAlarm(remark, at.tap_id, at.time) for remark, at in pairs if at and rules.is_alarm(remark)]
     times = newest.time, first.time
     return SeriesStatus(newest.tool, newest.direction, *times, drop, trend, tuple(remarks), tuple(raised), series)
@@ -288,14 +287,14 @@ def _severity_of_series(series: SeriesStatus) -> tuple[int, float]:
 def _program_remarks(rows: Sequence[HistoryRow], machine: Machine) -> Iterator[Remark]:
     to_tap = {remark.about: remark.cure for remark in _direction_remarks(rows)}
     tools = {program.name: program.tool for program in machine.program}
-    for name, ruling in (rows[-1].verdicts or {}).items():
-        tap, stability = to_tap.get(tools[name], ""), ruling.stability.value
-        if ruling.stability is Stability.NOT_STABLE:
+    for name, verdict in (rows[-1].verdicts or {}).items():
+        tap, stability = to_tap.get(tools[name], ""), verdict.stability.value
+        if verdict.stability is Stability.NOT_STABLE:
             cure = tap and f"Do not run this program. {tap}."
             yield rules.PROGRAM_NOT_STABLE.remark(name, cure, stability=stability)
-        elif ruling.stability is Stability.UNKNOWN:
+        elif verdict.stability is Stability.UNKNOWN:
             yield rules.PROGRAM_UNKNOWN.remark(name, stability=stability)
-        elif ruling.stability is Stability.DOUBTFUL:
+        elif verdict.stability is Stability.DOUBTFUL:
             yield rules.PROGRAM_DOUBTFUL.remark(name, tap, stability=stability)
 
 
@@ -313,8 +312,8 @@ def _trigger_program_alarm(remark: Remark, rows: Sequence[HistoryRow]) -> Trigge
     """Build the alarm of a program that is not stable, triggered by the first of the consecutive tests that show it."""
     first = rows[-1]
     for row in reversed(rows):
-        ruling = (row.verdicts or {}).get(remark.about)
-        if ruling is None or ruling.stability is not Stability.NOT_STABLE:
+        verdict = (row.verdicts or {}).get(remark.about)
+        if verdict is None or verdict.stability is not Stability.NOT_STABLE:
             break
         first = row
     return TriggeredAlarm(remark, first.tap_id, first.time)

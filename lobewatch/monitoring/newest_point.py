@@ -7,7 +7,7 @@ import numpy as np
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.change_detection import detect_changes
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, PastFit, fit_past
-from lobewatch.monitoring.level_model import MIN_POINT_VARIANCE, build_level_model
+from lobewatch.monitoring.level_model import MIN_SCATTER, build_level_model
 from lobewatch.monitoring.series_points import (
     CONFIRMED_DISTANCE_SHARE,
     MAD_TO_STD,
@@ -43,7 +43,7 @@ def measure_newest_distance(y: Floats) -> float:
     scatter = MAD_TO_STD / math.sqrt(2) * float(np.median(np.abs(np.diff(y[:-1]))))
     if not away or before / away >= CONFIRMED_DISTANCE_SHARE:
         return 0.0
-    return away / max(scatter, math.sqrt(MIN_POINT_VARIANCE))
+    return away / max(scatter, MIN_SCATTER)
 
 
 def fit_confirmed_past(days: Floats, readings: Readings) -> PastFit | None:

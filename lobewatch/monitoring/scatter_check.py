@@ -16,8 +16,8 @@ CORRELATION_SCORE = 2.33
 """Correlation over its standard deviation from which it is certain: chance of 1 in 100."""
 N_LINE_COLUMNS = 2
 """Number of coefficients of a line, which lower the expected correlation of what it leaves."""
-MIN_GROUP_POINTS = 3
-"""Smallest number of points of a group; chosen."""
+MIN_GROUP_SHARE = 0.2
+"""Smallest share of the points in each of two groups; chosen. Fewer are outliers, such as bad clampings."""
 GROUP_SHARE = 2 / math.pi, 0.86
 """Share of the variance that the best division into two groups explains of n normal numbers: its limit, and how far its
 99 % quantile is above it times the root of n (measured on 3000 series of 20 to 120 numbers)."""
@@ -42,8 +42,10 @@ class ScatterCheck(NamedTuple):
         return not self.is_correlated and not self.group_distance
 
     @property
-    def false_alarm_share(self) -> float:
-        """Share of healthy series with such a scatter that have a false alarm in 24 points."""
+    def false_alarm_share(self) -> float | None:
+        """Share of healthy series with such a scatter that have a false alarm in 24 points; None for groups."""
+        if self.group_distance and not self.is_correlated:
+            return None
         return float(np.interp(self.correlation if self.is_correlated else 0.0, *FALSE_ALARM_SHARES))
 
 
@@ -88,11 +90,12 @@ def _fit_without_walks(past: PastFit) -> Floats | None:
 def _find_groups(left: Floats) -> float:
     """Return the distance of two groups of what the line leaves (n,), with mean 0; 0 without certain groups."""
     values, n = np.sort(left), left.size
-    low = np.arange(MIN_GROUP_POINTS, n - MIN_GROUP_POINTS + 1)
+    low = np.arange(1, n)
     sums = np.cumsum(values)[low - 1]
     between = sums**2 * (1 / low + 1 / (n - low))
     best = int(np.argmax(between))
     limit, above = GROUP_SHARE
-    if between[best] <= (limit + above / math.sqrt(n)) * float(values @ values):
+    is_outliers = min(low[best], n - low[best]) < MIN_GROUP_SHARE * n
+    if is_outliers or between[best] <= (limit + above / math.sqrt(n)) * float(values @ values):
         return 0.0
     return float(-sums[best] * (1 / low[best] + 1 / (n - low[best])))

@@ -15,6 +15,7 @@ import scipy
 from lobewatch.arrays import Floats
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, PastFit
 from lobewatch.monitoring.level_model import (
+    MIN_SCATTER,
     OPERATOR_SPREAD,
     STEEL_FREQUENCY_PER_KELVIN,
     LevelModel,
@@ -33,8 +34,6 @@ USUAL_SCATTER = 0.05, 0.6
 higher so that the interval holds at 0.5 too; chosen."""
 MEASURED_SCATTER_RANGE = 0.1, 10.0
 """Range of scatters over the estimated one, to which a posterior is computed."""
-MIN_SCATTER = 1e-9
-"""Smallest scatter (%), above rounding."""
 N_SCATTERS = 48
 """Number of scatters of a posterior."""
 INTERVAL_PROBABILITY = 0.95
@@ -68,7 +67,7 @@ class ScatterPosterior(NamedTuple):
         """
         squares, freedom = squares + known.freedom * known.percent**2, freedom + known.freedom
         middle = math.sqrt(squares / freedom) if freedom else 0.0
-        low, high = (end * max(middle, MIN_SCATTER) for end in MEASURED_SCATTER_RANGE)
+        low, high = (max(end * max(middle, MIN_SCATTER), MIN_SCATTER) for end in MEASURED_SCATTER_RANGE)
         low, high = (USUAL_SCATTER[0], highest) if highest and not known.freedom else (low, high)
         scatter = np.geomspace(low, high, N_SCATTERS)
         log = -freedom * np.log(scatter) - squares / (2 * scatter**2)

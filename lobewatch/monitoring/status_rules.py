@@ -142,7 +142,7 @@ FREQUENCY_ALARM = StatusRule(
 FREQUENCY_DECAY = StatusRule(
     "decay",
     ALARM,
-    "frequency {course} {since:%Y-%m-%d}, now {drop}{run_in}",
+    "frequency {kind} {since:%Y-%m-%d}, now {drop}{run_in}",
     "Inspect bearings, tool and clamping. Then run {event} after a repair, "
     "or operator_entries.acknowledge_alarms {folder} if the cause is known.",
 )
@@ -204,7 +204,7 @@ NEWEST_HIGH = StatusRule(
 VALUE_CHANGED = StatusRule(
     "value-changed",
     GOOD,
-    "{value} {course} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
+    "{value} {kind} {since:%Y-%m-%d}, by {change} (used in verdicts, not in the status)",
 )
 SCATTER_CORRELATED = StatusRule(
     "scatter-correlated",
@@ -216,10 +216,12 @@ SCATTER_CORRELATED = StatusRule(
 SCATTER_GROUPS = StatusRule(
     "scatter-groups",
     GOOD,
-    "f1 scatters in two groups {distance:.2g} % apart, as of two operators or two ways of clamping. {share:.0%} of "
-    "healthy spindles have a false alarm in 24 tests",
+    "f1 scatters in two groups {distance:.2g} % apart, for example of two operators or two ways of clamping. "
+    "The false alarm rate is unknown",
     "Record the operator of every test",
 )
+CLAMP_ALIKE = "Clamp the tool in the same way for every test"
+"""Next step for two groups if all operators are recorded."""
 ONE_DIRECTION = StatusRule(
     "one-direction",
     GOOD,

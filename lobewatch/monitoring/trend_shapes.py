@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, Self, get_args
 import numpy as np
 
 from lobewatch.arrays import Floats, Indices
-from lobewatch.monitoring.level_model import MIN_RESIDUAL_SHARE, ColumnFits, LevelModel
+from lobewatch.monitoring.level_model import MIN_POINT_VARIANCE, ColumnFits, LevelModel
 
 EXPONENTIAL_RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
 """Rates of the exponential curves, per span of the series; chosen."""
@@ -223,7 +223,7 @@ def _fit_shapes(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], draw
     counts = Counter(shape.kind for shape in shapes)
     columns = np.array([0 if shape.kind == "none" else fits.size.shape[1] for shape in shapes])
     many = np.log([counts[shape.kind] / PRIOR_ODDS.get(shape.kind, 1.0) for shape in shapes])
-    left = np.log(fits.rss / (base.residual_squares + np.finfo(float).tiny))
+    left = np.log(fits.rss / base.residual_squares)
     evidence = -fits.freedom / 2 * left - many - columns / 2 * np.log(at.size)
     return ShapeFits(tuple(shapes), evidence, fits, drawn, float(at[-1]), float(fits.freedom))
 
@@ -345,13 +345,13 @@ def fit_random_walks(base: LevelModel, at: Floats) -> list[RandomWalkFits]:
 
 def _fit_random_walk(base: LevelModel, at: Floats, shapes: Sequence[TrendShape], n_starts: int) -> RandomWalkFits:
     """Fit random walks of one kind and one of its starts."""
-    points, freedom, tiny = _rotate_points(base, at, shapes[0]), float(at.size - 2), np.finfo(float).tiny
+    points, freedom = _rotate_points(base, at, shapes[0]), float(at.size - 2)
     amounts = np.array([[shape.rate] for shape in shapes])
     weight = 1 / (1 + np.concatenate([[[0.0]], amounts]) * points.values)
     gram, _, left = points.solve(weight)
-    rss = np.maximum(left[1:], MIN_RESIDUAL_SHARE * base.residual_squares + tiny)
+    rss = np.maximum(left[1:], MIN_POINT_VARIANCE * at.size)
     known = np.log(weight).sum(axis=1) + np.linalg.slogdet(gram)[1]
-    evidence = (known[1:] - known[0]) / 2 - freedom / 2 * np.log(rss / (base.residual_squares + tiny))
+    evidence = (known[1:] - known[0]) / 2 - freedom / 2 * np.log(rss / base.residual_squares)
     evidence += np.log(PRIOR_ODDS[shapes[0].kind] / (len(shapes) * n_starts)) - np.log(at.size) / 2
     return RandomWalkFits(tuple(shapes), evidence, rss / freedom, points, freedom)
 

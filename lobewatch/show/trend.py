@@ -92,7 +92,7 @@ def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: Remaini
     """Return chart, facts and forecast dates of a series, the change of the other series, and the next step."""
     if series.trend is None:
         return [f"{series.name}: no tap test yet to compare later tests with"]
-    facts = [*_trend_facts(series), *([] if preload is None else [str(preload)])]
+    facts = [*_trend_facts(series), *preload_texts(series, preload)]
     texts: Texts = [*chart_lines(series.trend), f"{series.name}:", *wrap_lines(facts)]
     texts += [
         f"{other.name}: {change_since_start_text(other)}" for other in outlook.status.series if other is not series
@@ -116,11 +116,20 @@ def trend_remarks(outlook: MachineForecast) -> list[Remark]:
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     """Return when each program becomes doubtful and not stable, and when the fixed limits are reached."""
-    now, rows = outlook.status.time, list[tuple[str, str, str]]()
+    now, rows, asked = outlook.status.time, list[tuple[str, str, str]](), open_questions_text(outlook)
+    reason = {"unknown": asked} if asked else {}
     for name, fate in outlook.programs.items():
-        dates = (reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
+        dates = [reach_text(reach, now, **reason) for reach in (fate.doubtful, fate.not_stable)]
         rows.append((name, *(("unknown, see lobewatch check",) * 2 if name in outlook.unknown_programs else dates)))
-    return rows + [(f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits]
+    limits = [(f"-{percent:g} % (fixed limit)", reach_text(reach, now, **reason)) for percent, reach in outlook.limits]
+    return rows + [(name, "", text) for name, text in limits]
+
+
+def open_questions_text(outlook: MachineForecast) -> str:
+    """Return the number of tests with open questions in the series without a forecast; empty if there are none."""
+    trends = [(series.history.frequency, series.trend) for series in outlook.status.series]
+    asked = sum(int(one.has_questions.sum()) for one, trend in trends if trend is None or trend.forecast is None)
+    return f"unknown, {asked} tests with open questions do not count" if asked else ""
 
 
 def no_dates_text(outlook: MachineForecast) -> str:
@@ -147,17 +156,23 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
     trend = series.trend
     if trend is None:
         return ["unknown"]
-    n = len(trend.points)
-    change = f"{change_since_start_text(series)}{f' ({n} points)' if n > 1 else ''}"
+    n, change = len(trend.points), change_since_start_text(series)
+    interval = [f"{INTERVAL_NOTE} ({n} points)"] if n > 1 else []
     if trend.forecast is None:
         known = trend.readings.scatter_prior.single
-        least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
-        return [change, *([INTERVAL_NOTE] if n > 1 else []), f"alarms are possible from {least}"]
+        least = f"5 points (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points"
+        return [change, *interval, f"trend alarms need {least}, but the fixed limits always apply"]
     score = f"from {MIN_MONITORED_POINTS} points on"
-    if math.isfinite(trend.detection.scores[-1]):
-        score = f"{trend.detection.scores[-1]:.1f} (alarm: {SURE_CHANGE_SCORE:g} or more in two clampings)"
-    course = ", ".join(filter(None, (trend_text(series), rate_text(trend))))
-    return [change, INTERVAL_NOTE, course, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
+    if not math.isnan(trend.detection.scores[-1]):
+        score = f"{max(trend.detection.scores[-1], 0.0):.1f} (alarm: {SURE_CHANGE_SCORE:g} or more in two clampings)"
+    kind = trend_text(series) if series.is_change_proven else ""
+    now = ", ".join(filter(None, (kind, rate_text(trend))))
+    return [change, *interval, now, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
+
+
+def preload_texts(series: SeriesStatus, preload: RemainingPreload | None) -> list[str]:
+    """Return the remaining preload of a series with a proven change."""
+    return [str(preload)] if preload is not None and series.is_change_proven else []
 
 
 def rate_text(trend: Trend) -> str:
@@ -190,20 +205,20 @@ def trend_text(series: SeriesStatus) -> str:
     if not series.is_change_proven:
         return "no change proven"
     if trend.open_drop is not None:
-        return _alarm_course_text(trend)
+        return _alarm_text(trend)
     if not trend.has_certain_shape:
         return "date of the change unknown"
     return _shape_text(trend.likeliest_shape, falls=trend.forecast.fitted[-1] < trend.start)
 
 
-def _alarm_course_text(trend: Trend) -> str:
+def _alarm_text(trend: Trend) -> str:
     """Return kind and date of the drop of an alarm."""
     fallen, since = trend.open_drop, trend.drop_since
     if fallen is None or since is None:
         return ""
     words = {"step": "dropped at once before", "slope": "dropping since", "mixed": "dropped at once and steadily since"}
-    course = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
-    return f"{course}, slower now (may be run-in)" if trend.is_run_in else course
+    text = f"{words.get(fallen.change.kind, 'dropped since')} {since:%Y-%m-%d}"
+    return f"{text}, slower now (may be run-in)" if trend.is_run_in else text
 
 
 def _shape_text(shape: TrendShape, falls: bool) -> str:
@@ -230,12 +245,12 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
     return words.get(shape.kind, f"{goes} {'faster and faster' if shape.accelerates else 'more and more slowly'}")
 
 
-def reach_text(reach: ThresholdDates, now: datetime) -> str:
-    """Return when a limit is reached in words."""
+def reach_text(reach: ThresholdDates, now: datetime, unknown: str = "history too short or too old") -> str:
+    """Return when a limit is reached in words; unknown: reason for no date."""
     if reach.is_measured:
         return "already"
     if reach.forecast_end is None:
-        return "history too short or too old"
+        return unknown
     if reach.earliest is None:
         return f"not before {date_of_days(reach.forecast_end):%Y-%m}"
     today = days_since_epoch(now)

@@ -88,7 +88,7 @@ def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -
         return ""
     percent, reach = limit
     first, last = _month_text(reach.earliest or reach.forecast_end), _month_text(reach.latest)
-    when = f"{first} to {last}" if last else f"not before {first}"
+    when = first if first == last else f"{first} to {last}" if last else f"not before {first}"
     is_past = reach.latest is not None and reach.latest <= now.timestamp() / 86400
     return f"{percent:g} %: {'by now at this rate' if is_past else when}"
 

@@ -163,7 +163,7 @@ def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
 def _reclamping_parts(widths: Floats, label: str, assembly: Assembly, given: UncertaintyTable) -> Iterator[str]:
     asked, texts = (given.frequency_percent, given.damping_percent, given.stiffness_percent), dict[str, str]()
     for side in assembly.directions:
-        scatter = f"scatter of {len(assembly.series.get(side, ()))} tests"
+        scatter = f"scatter of {len(assembly.series.get(side, ()))} tests, outliers included"
         sources = [
             scatter if assembly.scatter(side) is not None else f"default value until {MIN_TAPS_FOR_SCATTER} tests"
         ]

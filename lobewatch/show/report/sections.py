@@ -309,11 +309,13 @@ INDEPENDENT_CONFIDENCE = "False alarms: 5 of 100 healthy series within 60 clampi
 def _alarm_confidence(trend: Trend | None) -> str:
     """Return rule and confidence of the alarm."""
     if trend is None or len(trend.points) < MIN_MONITORED_POINTS:
-        return f"needs {MIN_MONITORED_POINTS} clampings"
+        return f"needs {MIN_MONITORED_POINTS} clampings, except at the fixed limits"
     check = trend.scatter_check
-    if check is None or not check.is_correlated:
+    if check is None or check.is_independent:
         return f"{ALARM_RULE}. {INDEPENDENT_CONFIDENCE}"
-    return f"{ALARM_RULE}. False alarms: {100 * check.false_alarm_share:.0f} of 100 series within 24 clampings"
+    share = check.false_alarm_share
+    rate = "unknown" if share is None else f"{100 * share:.0f} of 100 series within 24 clampings"
+    return f"{ALARM_RULE}. False alarms: {rate}"
 
 
 def make_sign_off(data: ReportData) -> list[Section]:

@@ -12,6 +12,7 @@ from scipy.stats import norm
 from scipy.stats import t as students
 
 from lobewatch.monitoring.drop_text import describe_drop, format_below_start, format_change
+from lobewatch.monitoring.machine_status import scatter_remarks
 from lobewatch.monitoring.scatter_check import check_scatter
 from lobewatch.monitoring.series_drop import HIGHEST_SQUARE, ScatterPosterior, SeriesDrop
 from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, ScatterPrior, SeriesScatterPrior
@@ -165,6 +166,7 @@ def test_scatter_that_repeats_is_said_with_its_false_alarms() -> None:
     assert (plain.is_independent, plain.false_alarm_share) == (True, 0.024)
     assert repeated.is_correlated
     assert repeated.correlation == pytest.approx(0.7, abs=0.25)
+    assert repeated.false_alarm_share is not None
     assert 0.18 < repeated.false_alarm_share <= 0.63
 
 
@@ -173,10 +175,31 @@ def test_two_operators_whom_nobody_declared_are_two_groups() -> None:
     found = fitted(rng.normal(0, 0.04, 30) + 0.4 * rng.integers(0, 2, 30)).scatter_check
     assert found is not None
     assert found.group_distance == pytest.approx(0.4, abs=0.05)
-    assert not found.is_independent
+    assert (found.is_independent, found.false_alarm_share) == (False, None)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("bad", [1, 3, 5])
+def test_bad_clampings_are_no_group(bad: int, sign: int) -> None:
+    rng, places = np.random.default_rng(bad), np.linspace(4, 27, bad).astype(int)
+    percents = rng.normal(0, 0.15, 30)
+    percents[places] += 2.5 * sign
+    found = fitted(percents).scatter_check
+    assert found is not None
+    assert found.group_distance == 0
 
 
 def test_less_than_twenty_points_are_not_checked() -> None:
     trend = fitted(np.random.default_rng(4).normal(0, 0.1, 19))
     assert trend.scatter_check is None
     assert check_scatter(trend.drops, None, has_changed=False) is None
+
+
+def test_two_groups_ask_for_the_operator_only_if_one_is_missing() -> None:
+    rng = np.random.default_rng(3)
+    percents = rng.normal(0, 0.04, 30) + 0.4 * rng.integers(0, 2, 30)
+    declared, missing = (scatter_remarks("x", fitted(percents, operators)) for operators in ("a" * 30, ""))
+    remarks = [*declared, *missing]
+    assert [remark.code for remark in remarks] == ["scatter-groups"] * 2
+    assert remarks[0].text == remarks[1].text
+    assert remarks[0].cure != remarks[1].cure

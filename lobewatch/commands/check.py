@@ -12,10 +12,8 @@ from lobewatch.step_times import time_step
 def check(
     machine: shared.Machine,
     program: Annotated[list[str] | None, Option(help="Program name, repeatable. Default: all programs.")] = None,
-    speed: Annotated[
-        float | None, Option(parser=shared.rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
-    ] = None,
-    depth: Annotated[float | None, Option(parser=shared.length, help="Axial depth of cut ap (mm).")] = None,
+    speed: shared.OtherCutSpeed = None,
+    depth: shared.AxialDepth = None,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
     material: shared.Material = None,
     teeth: shared.Flutes = None,

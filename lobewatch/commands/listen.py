@@ -5,7 +5,7 @@ import itertools
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Never
 
@@ -20,6 +20,7 @@ from lobewatch.commands.shared_options import (
     FolderArgument,
     add_file_options,
     allow_options,
+    find_recording,
     parse_speeds,
     reject_options,
     rpm,
@@ -27,9 +28,7 @@ from lobewatch.commands.shared_options import (
 from lobewatch.show.terminal.output import (
     HttpPort,
     Json,
-    JsonObject,
     Listen,
-    Texts,
     Token,
     WatchToken,
     emit,
@@ -44,7 +43,6 @@ if TYPE_CHECKING:
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import CutComparison
     from lobewatch.logbook.heard_cuts import CutFileRequest
-    from lobewatch.machine.journal.entries import CutEntry
     from lobewatch.screen.web_server import ServerOptions
     from lobewatch.tap.cut_recording import CutState
     from lobewatch.tap.state import StatePublisher
@@ -121,11 +119,11 @@ def listen(
     if page:
         allow_options(ctx, ["page", *SERVER_OPTIONS], "does not apply to --page")
         _serve_page(as_json, server)
-    machine = _find_path(machine)
+    machine = find_recording(machine)
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.heard_cuts import CutFileRequest
     from lobewatch.machine.settings.requested_cut import choose_cut
-    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+    from lobewatch.show.listen_answers import unstored_answer
     from lobewatch.tap import cut_recording as recorder
 
     if machine.is_file():
@@ -142,7 +140,10 @@ def listen(
     description = file_options.description(**recorder.check_file_options(sensor, tacho, pulses, file))
     with contextlib.ExitStack() as screens, recorder.publish_cut_states(logbook, setting) as publisher:
         if screen:
-            _start_screen(screens, publisher, server)
+            from lobewatch.screen import CutScreenServer  # imports aiohttp
+
+            shown = screens.enter_context(CutScreenServer(publisher, **server))
+            show_address(shown.url, shown.watch_url)
         how = file, port, seconds, description, notes.print, publisher.show
         signals = screens.enter_context(contextlib.closing(recorder.acquire_cut(logbook.folder, setting, *how)))
         limit = cuts or (None if notes.is_terminal and sys.stdin.isatty() else 1)
@@ -150,19 +151,10 @@ def listen(
             comparisons = recorder.evaluate_live_cut(logbook, setting, signal, publisher)
             _save_figure(comparisons, out)
             if dry_run:
-                payload, texts = _suggest_untapped(logbook, comparisons)
-                emit(recording_json(comparisons) | payload, as_json, *recording_texts(comparisons), *texts)
+                payload, texts = unstored_answer(logbook, comparisons)
+                emit(payload, as_json, *texts)
             else:
                 _store(logbook, comparisons, signal, date, publisher, as_json)
-
-
-def _find_path(path: Path | None) -> Path:
-    """Return the path of a machine folder or a recording; ValueError if it does not exist."""
-    if path is None:
-        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
-    if not path.exists():
-        raise ValueError(f"{path}: no such file or folder. Name a machine folder or a recorded cut.")
-    return path
 
 
 def _reject_folder_options(ctx: Context, file_options: Iterable[str], *, has_file: bool, screen: bool) -> None:
@@ -186,16 +178,6 @@ def _serve_page(as_json: bool, options: "ServerOptions") -> Never:
             time.sleep(1)
 
 
-def _start_screen(
-    screens: contextlib.ExitStack, publisher: "StatePublisher[CutState]", options: "ServerOptions"
-) -> None:
-    from lobewatch.screen import CutScreenServer  # imports aiohttp
-
-    server = CutScreenServer(publisher, **options)
-    screens.enter_context(server)
-    show_address(server.url, server.watch_url)
-
-
 def _save_figure(comparisons: "Sequence[CutComparison]", out: Path | None) -> None:
     if out is not None:
         from lobewatch.show.cuts.spectrum_figure import save_cut_spectrum  # imports matplotlib
@@ -208,32 +190,12 @@ def _listen_to_file(
 ) -> None:
     """Evaluate a recorded cut of an unknown machine, and show the next speeds."""
     from lobewatch.logbook.heard_cuts import hear_file
-    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
-    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
+    from lobewatch.show.listen_answers import file_answer
 
     comparisons, found = hear_file(path, description, request)
     _save_figure(comparisons, out)
-    payload = recording_json(comparisons) | next_speeds_json(found)
-    emit(payload, as_json, *recording_texts(comparisons), *next_speeds_texts(found))
-
-
-def _suggest_untapped(
-    logbook: "Logbook", comparisons: "Sequence[CutComparison]", stored: "Sequence[CutEntry] | None" = None
-) -> tuple[JsonObject, Texts]:
-    """Return the next speeds as JSON and texts if the tool was never tapped; empty if it was.
-
-    stored: all cuts of the journal. None to add these cuts to those of the logbook.
-    """
-    from lobewatch.logbook.heard_cuts import is_tool_untapped, suggest_by_sound
-    from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
-
-    setting = comparisons[-1].setting
-    if not is_tool_untapped(logbook, setting.tool):
-        return {}, []
-    now = datetime.now(UTC)
-    made = [comparison.to_recorded_cut(now) for comparison in comparisons]
-    found = suggest_by_sound(logbook, setting, [*logbook.cuts, *made] if stored is None else stored)
-    return next_speeds_json(found), next_speeds_texts(found)
+    payload, texts = file_answer(comparisons, found)
+    emit(payload, as_json, *texts)
 
 
 def _store(
@@ -247,16 +209,11 @@ def _store(
     """Store the recorded cuts and show them."""
     from lobewatch.logbook.cut_comparison import store_recorded_cuts
     from lobewatch.notify.publish_status import publish_on_change
-    from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
-    from lobewatch.show.history import saved_cut_remarks
+    from lobewatch.show.listen_answers import stored_answer
 
     with publish_on_change(logbook):
         earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, date)
         publisher.show(saved=stored[-1].id)
-        remarks = [saved_cut_remarks(logbook, cut, [*earlier, *stored[:i]]) for i, cut in enumerate(stored)]
-        codes = [[remark.code for remark in cut_remarks] for cut_remarks in remarks]
-        rows = [{"id": cut.id, "remarks": cut_codes} for cut, cut_codes in zip(stored, codes, strict=True)]
-        payload, texts = _suggest_untapped(logbook, comparisons, [*earlier, *stored])
-        saved = recording_texts(comparisons, [cut.id for cut in stored])
-        emit(recording_json(comparisons, rows) | payload, as_json, *saved, *texts)
-    print_remarks(itertools.chain.from_iterable(remarks))
+        payload, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
+        emit(payload, as_json, *texts)
+    print_remarks(remarks)

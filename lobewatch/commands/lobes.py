@@ -12,8 +12,6 @@ from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
 if TYPE_CHECKING:
-    from acquisition import Remark
-    from lobewatch.logbook import LobeComparison
     from lobewatch.tool import LobeMethod
 
 DynamicsName = Literal["modes", "frf"]
@@ -45,25 +43,16 @@ def lobes(
         Option(help='Mode at the tool tip in place of a machine folder: "600 Hz 3% 10 N/um". Repeatable.'),
     ] = None,
     mode_y: Annotated[list[str] | None, Option(help="Mode in y, repeatable. Default: as in x.")] = None,
-    teeth: Annotated[int | None, Option(help="Number of flutes, with --mode.")] = None,
-    material: Annotated[str | None, Option(help="Material of lobewatch materials, with --mode.")] = None,
-    diameter: Annotated[
-        float | None, Option(parser=shared.length, help="Tool diameter (mm), with --mode. Default: 10.")
-    ] = None,
-    radial_depth: Annotated[
-        float | None,
-        Option(parser=shared.length, help="Radial depth of cut ae (mm), with --mode. Default: full slot."),
-    ] = None,
+    teeth: shared.Flutes = None,
+    material: shared.Material = None,
+    diameter: shared.Diameter = None,
+    radial_depth: shared.RadialDepth = None,
     direction: shared.MillingDirection = None,
     speeds: Annotated[
         str, Option(help='Lowest and highest spindle speed (rpm), with --mode. Default: "1000-24000".')
     ] = "",
-    speed: Annotated[
-        float | None, Option(parser=shared.rpm, help="Spindle speed of a cut to check (rpm), with --mode.")
-    ] = None,
-    depth: Annotated[
-        float | None, Option(parser=shared.length, help="Axial depth ap of that cut (mm), with --mode.")
-    ] = None,
+    speed: shared.OtherCutSpeed = None,
+    depth: shared.AxialDepth = None,
     now: Now = None,
     as_json: Json = False,
 ) -> None:
@@ -73,7 +62,7 @@ def lobes(
     spindle model. Tap tests without a force sensor give pocket speeds, but no depths.
 
     --mode needs no machine folder: it takes natural frequency, damping ratio and stiffness at the tool tip, with the
-    default uncertainties. --speed and --depth add a verdict.
+    default uncertainties. --teeth to --depth belong to it. --speed and --depth add a verdict.
 
     Examples
     --------
@@ -85,6 +74,7 @@ def lobes(
     from lobewatch.logbook import Logbook, compare_lobes
     from lobewatch.logbook.chart_data import chart_speed_pockets
     from lobewatch.show.cuts.recorded_cuts import speed_pockets_json, speed_pockets_texts
+    from lobewatch.show.programs.advice import comparison_json, comparison_texts
     from lobewatch.tool import DynamicsSource, LobeMethod
 
     stated: dict[str, Any] = {"teeth": teeth, "material": material, "diameter": diameter, "radial-depth": radial_depth}
@@ -112,12 +102,6 @@ def lobes(
 
         with time_step("figures"):
             remarks += save_lobe_figures(logbook, comparison, LobeMethod(method), figure, radial, waterfall)
-    _show(comparison, remarks, as_json)
-
-
-def _show(comparison: "LobeComparison", remarks: "Sequence[Remark]", as_json: bool) -> None:
-    from lobewatch.show.programs.advice import comparison_json, comparison_texts
-
     emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))
 
 
@@ -126,15 +110,13 @@ def _show_stated(
 ) -> None:
     """Show lobes, pockets and a verdict for stated modes."""
     from lobewatch.logbook.stated_modes import StatedCut, build_stated_machine, compare_stated_modes, parse_mode
+    from lobewatch.show.programs.advice import comparison_json, comparison_texts
 
     if missing := [f"--{name}" for name in ("teeth", "material") if stated[name] is None]:
         raise ValueError(f"--mode needs {' and '.join(missing)}. Write --teeth 4 --material 6061, for example.")
-    cut = StatedCut(*(stated[name] for name in ("teeth", "material", "diameter", "radial-depth")))
-    if stated["direction"]:
-        cut = cut._replace(direction=stated["direction"])
-    if stated["speeds"]:
-        low, high = shared.parse_speeds(stated["speeds"])
-        cut = cut._replace(low_rpm=low, high_rpm=high)
+    low, high = shared.parse_speeds(stated["speeds"] or "1000 24000")
+    sizes = stated["diameter"], stated["radial-depth"]
+    cut = StatedCut(stated["teeth"], stated["material"], *sizes, stated["direction"] or "down", low, high)
     x, y = ([parse_mode(text) for text in texts or ()] for texts in (modes, stated["mode-y"]))
     with show_progress("searching stable pockets"), time_step("lobes"):
         comparison = compare_stated_modes(cut, x, y, stated["speed"], stated["depth"], method)
@@ -143,4 +125,4 @@ def _show_stated(
         from lobewatch.show.figures.lobe_figures import plot_comparison
 
         save_figure(plot_comparison(build_stated_machine(cut), comparison, ()), figure)
-    _show(comparison, comparison.remarks, as_json)
+    emit(comparison_json(comparison, comparison.remarks), as_json, *comparison_texts(comparison, comparison.remarks))

@@ -4,33 +4,24 @@ from typing import Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import (
-    Flutes,
-    Material,
-    MillingDirection,
-    Now,
-    TappedMachine,
-    cut_fields,
-    length,
-    rpm,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
 
 def pitch(
-    machine: TappedMachine,
-    speed: Annotated[float, Option(parser=rpm, help="Spindle speed (rpm).")],
+    machine: shared.TappedMachine,
+    speed: Annotated[float, Option(parser=shared.rpm, help="Spindle speed (rpm).")],
     tool: Annotated[str | None, Option(help="Name of the cutter.")] = None,
     depth: Annotated[
-        float | None, Option(parser=length, help="Axial depth of cut ap (mm) to give verdicts for.")
+        float | None, Option(parser=shared.length, help="Axial depth of cut ap (mm) to give verdicts for.")
     ] = None,
-    material: Material = None,
-    teeth: Flutes = None,
-    diameter: Annotated[float | None, Option(parser=length, help="Tool diameter (mm).")] = None,
-    radial: Annotated[float | None, Option(parser=length, help="Radial depth of cut ae (mm).")] = None,
-    direction: MillingDirection = None,
-    now: Now = None,
+    material: shared.Material = None,
+    teeth: shared.Flutes = None,
+    diameter: shared.Diameter = None,
+    radial: Annotated[float | None, Option(parser=shared.length, help="Radial depth of cut ae (mm).")] = None,
+    direction: shared.MillingDirection = None,
+    now: shared.Now = None,
     as_json: Json = False,
 ) -> None:
     """Propose unequal pitches for a cutter at one speed.
@@ -48,7 +39,7 @@ def pitch(
     from lobewatch.logbook.requested_cuts import propose_requested_pitch
     from lobewatch.show.programs.recommendations import pitches_json, pitches_texts
 
-    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
+    cut = shared.cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     logbook = Logbook.open(machine, now)
     with show_progress("comparing pitches"), time_step("lobes"):
         proposal = propose_requested_pitch(logbook, cut)

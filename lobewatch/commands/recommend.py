@@ -4,38 +4,26 @@ from typing import Annotated, Literal
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import (
-    Diameter,
-    Flutes,
-    Material,
-    Now,
-    TappedMachine,
-    cut_fields,
-    feed,
-    length,
-    rpm,
-)
+from lobewatch.commands import shared_options as shared
 from lobewatch.show.terminal.output import Json, emit, show_progress
 from lobewatch.step_times import time_step
 
 
 def recommend(
-    machine: TappedMachine,
+    machine: shared.TappedMachine,
     tool: Annotated[str | None, Option(help="Tool name.")] = None,
-    material: Material = None,
-    radial: Annotated[
-        float | None, Option(parser=length, help="Radial depth of cut ae (mm). Default: full slot.")
-    ] = None,
+    material: shared.Material = None,
+    radial: shared.RadialDepth = None,
     direction: Annotated[
         Literal["up", "down"] | None, Option(help="Up or down milling. Default: the direction with the lower limit.")
     ] = None,
-    depth: Annotated[float | None, Option(parser=length, help="Required axial depth of cut ap (mm).")] = None,
-    speed: Annotated[float | None, Option(parser=rpm, help="Present spindle speed (rpm).")] = None,
-    teeth: Flutes = None,
-    diameter: Diameter = None,
-    feed_per_tooth: Annotated[float | None, Option(parser=feed, help="Feed per tooth (mm).")] = None,
+    depth: Annotated[float | None, Option(parser=shared.length, help="Required axial depth of cut ap (mm).")] = None,
+    speed: Annotated[float | None, Option(parser=shared.rpm, help="Present spindle speed (rpm).")] = None,
+    teeth: shared.Flutes = None,
+    diameter: shared.Diameter = None,
+    feed_per_tooth: Annotated[float | None, Option(parser=shared.feed, help="Feed per tooth (mm).")] = None,
     save: Annotated[str | None, Option(help="Name of a new program in machine.toml.")] = None,
-    now: Now = None,
+    now: shared.Now = None,
     as_json: Json = False,
 ) -> None:
     """Recommend a speed and a depth for a tool and a material.
@@ -56,7 +44,7 @@ def recommend(
     from lobewatch.machine.folder_updates import check_program_name, save_program
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
-    cut = cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
+    cut = shared.cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
     cut["feed_per_tooth_mm"] = feed_per_tooth
     logbook = Logbook.open(machine, now)
     if save is not None:

@@ -17,6 +17,15 @@ from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.machine.settings.number_text import format_number, list_readings, read_number, read_numbers
 
 
+def find_recording(path: Path | None) -> Path:
+    """Return the path of a machine folder or a recording; ValueError if it does not exist."""
+    if path is None:
+        raise ValueError("no machine folder or recording. Name one of them, or use --page.")
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder. Name a machine folder or a recorded cut.")
+    return path
+
+
 def number(text: str | float) -> float:
     """Parse a number with a decimal point, and with separators between thousands if it has no other value.
 
@@ -134,6 +143,11 @@ ExcludableEntry = Annotated[
 ]
 AsCsv = Annotated[bool, Option("--csv", help="CSV on stdout.")]
 Diameter = Annotated[float | None, Option(parser=length, help="Tool diameter (mm).")]
+RadialDepth = Annotated[float | None, Option(parser=length, help="Radial depth of cut ae (mm). Default: full slot.")]
+AxialDepth = Annotated[float | None, Option(parser=length, help="Axial depth of cut ap (mm).")]
+OtherCutSpeed = Annotated[
+    float | None, Option(parser=rpm, help="Spindle speed (rpm) of a cut that is not in machine.toml.")
+]
 MillingDirection = Annotated[Literal["up", "down"] | None, Option(help="Up or down milling.")]
 CutDepth = Annotated[float | None, Option(parser=length, help="Axial depth of cut ap (mm). Default: from the program.")]
 Now = Annotated[

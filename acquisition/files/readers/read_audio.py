@@ -107,16 +107,16 @@ def _decode_by_av(content: bytes, name: str, max_seconds: float) -> tuple[float,
         cure = 'Export WAV, or install the package with pip install "lobewatch[phone]".'
         raise MissingDecoderError(f"{name}: M4A and WebM need the package av. {cure}") from error
     pieces, count = list[Floats](), 0
-    with av.open(io.BytesIO(content), format=_find_demuxer(content[:12])) as container:
+    with av.open(io.BytesIO(content), "r", format=_find_demuxer(content[:12])) as container:
         if not container.streams.audio:
             raise DataError(f"{name}: no sound track. Choose a recording with sound.")
         stream, resampler = container.streams.audio[0], av.AudioResampler(format="fltp")
         for frame in container.decode(stream):
-            pieces += [piece.to_ndarray() for piece in resampler.resample(frame)]
+            pieces += [piece.to_ndarray().astype(np.float64) for piece in resampler.resample(frame)]
             count += frame.samples
             if count > max_seconds * stream.rate:
                 break
-        return float(stream.rate), np.concatenate(pieces, axis=1, dtype=np.float64)
+        return float(stream.rate), np.concatenate(pieces, axis=1)
 
 
 def _is_wav(head: bytes) -> bool:

@@ -137,6 +137,7 @@ def trim_to_cut(path: Path, name: str) -> Path:
 def test_a_cut_without_air_has_that_of_an_earlier_cut_at_its_speed(
     shop: Shop, tmp_path: Path, chatter: float | None
 ) -> None:
+    shop.tap_both()  # a tool that was never tapped is judged without air
     place = ("--program", "A", "--speed", 12000, "--json")
     short = trim_to_cut(recording(tmp_path / "next.csv", chatter), "short.csv")
     alone = json.loads(run(shop, *place, "--file", short, "--dry-run").stdout)

@@ -157,9 +157,11 @@ def test_after_a_new_baseline_nothing_is_known_until_the_next_tap(shop: Shop) ->
     standing = shop.logbook.status(day(shop, 11))
     assert (standing.status, [one.code for one in standing.remarks]) == ("unknown", ["never-tapped"])
     assert [one.stability.value for one in shop.logbook.verdicts()] == ["unknown"]
-    for command in ("check", "report", "lobes"):
+    for command in ("report", "lobes"):
         with pytest.raises(DataError, match="2026-01-25"):
             run(command, shop.path)
+    (program,) = json.loads(run("check", shop.path, "--json").stdout)["programs"]
+    assert (program["verdict"], program["decided_by"], program["limit_mm"]) == ("doubtful", "no-tap-test", None)
 
 
 def test_an_old_recording_is_stored_next_to_a_new_baseline(shop: Shop, beam: Path) -> None:

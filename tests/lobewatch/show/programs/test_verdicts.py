@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import math
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -140,7 +142,9 @@ def test_chance_of_chatter_once_it_turns(chance: float, text: str) -> None:
 
 def test_a_verdict_says_what_it_must_in_the_same_breath() -> None:
     beyond = a_verdict(drive_limit=1e-3)
-    assert verdict_text(beyond) == "stable, beyond the drive (predicted)"
+    assert verdict_text(beyond) == "stable, beyond the drive"  # by sound, without a tap test
+    predicted = replace(beyond, assembly=SimpleNamespace(predicted=True))  # type: ignore[arg-type]
+    assert verdict_text(predicted) == "stable, beyond the drive (predicted)"
     assert [
         is_safe(verdict)
         for verdict in (a_verdict(), beyond, a_verdict(Stability.DOUBTFUL), a_verdict(Stability.UNKNOWN))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from functools import partialmethod
 from pathlib import Path
 from types import ModuleType
 
@@ -13,6 +14,7 @@ import pytest
 from fake_libraries import Volts, Wiring, fake_daqhats, fake_ljm, fake_nidaqmx, fake_sounddevice, fake_uldaq
 
 from acquisition import HammeredStructure, Hammering, MeasuredRate, Structure
+from acquisition.vendor_drivers.library_device import LibraryDevice
 from lobewatch.cli import main
 from lobewatch.machine.daq_rates import apply_measured_rate
 from lobewatch.machine.folder import MachineFolder
@@ -90,6 +92,8 @@ def test_a_whole_tap_test(
         monkeypatch.setitem(sys.modules, name, module)
     with open_device(folder.machine.daq, PORTS[driver]) as device:
         apply_measured_rate(folder, device, MeasuredRate(device.sample_rate, 1.0, 250_000, 5.0))
+    as_read = partialmethod(LibraryDevice.__init__, follows_clock=False)  # a simulated library is as fast as it is read
+    monkeypatch.setattr(LibraryDevice, "__init__", as_read)
     monkeypatch.setattr(sys, "argv", ["lobewatch", "tap", "trial", "--direction", "x", "--json"])
     with pytest.raises(SystemExit) as end:
         main()

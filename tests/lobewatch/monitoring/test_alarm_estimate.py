@@ -16,7 +16,6 @@ from lobewatch.monitoring.change_detection import detect_changes, monitor_drops
 from lobewatch.monitoring.series_points import Readings
 
 Floats = NDArray[np.float64]
-pytestmark = pytest.mark.quick
 SCATTER = 0.1 * np.array([1, -1, 1, 1, -1, -1, 1, -1] * 5)
 """Scatter of 40 points."""
 

@@ -19,7 +19,7 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
-from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts, material_key
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import CutSetting
 
@@ -141,13 +141,12 @@ def find_heard_cuts(setting: CutSetting, cuts: Iterable[CutEntry], since: dateti
     since
         Time of the newest baseline, before which cuts do not count; None without one.
     """
-    key = setting.tool, geometry_key(setting.cut), setting.material, setting.feed
-    same = [
-        cut
-        for cut in cuts
-        if (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key and (since is None or cut.at >= since)
-    ]
-    decisive = list_decisive_cuts(same)
+    wanted = setting.tool, geometry_key(setting.cut), material_key(setting.material, setting.cut), setting.feed
+
+    def is_same(cut: CutEntry) -> bool:
+        return (cut.tool, geometry_key(cut.cut), material_key(cut.coefficients, cut.cut), cut.feed) == wanted
+
+    decisive = list_decisive_cuts([cut for cut in cuts if is_same(cut) and (since is None or cut.at >= since)])
     return [HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth) for cut in decisive]
 
 

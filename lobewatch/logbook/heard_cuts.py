@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,8 +11,8 @@ from acquisition import DataError, Description
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import MICROPHONE_SENSOR, read_cut_recording
 from lobes import Cut
-from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
-from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
 from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.analysis import Analysis
@@ -23,6 +23,10 @@ from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decis
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import CutSetting
 
+ASSUMED_RANGE = (0.5, 1.5)
+"""Speed range over the speed of the cut, if nobody gives the range of the machine; chosen."""
+UNKNOWN_IMMERSION = 1.0
+"""Radial depth over diameter of a recording if it is unknown: a slot, for which the fewest lines are checked."""
 ARBITRARY_DIAMETER_MM, ARBITRARY_FORCES = 10.0, (1e9, 3e8)
 """Tool diameter (mm), Kt and Kr (Pa) of a cut whose machine is unknown; no result depends on them."""
 
@@ -102,11 +106,12 @@ def hear_signal(signal: CutSignal, name: str, request: CutFileRequest) -> tuple[
         signal.lost_scans,
         signal.speed_rpm,
     )
-    heard = hear_recording(recording, range_rpm, depth)
-    setting = _make_setting(name, teeth, speed_rpm, depth)
+    evaluations = evaluate_without_air(recording, evaluate_recording(recording))
+    setting, now = _make_setting(name, teeth, speed_rpm, depth), datetime.now(UTC)
     sensor: CutSensor = "microphone" if signal.sensor == MICROPHONE_SENSOR else "accelerometer"
-    comparisons = [CutComparison(setting, found, None, sensor, None) for found in heard.evaluations]
-    return comparisons, heard.next_speeds
+    comparisons = [CutComparison(setting, found, None, sensor, None) for found in evaluations]
+    cuts = find_heard_cuts(setting, [comparison.to_recorded_cut(now) for comparison in comparisons], None)
+    return comparisons, suggest_speeds(cuts, teeth, range_rpm)
 
 
 def _read_without_sensitivity(path: Path, description: Description) -> CutSignal:

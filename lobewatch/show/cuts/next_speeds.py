@@ -94,4 +94,4 @@ def _contradiction_lines(found: NextSpeeds) -> Iterator[str]:
     if found.contradicting:
         speeds = ", ".join(dict.fromkeys(format_rpm(round(cut.speed_rpm)) for cut in found.contradicting))
         count = count_noun(len(found.contradicting), "cut")
-        yield f"Not counted: {count} at {speeds} rpm, contradicted by a later cut."
+        yield f"Not counted: {count} at {speeds} rpm, contradicted by a cut that chattered."

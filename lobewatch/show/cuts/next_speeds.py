@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lobewatch.cuts.learning.next_speed import NextSpeed, NextSpeeds
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.show.cuts.recorded_cuts import observe_text
+from lobewatch.show.cuts.suggested_cuts import observe_text
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table
 

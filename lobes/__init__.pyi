@@ -21,7 +21,6 @@ from .materials import (
     find_materials,
     fold_material_name,
     materials_by_name,
-    nearest_material_name,
 )
 from .milling_system import ProjectedModes, age_mode, build_milling_system, project_modes
 from .pitch_patterns import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pitch_pattern
@@ -80,7 +79,6 @@ __all__ = [
     "materials_by_name",
     "max_depth_for_drive",
     "mean_torque",
-    "nearest_material_name",
     "pitch_patterns",
     "program_limit",
     "project_modes",

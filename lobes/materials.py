@@ -190,39 +190,23 @@ def explain_unknown_material(name: str, by_name: Mapping[str, CuttingCoefficient
     Returns
     -------
     str
-        Question with the nearest name, or the names of a group.
+        Question with the most similar published name, or the names of a group.
 
     Examples
     --------
     >>> explain_unknown_material("titanium", materials_by_name())
     'Choose one of Ti Grade 2, TiAl6V4.'
+    >>> explain_unknown_material("AA 7057", materials_by_name())
+    "Did you mean 'AA 7075'?"
     """
     group, pattern = MATERIAL_GROUPS.get(fold_material_name(name), ("", ""))
     listed = [material for material in listed_materials() if material.iso_group == group]
     names = [material.material for material in listed if re.search(pattern, material.material)]
-    return f"Choose one of {', '.join(names)}." if names else f"Did you mean {nearest_material_name(name, by_name)!r}?"
+    return f"Choose one of {', '.join(names)}." if names else f"Did you mean {_nearest_material_name(name, by_name)!r}?"
 
 
-def nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
-    """Return the published name that is most similar to an unknown one.
-
-    Parameters
-    ----------
-    name : str
-        Unknown name.
-    by_name : mapping of str to CuttingCoefficients
-        Coefficients by folded names.
-
-    Returns
-    -------
-    str
-        Name as published.
-
-    Examples
-    --------
-    >>> nearest_material_name("AA 7057", materials_by_name())
-    'AA 7075'
-    """
+def _nearest_material_name(name: str, by_name: Mapping[str, CuttingCoefficients]) -> str:
+    """Return the published name that is most similar to an unknown one."""
     nearest = difflib.get_close_matches(fold_material_name(name), by_name, n=1, cutoff=0.0)[0]
     return next((known for known in by_name[nearest].names if fold_material_name(known) == nearest), nearest)
 
@@ -256,6 +240,6 @@ def find_materials(word: str) -> list[CuttingCoefficients]:
     in_group = [material for material in known if folded and material.iso_group.casefold() == folded]
     matching = in_group or [m for m in known if any(folded in fold_material_name(name) for name in m.names)]
     if not matching:
-        near = nearest_material_name(word, materials_by_name())
+        near = _nearest_material_name(word, materials_by_name())
         raise ValueError(f"no material name contains {word!r}. Did you mean {near!r}?")
     return matching

@@ -48,7 +48,7 @@ class CutSignal:
     more_channels: tuple[Channel, ...] = ()
     """Channels of the codes of further responses."""
     overload_spans: tuple[tuple[int, int], ...] = ()
-    """First sample and the one after the last of each reported overload; empty if it is not known where."""
+    """First sample of each reported overload, and the one after its last; empty if the file does not tell."""
 
     @property
     def duration(self) -> float:

@@ -73,7 +73,7 @@ def lobes(
     """
     from lobewatch.logbook import Logbook, compare_lobes
     from lobewatch.logbook.chart_data import chart_speed_pockets
-    from lobewatch.show.cuts.recorded_cuts import speed_pockets_json, speed_pockets_texts
+    from lobewatch.show.cuts.suggested_cuts import speed_pockets_json, speed_pockets_texts
     from lobewatch.show.programs.advice import comparison_json, comparison_texts
     from lobewatch.tool import DynamicsSource, LobeMethod
 

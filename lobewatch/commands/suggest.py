@@ -33,7 +33,7 @@ def suggest(
     from lobewatch.logbook.heard_cuts import suggest_by_sound
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.show.cuts import next_speeds as sound
-    from lobewatch.show.cuts import recorded_cuts as show
+    from lobewatch.show.cuts import suggested_cuts as show
     from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine, now)

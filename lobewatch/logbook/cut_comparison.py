@@ -9,14 +9,10 @@ import numpy as np
 
 from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
-from lobewatch.cuts.chatter_detection.cut_evaluation import (
-    CutEvaluation,
-    CutRecording,
-    evaluate_recording,
-)
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
 from lobewatch.cuts.chatter_detection.earlier_air import evaluate_with_air
 from lobewatch.cuts.chatter_detection.spectrum import sideband_distance
-from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
+from lobewatch.cuts.chatter_detection.without_air import AIR_REASONS, evaluate_without_air
 from lobewatch.cuts.learning.cut_likelihood import ExpectedChatter, predict_chatter
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
@@ -134,22 +130,18 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     return [replace(cut, predicted=predict_chatter(setting, assembly, cut.speed_rpm)) for cut in comparisons]
 
 
-NO_AIR_REASONS = ("no-air", "no-cut")
-"""Reasons of recordings that air of an earlier cut may resolve: all of it may be one cut."""
-
-
 def _evaluate_with_any_air(
     logbook: Logbook, setting: CutSetting, signal: CutSignal, recording: CutRecording
 ) -> tuple[list[CutEvaluation], str]:
     """Evaluate each cut; without air in the recording with that of an earlier cut, whose identity is returned."""
     evaluated = evaluate_recording(recording)
-    if any(detected.reason not in NO_AIR_REASONS for detected in evaluated):
+    if any(detected.reason not in AIR_REASONS for detected in evaluated):
         return evaluated, ""
     air = find_remembered_air(logbook, setting, signal)
     if air is None:
         return evaluated, ""
     again = evaluate_with_air(recording, air.signal, is_calibrated=signal.sensor != "microphone")
-    if any(detected.reason in NO_AIR_REASONS for detected in again):
+    if any(detected.reason in AIR_REASONS for detected in again):
         return evaluated, ""
     return again, air.cut
 

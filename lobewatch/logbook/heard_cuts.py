@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,18 +11,22 @@ from acquisition import DataError, Description
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import MICROPHONE_SENSOR, read_cut_recording
 from lobes import Cut
-from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording
-from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE, UNKNOWN_IMMERSION, hear_recording
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
 from lobewatch.cuts.learning.next_speed import HeardCut, NextSpeeds, suggest_speeds
 from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import CutTable
-from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts, material_key
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.machine.settings.requested_cut import CutSetting
 
+ASSUMED_RANGE = (0.5, 1.5)
+"""Speed range over the speed of the cut, if nobody gives the range of the machine; chosen."""
+UNKNOWN_IMMERSION = 1.0
+"""Radial depth over diameter of a recording if it is unknown: a slot, for which the fewest lines are checked."""
 ARBITRARY_DIAMETER_MM, ARBITRARY_FORCES = 10.0, (1e9, 3e8)
 """Tool diameter (mm), Kt and Kr (Pa) of a cut whose machine is unknown; no result depends on them."""
 
@@ -102,11 +106,12 @@ def hear_signal(signal: CutSignal, name: str, request: CutFileRequest) -> tuple[
         signal.lost_scans,
         signal.speed_rpm,
     )
-    heard = hear_recording(recording, range_rpm, depth)
-    setting = _make_setting(name, teeth, speed_rpm, depth)
+    evaluations = evaluate_without_air(recording, evaluate_recording(recording))
+    setting, now = _make_setting(name, teeth, speed_rpm, depth), datetime.now(UTC)
     sensor: CutSensor = "microphone" if signal.sensor == MICROPHONE_SENSOR else "accelerometer"
-    comparisons = [CutComparison(setting, found, None, sensor, None) for found in heard.evaluations]
-    return comparisons, heard.next_speeds
+    comparisons = [CutComparison(setting, found, None, sensor, None) for found in evaluations]
+    cuts = find_heard_cuts(setting, [comparison.to_recorded_cut(now) for comparison in comparisons], None)
+    return comparisons, suggest_speeds(cuts, teeth, range_rpm)
 
 
 def _read_without_sensitivity(path: Path, description: Description) -> CutSignal:
@@ -141,13 +146,12 @@ def find_heard_cuts(setting: CutSetting, cuts: Iterable[CutEntry], since: dateti
     since
         Time of the newest baseline, before which cuts do not count; None without one.
     """
-    key = setting.tool, geometry_key(setting.cut), setting.material, setting.feed
-    same = [
-        cut
-        for cut in cuts
-        if (cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed) == key and (since is None or cut.at >= since)
-    ]
-    decisive = list_decisive_cuts(same)
+    wanted = setting.tool, geometry_key(setting.cut), material_key(setting.material, setting.cut), setting.feed
+
+    def is_same(cut: CutEntry) -> bool:
+        return (cut.tool, geometry_key(cut.cut), material_key(cut.coefficients, cut.cut), cut.feed) == wanted
+
+    decisive = list_decisive_cuts([cut for cut in cuts if is_same(cut) and (since is None or cut.at >= since)])
     return [HeardCut(cut.speed_rpm, cut.word, cut.chatter_frequency_hz or math.nan, cut.depth) for cut in decisive]
 
 

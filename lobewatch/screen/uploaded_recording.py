@@ -15,9 +15,8 @@ from acquisition.files.read_cut import MICROPHONE_SENSOR
 from acquisition.files.readers.read_audio import MissingDecoderError, decode_audio
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 from lobewatch.arrays import Floats
-from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
 from lobewatch.logbook.cut_comparison import find_worst_cut
-from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
+from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
@@ -64,7 +63,7 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def request(self) -> CutFileRequest:
-        """The same facts as of a recording on the command line."""
+        """Request with these values for `hear_signal`."""
         return CutFileRequest(self.teeth, self.speed_rpm, self.depth_mm, self.range_rpm)
 
 

@@ -119,7 +119,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
 
 
 def find_loud_pieces(axes: Sequence[Floats]) -> Flags:
-    """Which pieces are loud: by their loudness, or by their power where that steps by `POWER_STEP_MARGIN` more.
+    """Find the loud pieces by loudness, or by power where that steps by `POWER_STEP_MARGIN` more.
 
     axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
     """
@@ -131,12 +131,12 @@ def find_loud_pieces(axes: Sequence[Floats]) -> Flags:
 
 
 def compute_loudness_step(level: Floats, is_loud: Flags) -> float:
-    """By how much what is loud is louder than what is not, in the mean."""
+    """Return the mean level of the loud pieces less that of the others (log10)."""
     return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if np.any(is_loud) and not np.all(is_loud) else 0.0
 
 
 def find_loudness_threshold(level: Floats) -> float:
-    """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
+    """Find the lowest level halfway between the means of the lower and the higher ones (Ridler & Calvard 1978)."""
     smooth = scipy.ndimage.uniform_filter1d(level, N_QUIET_PIECES)
     half_window = N_QUIET_PIECES // 2
     least = threshold = float(np.min(smooth[half_window:-half_window])) + MIN_CUT_LOUDNESS
@@ -177,7 +177,7 @@ def _find_entry_and_exit(power: Floats, join: float, most: float) -> tuple[int, 
 
 
 def find_cut_fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
-    """Why parts cannot be listened to, a code; empty where they can."""
+    """Return the code of the fault of a cut; empty without one."""
     if parts.cut.stop - parts.cut.start < MIN_CUT_TIME * sample_rate:
         return "too-short"
     if parts.air.stop - parts.air.start < MIN_AIR_TIME * sample_rate:
@@ -231,7 +231,7 @@ def find_stretches(loud: Flags) -> list[tuple[int, int]]:
 
 
 def join_stretches(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
-    """Stretches with short pauses between them as one; gap: longest pause (pieces)."""
+    """Join stretches with short pauses between them; gap: longest pause (pieces)."""
     joined: list[tuple[int, int]] = []
     for begin, end in stretches:
         if joined and begin - joined[-1][1] <= gap:

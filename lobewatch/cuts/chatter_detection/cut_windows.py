@@ -32,7 +32,7 @@ MIN_CHATTER_FREQUENCY = 100.0
 
 
 class KnownCut(NamedTuple):
-    """What is known of a cut before one of its windows is evaluated."""
+    """Facts about a cut that the evaluation of one of its windows may use."""
 
     speed: SpindleSpeed | None = None
     """Spindle speed in another window, which is tried first."""

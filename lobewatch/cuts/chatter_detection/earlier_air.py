@@ -15,10 +15,7 @@ def evaluate_with_air(recording: CutRecording, air: Floats, *, is_calibrated: bo
     """
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     if not is_calibrated:
-        levels = [
-            [np.median(spectrum.noise) for spectrum in spectral.compute_spectra(part, 1.0)] for part in (axes, air)
-        ]
-        air = air * np.sqrt(np.array(levels[0]) / np.array(levels[1]))[:, np.newaxis]
+        air = air * np.sqrt(_noise_density(axes) / _noise_density(air))[:, np.newaxis]
     count = air.shape[1]
     longer = recording._replace(
         signal=np.concatenate([air, axes], axis=1),
@@ -28,6 +25,12 @@ def evaluate_with_air(recording: CutRecording, air: Floats, *, is_calibrated: bo
         else np.pad(recording.measured_rpm, (count, 0), mode="edge"),
     )
     return [_shift_times(sound, count / recording.sample_rate) for sound in evaluate_recording(longer)]
+
+
+def _noise_density(signal: Floats) -> Floats:
+    """Return the median noise power in a bandwidth that does not depend on the length of a signal, shape (axes,)."""
+    spectra = spectral.compute_spectra(signal, 1.0)
+    return np.array([np.median(spectrum.noise) / spectrum.bin_width for spectrum in spectra])
 
 
 def _shift_times(sound: CutEvaluation, earlier: float) -> CutEvaluation:

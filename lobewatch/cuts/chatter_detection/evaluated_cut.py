@@ -65,6 +65,6 @@ def group_peaks(sound: CutEvaluation) -> dict[str, SpectralPeaks]:
 
 
 def rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
-    """Rank an axis: chatter first, then by energy."""
+    """Rank an evaluation of an axis or a window: chatter first, then by energy."""
     peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
     return sound.chatter is not None, peaks.energy if peaks else 0.0

@@ -17,7 +17,7 @@ from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Sp
 MAX_RIPPLE_FREQUENCY = 30.0
 """Highest frequency of a ripple (Hz): ball screws, ribs and small circles are slower."""
 MIN_RIPPLE_FREQUENCY = 0.5
-"""Lowest frequency of a ripple (Hz)."""
+"""Lowest frequency of a ripple (Hz); chosen."""
 MAX_BAND_SHARE = 0.45
 """Half width of the band around a multiple over the spindle frequency, at most; chosen."""
 BAND_MARGIN = 1.3
@@ -156,6 +156,10 @@ def find_ripple(envelopes: Envelopes, ahead: Floats) -> Ripple | None:
     return Ripple(loud_hz if loud > fast else speed_hz, loud_size if loud > 1 else 0.0, speed_size if fast > 1 else 0.0)
 
 
+SWING_PADDING = 4
+"""Zero-padding factor of the search for the frequency of a ripple; chosen."""
+
+
 def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
     """Return frequency (Hz) and amplitude of the swing that explains most of the changes of values; 0 if none does."""
     changes = (values - np.mean(values)) * np.hanning(values.size)
@@ -168,10 +172,6 @@ def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
     if not inside[best] or float(np.sum(power[near])) <= MIN_RIPPLE_SHARE * total:
         return 0.0, 0.0
     return float(frequency[best]), float(np.sqrt(2) * np.std(values))
-
-
-SWING_PADDING = 4
-"""Zero-padding factor of the search for the frequency of a ripple; chosen."""
 
 
 RESAMPLING_FACTOR = 3
@@ -195,11 +195,11 @@ MAX_SIDEBAND_DISTANCE = 200.0
 MAX_LOAD_DISTANCE = 4.0
 """Distance of a peak from a louder multiple (Hz) within which it shows corners, entry and exit; chosen."""
 MIN_PAIR_RATIO = 0.5
-"""Smallest amplitude ratio of two side bands that ripple makes beside a multiple, if no other can be compared; chosen.
+"""Smallest amplitude ratio of two side bands that ripple makes next to a multiple, if no other can be compared; chosen.
 
 Chatter is above or below a multiple."""
 MIN_KNOWN_SIDEBANDS = 4
-"""Smallest number of places beside other multiples where a common side band would be clear of the noise; chosen."""
+"""Smallest number of places next to other multiples where a common side band would be clear of the noise; chosen."""
 NOISE_MARGIN = 2.0
 """Expected amplitude of a side band over the noise, below which its absence shows nothing; chosen."""
 OWN_SIDEBAND_BINS = 4.0

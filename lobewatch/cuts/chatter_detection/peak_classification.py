@@ -138,13 +138,12 @@ MAX_TEETH = 12
 """Largest number of teeth that harmonics are compared with; chosen."""
 MIN_TEETH_SHARE, MAX_STATED_TEETH_SHARE = 0.9, 0.5
 """Smallest energy share of the harmonics of another number of teeth, and largest of the stated one; chosen."""
-
 MIN_HARMONIC_POWER = 1e-2
 """Smallest power of the first three harmonics of another number of teeth over the largest of all; chosen.
 
 A single one may be loud by a mode."""
 MAX_GAP_POWER = 2.5e-3
-"""Largest power between harmonics that there are not, over theirs: 5 % of their amplitude; chosen."""
+"""Largest power of missing harmonics over that of their neighbours: 5 % of the amplitude; chosen."""
 
 
 def find_other_teeth(comb: SpectralPeaks, turning: SpindleSpeed, teeth: int) -> int:

@@ -100,10 +100,8 @@ def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> Spindle
 
 def _find_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float, distance: float) -> SpindleSpeed | None:
     """Find the spindle frequency (Hz); distance: of separate peaks, at least (Hz)."""
-    peaks, voted = (
-        find_cut_peaks(spectra, air, distance),
-        _find_speed_by_peaks(spectra, air, teeth, commanded, distance),
-    )
+    peaks = find_cut_peaks(spectra, air, distance)
+    voted = _find_speed_by_peaks(spectra, air, teeth, commanded, distance)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         return voted or summed

@@ -39,7 +39,7 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
     if len(places) > 1 and known.speed:
         about = known._replace(is_begun=True)
         ends = windowing.place_end_windows(parts, rate)
-        early, late = ([evaluate(place, about) for place in places] for places in ends)
+        early, late = ([evaluate(place, about) for place in windows] for windows in ends)
         heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
     heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
@@ -73,24 +73,32 @@ def _settle_contradictions(
     """
     chatters, settled = [sound.chatter is not None for sound in heard], list(heard)
     for i, sound in enumerate(heard):
-        beside = chatters[max(i - 1, 0) : i] + chatters[i + 1 : i + 2]
-        if not beside or chatters[i] in beside or sound.verdict == "cannot tell":
+        neighbours = chatters[max(i - 1, 0) : i] + chatters[i + 1 : i + 2]
+        if not neighbours or chatters[i] in neighbours or sound.verdict == "cannot tell":
             continue
         about = known._replace(speed=sound.spindle_speed, is_begun=True)
         again = [evaluate(place, about) for place in windowing.shift_window(sound.parts.cut, parts, rate)]
-        if again and not any((other.chatter is not None) == chatters[i] for other in again):
+        if not any((other.chatter is not None) == chatters[i] for other in again):
             settled[i] = again[0]._replace(parts=sound.parts)
     return settled
 
 
 def compare_with_stable(axes: Floats, rate: float, heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
-    """Let chatter that is as loud in the stable windows of a cut, and these, count by what most of them say."""
+    """Compare chatter with the same line in the stable windows of a cut.
+
+    Where it is as loud there, chattering and stable windows contradict each other: the fewer of them tell nothing.
+    """
     stable = [i for i, sound in enumerate(heard) if sound.verdict == "stable"]
     groups = [[i for i, _ in group] for _, group in groupby(enumerate(heard), lambda item: item[1].chatter is None)]
     doubted = [i for group in groups if stable and not _has_grown(axes, rate, heard, group, stable) for i in group]
     wrong = stable if len(doubted) > len(stable) else doubted
+    tone = max((heard[i] for i in doubted), key=rank_evidence).chatter if doubted else None
+    if tone is None:
+        return list(heard)
     return [
-        sound._replace(verdict="cannot tell", reason="unexplained-tone", chatter=None) if i in wrong else sound
+        sound._replace(verdict="cannot tell", reason="unexplained-tone", chatter=None, tone=tone.frequency)
+        if i in wrong
+        else sound
         for i, sound in enumerate(heard)
     ]
 

@@ -8,14 +8,10 @@ import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import MAX_CUT_TIME, MIN_CUT_TIME, CutParts
-from lobewatch.cuts.chatter_detection.cut_evaluation import (
-    MIN_SIDEBANDS,
-    CutEvaluation,
-    CutRecording,
-    evaluate_cut,
-    evaluate_recording,
-)
+from lobewatch.cuts.chatter_detection.cut_evaluation import MIN_SIDEBANDS, CutEvaluation, CutRecording, evaluate_cut
+from lobewatch.cuts.chatter_detection.cut_windows import NOTHING_KNOWN, KnownCut
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
+from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
 AIR_REASONS = ("no-air", "no-cut")
 """Reasons without a verdict of a recording that may hold nothing but a cut."""
@@ -26,17 +22,6 @@ STEADY_PIECE_LENGTH, MIN_STEADY_POWER = 0.1, 0.1
 """Length of the pieces (s) of a recording of nothing but a cut, and least power of one over that of the loudest."""
 
 
-def evaluate_with_or_without_air(recording: CutRecording) -> list[CutEvaluation]:
-    """Evaluate each cut in a recording, as `evaluate_recording`, and a recording of nothing but a cut.
-
-    Parameters
-    ----------
-    recording
-        Recording to be evaluated.
-    """
-    return evaluate_without_air(recording, evaluate_recording(recording))
-
-
 def evaluate_without_air(recording: CutRecording, found: list[CutEvaluation]) -> list[CutEvaluation]:
     """Evaluate a recording of nothing but a cut; the evaluations found with air if it has any."""
     if len(found) > 1 or found[0].reason not in AIR_REASONS:
@@ -45,20 +30,27 @@ def evaluate_without_air(recording: CutRecording, found: list[CutEvaluation]) ->
 
 
 def _evaluate_whole(recording: CutRecording, found: CutEvaluation) -> CutEvaluation:
-    """Evaluate the end of a recording as a cut; the first evaluation if that needs air."""
+    """Evaluate all windows of a recording as one cut; return the first evaluation if the verdict needs air."""
     signal = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     rate, count = recording.sample_rate, signal.shape[1]
     first = max(count - round(MAX_CUT_TIME * rate), 0)
-    clipped = recording.clipped is not None and bool(np.any(recording.clipped[first:]))
+    clipped = recording.clipped is not None and bool(np.any(recording.clipped))
     if count < MIN_CUT_TIME * rate or clipped or recording.lost_scans or not _is_steady(signal, rate):
         return found
     _, _, teeth, immersion, commanded_rpm, *_ = recording
-    silence = np.zeros((signal.shape[0], count - first))
-    heard = evaluate_cut(signal[:, first:], silence, rate, teeth, immersion, commanded_rpm)
+    whole = CutParts("", slice(0, 0), slice(first, count), 0.0, count / rate, first / rate, count / rate)
+
+    def evaluate(place: slice, known: KnownCut) -> CutEvaluation:
+        cut = signal[:, place]
+        heard = evaluate_cut(cut, np.zeros(cut.shape), rate, teeth, immersion, commanded_rpm, known=known)
+        if heard.verdict != "cannot tell" and not _needs_no_air(heard):
+            heard = heard._replace(verdict="cannot tell", reason="no-air", chatter=None)
+        return heard._replace(parts=whole._replace(cut=place))
+
+    heard = evaluate_windows(evaluate, signal, whole, rate, NOTHING_KNOWN)
     if heard.verdict == "cannot tell":
         return found._replace(reason="no-air") if heard.spindle_speed is not None else found
-    whole = CutParts("", slice(0, 0), slice(first, count), 0.0, count / rate, first / rate, count / rate)
-    return heard._replace(parts=whole) if _needs_no_air(heard) else found._replace(reason="no-air")
+    return heard
 
 
 def _is_steady(signal: Floats, sample_rate: float) -> bool:

@@ -1,9 +1,9 @@
 """Next speed and depth to try by the sound of cuts only, without a tap test.
 
-Each chatter frequency stands for a mode a little below it. Each mode has the lobes of a slot by the zero-order
-approximation with a typical damping ratio, and all modes the same lowest limit. The deepest speed of the lowest of
-these lobes is near the classic rule, tooth passing at f_c / k. Source: Altintas & Budak, CIRP Annals 44 (1995) 357-362;
-Schmitz & Smith, Machining Dynamics, ch. 4. How often it succeeds: docs/studies/cuts.md.
+Each chatter frequency stands for a mode a little below it. Samples of these modes and of the cut (`sampled_lobes`) are
+weighted by the verdicts and the chatter frequencies so far. The best speed is near the classic rule, tooth passing at
+f_c / k. Source: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Schmitz & Smith, Machining Dynamics, ch. 4.
+How often it succeeds: docs/studies/cuts.md.
 """
 
 import math
@@ -26,23 +26,23 @@ CHATTER_OVER_NATURAL = 1.015
 CLASSIC_TOLERANCE = 0.025
 """Relative distance of the first suggested speed below that of the classic rule; chosen."""
 MAX_MODES = 4
-"""Largest number of modes in a search."""
+"""Largest number of modes in a search; chosen."""
 LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.02
 """Logarithmic uncertainty of a stability limit and of a chatter frequency; chosen."""
 UNEXPLAINED, SIDEBAND_LIKELIHOOD = 0.1, 0.4
 """Likelihood of a chatter frequency of another cause, and of a side band, over that of the best one; chosen."""
 MAX_LOBE_GAIN = 20.0
-"""Largest limit over the lowest one that counts."""
+"""Largest limit over the lowest one that counts; chosen."""
 SPEED_STEP = 0.005
-"""Relative step of the searched speeds."""
+"""Relative step of the searched speeds; chosen."""
 SPEED_UNCERTAINTY = 0.01
 """Relative standard deviation of the pocket speeds, over which chances are averaged; chosen."""
 TRIED_TOLERANCE = 0.02
 """Relative distance in speed within which chatter at the same depth, or a smaller one, excludes a speed; chosen."""
 N_SPEEDS = 3
-"""Largest number of suggested speeds."""
+"""Largest number of suggested speeds; chosen."""
 WINDOW_SHARE = 0.8
-"""Share of the largest limit that the window of a pocket holds."""
+"""Smallest limit in the window of a pocket over that at its speed; chosen."""
 MAX_CUTS_AT_DEPTH = 3
 """Number of chattering cuts at a depth after which no speed is deep enough; chosen."""
 MIN_CUTS_BEFORE_LESS = 2
@@ -148,7 +148,7 @@ def _drop_contradicted(cuts: Sequence[HeardCut]) -> tuple[list[HeardCut], tuple[
 
 
 def _find_modes(cuts: Sequence[HeardCut], teeth: int) -> list[float]:
-    """Return the natural frequencies (Hz) that the chatter frequencies stand for."""
+    """Estimate the natural frequencies (Hz) from the chatter frequencies."""
     groups: list[list[float]] = []
     for cut in cuts:
         if cut.has_chatter and math.isfinite(cut.frequency):
@@ -171,7 +171,7 @@ def _distances(frequency: float, tooth: float, known: float) -> list[tuple[float
 
 
 def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
-    """Return the code of why the next cut is less deep than the user wants; empty if it need not be."""
+    """Return the code of the reason for a smaller depth; empty if it stays."""
     bases = [60 * frequency / teeth for frequency in modes]
     if not any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases):
         return "no-speed-in-range"

@@ -1,6 +1,6 @@
 """Stability lobes of a tool that nobody tapped: Monte Carlo samples of its modes and of the cut.
 
-All that chatter frequencies do not tell is drawn: stiffness, damping, a mode that has not chattered yet, radial depth,
+Unknown values are drawn: stiffness, damping, a mode that has not chattered yet, radial depth,
 direction and Kr. Lobes are those of the zero-order approximation. Each sample counts by how well it explains the cuts.
 Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Karandikar, Traverso, Abbas & Schmitz, 2014.
 """
@@ -18,13 +18,13 @@ from lobes.tooth_force import mean_force
 from lobewatch.arrays import Complexes, Floats
 
 N_SAMPLES, SEED = 600, 0
-"""Number of samples, and the seed that makes them the same each time."""
+"""Number of samples, chosen, and the seed that makes them the same each time."""
 HEARD_FREQUENCY_STD = 0.025
 """Relative standard deviation of a natural frequency around its first estimate; chosen."""
 UNHEARD_PROBABILITY, UNHEARD_FREQUENCY, UNHEARD_STIFFNESS = 0.4, (0.4, 2.5), (1.0, 6.0)
 """Probability of one more mode, its frequency and stiffness over those of the first; chosen."""
 RIGID = 1e6
-"""Stiffness over that of the first mode of a mode that is not there."""
+"""Stiffness over that of the first mode of a mode that is not there; chosen."""
 HEARD_STIFFNESS = 2.7
 """Largest ratio of the stiffness of two heard modes; chosen."""
 DAMPING_RATIOS = (0.01, 0.05)
@@ -34,17 +34,17 @@ AXES_FREQUENCY, AXES_OTHER = 1.1, 1.42
 IMMERSIONS = (0.1, 0.3, 0.6, 1.0)
 """Radial depths over diameter; chosen."""
 RADIAL_FORCES = (0.1, 0.5)
-"""Range of Kr over Kt."""
+"""Range of Kr over Kt; chosen."""
 N_FREQUENCIES, LAST_PHASE = 161, 1.55
 """Number of frequencies around each resonance, and the largest angle (rad), whose tangent is their distance.
 
 The distance is in half bandwidths."""
 LOWEST_FREQUENCY = 0.2
-"""Lowest frequency over that of the slowest mode."""
+"""Lowest frequency over that of the slowest mode; chosen."""
 MAX_GAIN = 1e3
-"""Largest limit over the lowest one that counts."""
+"""Largest limit over the lowest one that counts; chosen."""
 GAP_SPEEDS = 13
-"""Number of speeds around one that no sampled frequency reaches, of which the lowest limit counts."""
+"""Number of speeds around one that no sampled frequency reaches, of which the lowest limit counts; chosen."""
 
 
 class SampledModes(NamedTuple):
@@ -117,10 +117,8 @@ def _draw_heard_and_unheard(draw: np.random.Generator, modes: Sequence[float]) -
     heard = np.array(modes) * np.exp(HEARD_FREQUENCY_STD * draw.normal(size=(N_SAMPLES, count)))
     stiffness = _log_uniform(draw, 1 / HEARD_STIFFNESS, HEARD_STIFFNESS, count)
     stiffness[:, 0] = 1
-    more, its_stiffness = (
-        modes[0] * _log_uniform(draw, *UNHEARD_FREQUENCY, 1),
-        _log_uniform(draw, *UNHEARD_STIFFNESS, 1),
-    )
+    more = modes[0] * _log_uniform(draw, *UNHEARD_FREQUENCY, 1)
+    its_stiffness = _log_uniform(draw, *UNHEARD_STIFFNESS, 1)
     its_stiffness[draw.uniform(size=N_SAMPLES) > UNHEARD_PROBABILITY] = RIGID
     damping = draw.uniform(*DAMPING_RATIOS, (N_SAMPLES, count + 1))
     return SampledModes(np.hstack([heard, more]), damping, np.hstack([stiffness, its_stiffness]))
@@ -177,7 +175,7 @@ def _lowest_limits(frequency: Floats, loops: Sequence[Complexes], teeth: int, sp
 def _lobe_points(
     frequency: Floats, loop: Complexes, teeth: int, speeds: Floats
 ) -> Iterator[tuple[np.ndarray[tuple[int], np.dtype[np.intp]], Floats, Floats]]:
-    """Iterate over lobes: flat places in (samples, speeds), depths in any unit, chatter frequencies (Hz)."""
+    """Yield each lobe: flat places in (samples, speeds), depths in any unit, chatter frequencies (Hz)."""
     sample, point = np.nonzero(loop.real < 0)
     response, hz = loop[sample, point], frequency[sample, point]
     depth, part = -1 / (2 * response.real), np.mod(np.angle(response) / np.pi - 0.5, 1)

@@ -10,7 +10,7 @@ from acquisition import Remark
 from lobewatch.cuts.learning.cut_likelihood import REPEAT_SPEED_TOLERANCE
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
 from lobewatch.machine import Machine, ProgramTable, drive_depth_limit
-from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts
+from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts, material_key
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.verdicts.uncertainty_causes import NO_TAP_TEST
 from lobewatch.verdicts.verdict import Stability, Verdict
@@ -123,9 +123,9 @@ def _describe(cut: CutEntry) -> str:
 
 def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:
     """Return whether a cut decides on a program: the same cut, stable no shallower or chattering no deeper."""
-    made, known = machine.build_cut(program), machine.coefficients(program)
-    same = cut.tool, geometry_key(cut.cut), cut.coefficients, cut.feed
-    is_same = same == (program.tool, geometry_key(made), known.material, program.feed)
+    made, material = machine.build_cut(program), machine.coefficients(program).material
+    same = cut.tool, geometry_key(cut.cut), material_key(cut.coefficients, cut.cut), cut.feed
+    is_same = same == (program.tool, geometry_key(made), material_key(material, made), program.feed)
     if not (cut.is_usable and is_same and _is_same_feed(cut.feed_per_tooth, program)):
         return False
     depth, rpm = program.depth_mm / 1e3, program.speed_rpm

@@ -154,6 +154,11 @@ def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
     return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch
 
 
+def material_key(material: str, cut: Cut) -> str | tuple[float, float]:
+    """Return what cuts of one material share: its name, or its coefficients if it has none."""
+    return material or (cut.tangential, cut.radial)
+
+
 def parse_cut_line(line: Mapping[str, Any], excluded: str = "") -> CutEntry:
     """Read a test cut from its journal line."""
     fields = {name: line[name] for name in CutEntry.__dataclass_fields__ if name in line}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lobewatch.cuts.learning.next_speed import NextSpeed, NextSpeeds
 from lobewatch.machine.settings.requested_cut import CutSetting
-from lobewatch.show.cuts.recorded_cuts import observe_text
+from lobewatch.show.cuts.suggested_cuts import observe_text
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table
 
@@ -94,4 +94,4 @@ def _contradiction_lines(found: NextSpeeds) -> Iterator[str]:
     if found.contradicting:
         speeds = ", ".join(dict.fromkeys(format_rpm(round(cut.speed_rpm)) for cut in found.contradicting))
         count = count_noun(len(found.contradicting), "cut")
-        yield f"Not counted: {count} at {speeds} rpm, contradicted by a later cut."
+        yield f"Not counted: {count} at {speeds} rpm, contradicted by a cut that chattered."

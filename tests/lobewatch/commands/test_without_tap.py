@@ -220,6 +220,15 @@ def test_a_cut_of_another_kind_proves_nothing(untapped: Shop, more: str) -> None
     assert check(untapped)["verdict"] == "doubtful"
 
 
+def test_a_cut_with_other_coefficients_proves_nothing(untapped: Shop) -> None:
+    assert run("observe", untapped.path, "--program", "A", "--stable").exit_code == 0
+    assert check(untapped)["verdict"] == "stable"
+    untapped.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 2500")
+    assert check(untapped)["verdict"] == "doubtful"
+    after = json.loads(run("suggest", untapped.path, "--program", "A", "--json").stdout)
+    assert after["next_reason"] == "no-verdict"
+
+
 def test_a_stable_cut_after_chatter_leaves_the_program_doubtful(untapped: Shop) -> None:
     for word in ("--chatter", "--stable"):
         assert run("observe", untapped.path, "--program", "A", word).exit_code == 0

@@ -21,7 +21,7 @@ import soundfile
 from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.readers.read_audio import decode_audio
-from lobewatch.cuts.learning.heard_recording import ASSUMED_RANGE
+from lobewatch.logbook.heard_cuts import ASSUMED_RANGE
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer, RecordingServer, phone_page, uploaded_recording
 

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lobewatch.cuts.chatter_detection import earlier_air
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple, find_ripple_peaks, is_ringing, least_chatter_energy
 from lobewatch.cuts.chatter_detection.peak_classification import classify_peaks, find_other_teeth
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum, find_separate_peaks
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 from lobewatch.cuts.chatter_detection.window_evaluation import compare_with_stable
+from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
 
 Floats = NDArray[np.float64]
 RATE, TURN, TEETH = 6400.0, 8000 / 60, 4
@@ -181,9 +183,37 @@ def test_a_line_that_is_as_loud_in_the_stable_windows_makes_no_part_chatter() ->
     stable = [window._replace(verdict="stable", chatter=None) for window in windows[1:]]
     compared = compare_with_stable(np.atleast_2d(signal), RATE, [windows[0], *stable])
     assert [window.verdict for window in compared] == ["cannot tell", "stable", "stable"]
+    assert compared[0].reason == "unexplained-tone"
+    assert compared[0].tone == pytest.approx(1760.0, abs=1.0)
     louder = np.atleast_2d(recording(6.0, add=chatter(0.1, 2.5)))
     compared = compare_with_stable(louder, RATE, [windows[0], *stable])
     assert [window.verdict for window in compared] == ["chatter", "stable", "stable"]
+
+
+@pytest.mark.parametrize(("begin", "verdict"), [(0.5, "chatter"), (9.0, "stable")])
+def test_a_recording_of_nothing_but_a_cut_is_evaluated_in_all_its_parts(begin: float, verdict: str) -> None:
+    cut = recording(6.0, add=chatter(begin, begin + 1.5))[round(AIR * RATE) : -round(AIR * RATE)]
+    unknown = CutEvaluation("cannot tell", "no-cut")
+    (heard,) = evaluate_without_air(CutRecording(cut, RATE, TEETH, 0.5, 8010.0), [unknown])
+    assert heard.verdict == verdict
+    assert heard.part_verdicts[-1].verdict == "stable"
+    assert heard.part_verdicts[-1].to_s == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize("seconds", [0.5, 8.0])
+def test_air_of_another_microphone_position_gets_the_noise_of_the_recording(
+    monkeypatch: pytest.MonkeyPatch, seconds: float
+) -> None:
+    random, made = np.random.default_rng(0), list[CutRecording]()
+
+    def keep(recording: CutRecording) -> list[CutEvaluation]:
+        made.append(recording)
+        return []
+
+    monkeypatch.setattr(earlier_air, "evaluate_recording", keep)
+    air, noise = random.normal(size=(1, round(seconds * RATE))), 5.0 * random.normal(size=round(2 * RATE))
+    earlier_air.evaluate_with_air(CutRecording(noise, RATE, TEETH, 0.5, 8010.0), air, is_calibrated=False)
+    assert np.std(made[0].signal[0, : air.shape[1]]) == pytest.approx(5.0, rel=0.1)
 
 
 def test_a_mode_that_rings_after_each_rib_is_not_steady_like_chatter() -> None:

@@ -1,0 +1,203 @@
+"""Show the next test cut, the depths already cut in each pocket, and the values learned from test cuts."""
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rich.table import Table
+
+from acquisition import Remark, merge_remarks
+from acquisition.errors import join_sentences
+from lobewatch.cuts.learning.pocket_depth import MAX_POCKET_CUTS, PocketDepth
+from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
+from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
+from lobewatch.cuts.learning.suggestion import Suggestion
+from lobewatch.machine import ProgramTable
+from lobewatch.show.programs.advice import format_rpm
+from lobewatch.show.programs.verdicts import chance_text, factor_text
+from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
+from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
+
+
+def _round_to_mm(depth: float) -> float:
+    return round(1e3 * depth, 4)
+
+
+def _known_mm(depth: float) -> float | None:
+    return _round_to_mm(depth) if depth and math.isfinite(depth) else None
+
+
+def speed_pocket_json(pocket: SpeedPocket) -> JsonObject:
+    """Return one pocket of unknown depth."""
+    return {**pick(pocket, "speed_rpm", "window_rpm"), "depth_mm": None, "over_lowest_limit": pocket.gain}
+
+
+def speed_pocket_table(pockets: Sequence[SpeedPocket]) -> Table:
+    """Return a table with a line for each pocket."""
+    table = new_table("speed (rpm)", "stable (rpm)", "limit / lowest limit")
+    for pocket in pockets:
+        low, high = math.ceil(pocket.window_rpm[0]), math.floor(pocket.window_rpm[1])
+        gain = f"{pocket.gain:.1f}" if pocket.gain < MAX_POCKET_GAIN else f"{MAX_POCKET_GAIN:g} or more"
+        table.add_row(format_rpm(round(pocket.speed_rpm)), f"{format_rpm(low)}..{format_rpm(high)}", gain)
+    return table
+
+
+def speed_pockets_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> JsonObject:
+    """Return the stable pockets of a cut, and the remarks on their unknown depth."""
+    return {"cut": cut, "pockets": list(map(speed_pocket_json, pockets)), "remarks": merge_remarks(remarks)}
+
+
+def speed_pockets_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> Texts:
+    """Return the stable pockets of a cut as a table, and the remarks on their unknown depth."""
+    heading = f"{cut}: stable pockets from frequency and damping, highest removal rate first"
+    return [heading, speed_pocket_table(pockets), *remark_lines(remarks)]
+
+
+def tried_depths_json(table: ProgramTable, depths: Sequence[PocketDepth], first: float) -> JsonObject:
+    """Return the next test cut, and the depths already cut in each pocket; first: depth of the first cut (m)."""
+    following = _next_depth(depths, first)
+    return {
+        "program": table.name,
+        "suggested": following and {"speed_rpm": following[0], "depth_mm": _round_to_mm(following[1])},
+        "pockets": [
+            {
+                **speed_pocket_json(tried.pocket),
+                "cut_at_rpm": tried.speed_rpm,
+                "cuts": [cut.id for cut in tried.cuts],
+                "heard_stable_mm": _known_mm(tried.stable_depth),
+                "heard_chatter_mm": _known_mm(tried.chatter_depth),
+            }
+            for tried in depths
+        ],
+    }
+
+
+def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first: float, folder: Path) -> Iterator[str]:
+    """Return the next test cut, and the depths that were stable; first: depth of the first cut (m)."""
+    following = _next_depth(depths, first)
+    if following is not None:
+        speed, depth = following
+        number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the nearest pocket"
+        yield f"{table.name}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm ({number})"
+        yield observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
+    stable = [tried for tried in depths if tried.stable_depth]
+    for tried in stable:
+        chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
+        place = f"{_round_to_mm(tried.stable_depth):g} mm at {format_rpm(tried.speed_rpm)} rpm"
+        yield f"Recommended after {count_noun(len(tried.cuts), 'cut')}: {place}, stable{chatter}"
+    if not stable:
+        yield "No recommended depth yet: no test cut in a pocket was stable"
+
+
+def observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
+    """Return the command that enters the result of a test cut."""
+    observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
+    return f"Enter the result: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+
+
+def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, float] | None:
+    """Return speed (rpm) and depth (m) of the next cut, in the nearest pocket; None if all are done."""
+    wanted = depths[0].next_depth(first) if depths else None
+    return None if wanted is None else (depths[0].speed_rpm, wanted)
+
+
+def suggestion_json(next_cut: NextCut) -> JsonObject:
+    """Return the next test cut, and the result of those so far."""
+    learning, best, cut = next_cut.learning, _best_stable_cut(next_cut.learning), next_cut.suggestion
+    suggested = cut and {
+        "speed_rpm": cut.speed_rpm,
+        "depth_mm": round(1e3 * cut.depth, 6),
+        "chance_of_chatter": cut.chatter_probability,
+        "expected_gain": cut.gain,
+        "settles": cut.most_informative,
+        "repeats": cut.repeats or None,
+    }
+    return {
+        "program": learning.program.name,
+        "suggested": suggested,
+        "cuts_made": len(learning.own_cuts),
+        "cuts_left": next_cut.cuts_left,
+        "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
+        "learnt": learned_json(learning),
+    }
+
+
+def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
+    """Return the next test cut, how to enter it, and the best stable cut so far."""
+    learning, cut = next_cut.learning, next_cut.suggestion
+    program, n_made = learning.program, len(learning.own_cuts)
+    if cut is None:
+        yield f"{program.name}: {_no_suggestion_text(next_cut)}"
+    else:
+        depth = f"{1e3 * cut.depth:.4g}"
+        number = f"test cut {n_made + 1} of {n_made + next_cut.cuts_left}"
+        yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm ({number})"
+        risk = chance_text(cut.chatter_probability)
+        yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, learning)}"
+        yield observe_text(folder, program.name, cut.speed_rpm, depth)
+        if program.feed_per_tooth_mm is not None:
+            yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."
+    best = _best_stable_cut(learning)
+    if best is not None:
+        gain = f", expected gain of the next test cut {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
+        yield f"Best stable test cut: {1e3 * best[1]:.4g} mm at {format_rpm(best[0])} rpm{gain}"
+    yield "A test cut may chatter. For safe settings run lobewatch check."
+
+
+def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
+    if cut.repeats:
+        is_accepted = cut.repeats in [made.id for made in learning.accepted_cuts]
+        return f"the cut repeats {cut.repeats}, which {'may be wrong' if is_accepted else 'contradicts the other cuts'}"
+    return f"the cut determines mostly {factor_text(cut.most_informative)}"
+
+
+def _no_suggestion_text(next_cut: NextCut) -> str:
+    if not next_cut.cuts_left:
+        finding = f"all {len(next_cut.learning.own_cuts)} test cuts are done"
+        return join_sentences(finding, "Give a larger --cuts for more test cuts")
+    if next_cut.cut_range.is_empty:
+        return join_sentences(f"no test cut is possible in {next_cut.cut_range.text}", "Choose another tool")
+    return "no further test cut, because another test cut would gain nothing"
+
+
+def _best_stable_cut(learning: LearningResult) -> tuple[float, float] | None:
+    """Return speed (rpm) and depth (m) of the stable cut with the largest removal rate; None without a stable cut."""
+    accepted = [cut for cut in learning.own_cuts if cut not in learning.rejected_cuts]
+    stable = [(cut.speed_rpm, cut.depth) for cut in accepted if not cut.has_chatter]
+    return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
+
+
+def learned_json(learning: LearningResult) -> JsonObject:
+    """Return factors on values not rotating (Kt and Kr/Kt: on machine.toml), before and after the test cuts."""
+    before, posterior = learning.prior.intervals, learning.posterior
+    factors = {name: {**now._asdict(), "before": before[name]._asdict()} for name, now in posterior.intervals.items()}
+    return {
+        "cuts": [cut.id for cut in learning.accepted_cuts],
+        "chatter_frequencies": posterior.n_frequencies,
+        "frequency_learnt": bool(posterior.n_frequencies),
+        "effective_sample_size": posterior.effective_size,
+        "factors": factors,
+    }
+
+
+def learned_texts(learning: LearningResult) -> Texts:
+    """Return a table of the factors learned from test cuts; empty without test cuts."""
+    headings = "~ratio, rotating / not rotating", "before (95 %)", "learned (95 %)"
+    count, table = len(learning.accepted_cuts), new_table(*headings)
+    for name, interval in learning.posterior.intervals.items():
+        both = learning.prior.intervals[name], interval
+        before, after = (f"{value.mean:.3f} ({value.low:.3f}..{value.high:.3f})" for value in both)
+        is_open = name.startswith("frequency") and not learning.posterior.n_frequencies
+        table.add_row(factor_text(name), before, "not learned" if is_open else after)
+    return [f"Learned from {count_noun(count, 'test cut')}:", table] if count else []
+
+
+def learned_remarks(learning: LearningResult) -> Iterator[Remark]:
+    """Return remarks on rejected cuts, and on factors that the cuts do not determine."""
+    yield from inconsistent_cut_remarks(learning.posterior, learning.inconsistent_cuts, learning.program.name)
+    if learning.accepted_cuts and not learning.posterior.n_frequencies:
+        text = "frequency not learned: no cut with a chatter frequency yet"
+        yield Remark(
+            "frequency-not-learnt", learning.program.name, text, "Give --frequency with the next test cut that chatters"
+        )

@@ -68,9 +68,12 @@ def _remaining_preload(measurement: Measurement, logbook: Logbook) -> RemainingP
 
 
 def _proven_preload_texts(measurement: Measurement, logbook: Logbook) -> list[str]:
-    """Return the remaining preload if the drop of the frequency is proven."""
-    history, preload = _history_until(measurement, logbook), _remaining_preload(measurement, logbook)
-    return [str(preload)] if history is not None and preload is not None and history.drop.is_proven else []
+    """Return the remaining preload if a change of the frequency is proven."""
+    history = _history_until(measurement, logbook)
+    if history is None or history.frequency.trend is None or not history.frequency.trend.is_change_proven:
+        return []
+    preload = estimate_preload(history, logbook.machine)
+    return [] if preload is None else [str(preload)]
 
 
 def _history_until(measurement: Measurement, logbook: Logbook) -> SeriesHistory | None:

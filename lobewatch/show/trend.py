@@ -92,7 +92,7 @@ def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: Remaini
     """Return chart, facts and forecast dates of a series, the change of the other series, and the next step."""
     if series.trend is None:
         return [f"{series.name}: no tap test yet to compare later tests with"]
-    facts = [*_trend_facts(series), *preload_texts(series, preload)]
+    facts = [*_trend_facts(series), *([] if preload is None else [str(preload)])]
     texts: Texts = [*chart_lines(series.trend), f"{series.name}:", *wrap_lines(facts)]
     texts += [
         f"{other.name}: {change_since_start_text(other)}" for other in outlook.status.series if other is not series
@@ -168,11 +168,6 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
     kind = trend_text(series) if series.is_change_proven else ""
     now = ", ".join(filter(None, (kind, rate_text(trend))))
     return [change, *interval, now, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
-
-
-def preload_texts(series: SeriesStatus, preload: RemainingPreload | None) -> list[str]:
-    """Return the remaining preload of a series with a proven change."""
-    return [str(preload)] if preload is not None and series.is_change_proven else []
 
 
 def rate_text(trend: Trend) -> str:

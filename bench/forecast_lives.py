@@ -67,6 +67,7 @@ def bearing_cases(path: str, column: int, tests: int) -> Iterator[Case]:
 
 
 def main(engines: str, bearing: str) -> None:
+    """Print the shares of each record."""
     studies = {
         "engines, every 5 cycles": engine_cases(engines, 5),
         "engines, every 10 cycles": engine_cases(engines, 10),

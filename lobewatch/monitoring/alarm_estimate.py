@@ -1,4 +1,4 @@
-"""Kind, beginning and size of a drop, as all points of its series tell.
+"""Kind, beginning and size of a drop, estimated from all points of its series.
 
 A mixture of shapes, weighted as in a forecast: by the residual sum of squares and the number of shapes of a kind
 (Raftery 1995, "Bayesian model selection in social research"). Each shape has at most two dates, at each of which the
@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from lobewatch.arrays import Flags, Floats, Indices
-from lobewatch.monitoring.forecast import average_neighbors, average_readings, mixture_quantile
+from lobewatch.monitoring.forecast import INTERVAL_QUANTILES, average_neighbors, average_readings, mixture_quantile
 from lobewatch.monitoring.level_model import LevelModel, build_level_model
 from lobewatch.monitoring.series_points import Readings
 
@@ -34,7 +34,7 @@ class SeriesChange(NamedTuple):
 
 
 ChangePart = Literal["level", "rate", "both"]
-"""What changes at a date."""
+"""Part of a trend that changes at a date: its level, its rate, or both."""
 
 
 class DropFamily(NamedTuple):
@@ -45,7 +45,7 @@ class DropFamily(NamedTuple):
     odds: float
     """Prior odds; chosen so that intervals hold the size and kinds are right."""
     parts: tuple[ChangePart, ...]
-    """What changes at each of its dates."""
+    """Part that changes at each date, earliest first."""
 
 
 DROP_FAMILIES = (
@@ -70,8 +70,6 @@ N_YOUNG_POINTS = 12
 """Number of points since the beginning below which a drop is young; chosen."""
 NEGLIGIBLE_WEIGHT = 1e-4
 """Weight relative to that of the heaviest shape below which a shape is left out; chosen."""
-SIZE_QUANTILES = (0.025, 0.975)
-"""Quantiles of the 95 % interval of a size."""
 
 
 class _ShapeFits(NamedTuple):
@@ -96,7 +94,7 @@ def estimate_drop(readings: Readings) -> SeriesChange:
     Parameters
     ----------
     readings
-        Series (%) with an alarm, of four points or more. Many points are averaged with their neighbours.
+        Series (%) with an alarm, of five points or more. Many points are averaged with their neighbours.
 
     Returns
     -------
@@ -113,7 +111,7 @@ def estimate_drop(readings: Readings) -> SeriesChange:
     family_weight = np.bincount(fit.family, weight, len(DROP_FAMILIES))
     family = int(np.argmax(family_weight))
     best = int(np.argmax(np.where(fit.family == family, weight, 0.0)))
-    low, high = (mixture_quantile(weight, fit.size, fit.error, fit.freedom, p) for p in SIZE_QUANTILES)
+    low, high = (mixture_quantile(weight, fit.size, fit.error, fit.freedom, p) for p in INTERVAL_QUANTILES)
     first = np.array_split(number, days.size)[fit.point[best]][0]
     kind: ChangeKind = "slope" if fit.accelerates[best] else DROP_FAMILIES[family].kind
     rivals = [i for i, other in enumerate(DROP_FAMILIES) if other.kind in PURE_KINDS and other.kind != kind]
@@ -146,5 +144,5 @@ def _list_places(parts: tuple[ChangePart, ...], n: int) -> Iterator[tuple[int, .
 def _build_columns(days: Floats, points: Indices, part: ChangePart) -> Floats:
     """Build the columns of a change at points (j,), shape (j, 1, n) or (j, 2, n)."""
     away = days - days[points, np.newaxis]
-    level, rate = (away >= 0).astype(np.float64), np.maximum(away, 0.0)
+    level, rate = (np.arange(days.size) >= points[:, np.newaxis]).astype(np.float64), np.maximum(away, 0.0)
     return np.stack({"level": [level], "rate": [rate], "both": [level, rate]}[part], axis=1)

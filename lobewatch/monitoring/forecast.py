@@ -30,8 +30,8 @@ MAX_FITTED_POINTS = 120
 """Largest number of fitted points; more points are averaged with their neighbors; chosen."""
 NEGLIGIBLE_PROBABILITY = 1e-12
 """Probability that counts as zero."""
-RATE_QUANTILES = (0.025, 0.975)
-"""Quantiles of the 95 % interval of a rate."""
+INTERVAL_QUANTILES = (0.025, 0.975)
+"""Quantiles of the 95 % interval of a rate or a drop."""
 QUANTILE_HALVINGS = 30
 """Number of halvings in the search for a quantile of a mixture."""
 FAN_HALVINGS = 30
@@ -176,7 +176,7 @@ class PastFit(NamedTuple):
     def rate(self) -> Rate:
         """Rate of change at its last point."""
         rate, error = (np.concatenate(rates) for rates in zip(*(f.rate() for f in self.families), strict=True))
-        low, high = (mixture_quantile(self.weight, rate, error, self.freedom, p) for p in RATE_QUANTILES)
+        low, high = (mixture_quantile(self.weight, rate, error, self.freedom, p) for p in INTERVAL_QUANTILES)
         return Rate(float(self.weight @ rate), low, high)
 
 

@@ -176,7 +176,7 @@ class LevelModel:
 
     @property
     def residual_squares(self) -> float:
-        """Residual sum of squares of the level model for all points, with the smallest scatter at least."""
+        """Residual sum of squares of the level model for all points, at least that of the smallest scatter."""
         squares = self.y @ (self.y - self.columns @ (self.inverse_normal_matrix @ self.columns.T @ self.y))
         return max(float(squares), MIN_POINT_VARIANCE * self.y.size)
 

@@ -69,7 +69,7 @@ def _first_test_remarks(name: str, history: ValueHistory, path: Path | str) -> I
     if history.trend is not None and history.trend.drop_model.first_distance:
         model, folder = history.trend.drop_model, shlex.quote(str(path))
         texts = {"tap_id": history.first_row_of(model.first_outlier).tap_id, "folder": folder}
-        calls = {name: call.format(**texts) for name, call in rules.OUTLIER_CALLS.items()}
+        calls = {key: call.format(**texts) for key, call in rules.OUTLIER_CALLS.items()}
         side, distance = "above" if model.first_distance > 0 else "below", abs(model.first_distance)
         yield rules.FIRST_TEST_DIFFERS.remark(name, distance=distance, side=side, **texts, **calls)
 
@@ -142,9 +142,8 @@ class SeriesStatus:
 
     @property
     def is_change_proven(self) -> bool:
-        """True if the frequency has changed for certain: an open alarm, a rise, or two points that prove a drop."""
-        trend = self.trend
-        return trend is not None and bool(trend.open_drop or trend.detection.rise or trend.is_drop_proven)
+        """True if the frequency has changed for certain."""
+        return self.trend is not None and self.trend.is_change_proven
 
     @property
     def is_baseline(self) -> bool:

@@ -15,7 +15,7 @@ MIN_CHECKED_POINTS = 20
 CORRELATION_SCORE = 2.33
 """Correlation over its standard deviation from which it is certain: chance of 1 in 100."""
 N_LINE_COLUMNS = 2
-"""Number of coefficients of a line, which lower the expected correlation of what it leaves."""
+"""Number of coefficients of a line, which lower the expected correlation of its residuals."""
 MIN_GROUP_SHARE = 0.2
 """Smallest share of the points in each of two groups; chosen. Fewer are outliers, such as bad clampings."""
 GROUP_SHARE = 2 / math.pi, 0.86
@@ -34,7 +34,7 @@ class ScatterCheck(NamedTuple):
     is_correlated: bool
     """True if that is certain."""
     group_distance: float
-    """Distance of two groups of points, as of two operators that nobody declared (%); 0 without groups."""
+    """Distance of two groups of points (%), for example of two undeclared operators; 0 without groups."""
 
     @property
     def is_independent(self) -> bool:
@@ -52,7 +52,7 @@ class ScatterCheck(NamedTuple):
 def check_scatter(percents: Floats, past: PastFit | None, *, has_changed: bool) -> ScatterCheck | None:
     """Check the points (n,) of a series at the mean conditions; None below 20 points.
 
-    has_changed: True for a series with a certain change, which more than a line is fitted to. That takes out most
+    has_changed: True for a series with a certain change. Its shapes are fitted instead of a line, which removes most
     of the correlation of short series.
     """
     n = percents.size
@@ -67,7 +67,7 @@ def check_scatter(percents: Floats, past: PastFit | None, *, has_changed: bool) 
 
 
 def _correlate_neighbors(left: Floats) -> float:
-    """Return the correlation of neighbours of what the line leaves (n,), which two outliers alone do not make."""
+    """Return the correlation of neighbouring residuals (n,), clipped so that two outliers do not cause one."""
     limit = MAX_OUTLIER_DISTANCE * MAD_TO_STD * float(np.median(np.abs(left - np.median(left))))
     near = np.clip(left, -limit, limit)
     near -= near.mean()
@@ -88,7 +88,7 @@ def _fit_without_walks(past: PastFit) -> Floats | None:
 
 
 def _find_groups(left: Floats) -> float:
-    """Return the distance of two groups of what the line leaves (n,), with mean 0; 0 without certain groups."""
+    """Return the distance of two groups of residuals (n,) with mean 0; 0 without certain groups."""
     values, n = np.sort(left), left.size
     low = np.arange(1, n)
     sums = np.cumsum(values)[low - 1]

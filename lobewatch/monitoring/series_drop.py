@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats
+from lobewatch.monitoring.change_detection import SURE_CHANGE_SCORE
 from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS, PastFit
 from lobewatch.monitoring.level_model import (
     MIN_SCATTER,
@@ -24,7 +25,6 @@ from lobewatch.monitoring.level_model import (
 from lobewatch.monitoring.series_points import (
     CONFIRMED_DISTANCE_SHARE,
     MIN_CLAMPING_ERROR,
-    NO_SCATTER_PRIOR,
     Readings,
     ScatterPrior,
 )
@@ -38,8 +38,6 @@ N_SCATTERS = 48
 """Number of scatters of a posterior."""
 INTERVAL_PROBABILITY = 0.95
 """Probability of the stated interval."""
-PROVEN_DROP_SCORE = 3.3
-"""Score from which a drop is a finding, as that of the alarm."""
 N_START_POINTS = 3
 """Number of first points that define the start of a series without a fitted line; chosen."""
 HIGHEST_SQUARE = 1.0, 1.0, 1 + math.sqrt(3) / (2 * math.pi)
@@ -60,15 +58,16 @@ class ScatterPosterior(NamedTuple):
     """Probability of each, sum 1, shape (s,)."""
 
     @classmethod
-    def of(cls, squares: float, freedom: float, known: ScatterPrior = NO_SCATTER_PRIOR, highest: float = 0.0) -> Self:
-        """Return the posterior of a sum of squares (%^2) with degrees of freedom, and of a prior.
-
-        highest: largest scatter (%) of a series without a prior; 0 where the points alone tell.
-        """
+    def measured(cls, squares: float, freedom: float, known: ScatterPrior) -> Self:
+        """Return the posterior of a sum of squares (%^2) with degrees of freedom, pooled with those of a prior."""
         squares, freedom = squares + known.freedom * known.percent**2, freedom + known.freedom
-        middle = math.sqrt(squares / freedom) if freedom else 0.0
-        low, high = (max(end * max(middle, MIN_SCATTER), MIN_SCATTER) for end in MEASURED_SCATTER_RANGE)
-        low, high = (USUAL_SCATTER[0], highest) if highest and not known.freedom else (low, high)
+        middle = max(math.sqrt(squares / freedom), MIN_SCATTER)
+        low, high = (max(end * middle, MIN_SCATTER) for end in MEASURED_SCATTER_RANGE)
+        return cls.between(low, high, squares, freedom)
+
+    @classmethod
+    def between(cls, low: float, high: float, squares: float, freedom: float) -> Self:
+        """Return the posterior of a sum of squares (%^2) with degrees of freedom, in a range of scatters (%)."""
         scatter = np.geomspace(low, high, N_SCATTERS)
         log = -freedom * np.log(scatter) - squares / (2 * scatter**2)
         weight = np.exp(log - log.max())
@@ -188,10 +187,10 @@ class DropModel:
         lever = 1 + self.start_variance + self.effects.at(temperature, operator)[1]
         alone = math.hypot(self.start_error, np.nan_to_num(error) if self.is_short else 0.0)
         ratio, change = 1 - value / 100, abs(100 * math.log1p(-value / 100))
-        doubt = abs(self.first_distance)
-        std = ratio * math.hypot(math.sqrt(lever) * self.scatter.percent, alone, doubt / 2)
-        is_proven = self.scatter.tail(change - doubt, lever, alone) < scipy.special.ndtr(-PROVEN_DROP_SCORE)
-        return SeriesDrop(value, std, ratio * (self.scatter.half_width(lever, alone) + doubt), bool(is_proven))
+        gap = abs(self.first_distance)
+        std = ratio * math.hypot(math.sqrt(lever) * self.scatter.percent, alone, gap / 2)
+        is_proven = self.scatter.tail(change - gap, lever, alone) < scipy.special.ndtr(-SURE_CHANGE_SCORE)
+        return SeriesDrop(value, std, ratio * (self.scatter.half_width(lever, alone) + gap), bool(is_proven))
 
     def std(self, error: float) -> float:
         """Return the standard error of one value with reclamping (%); error: from its tap test alone."""
@@ -214,11 +213,15 @@ def _model_short_series(readings: Readings, errors: Floats) -> DropModel:
     seen = {*readings.operators[:N_START_POINTS], *readings.operators[-1:]}
     apart = 1 + OPERATOR_SPREAD**2 if len(seen) > 1 else 1.0
     squares, known = float(np.sum((y - y.mean()) ** 2)), readings.scatter_prior.single
-    scatter = ScatterPosterior.of(squares, y.size - 1.0, known, math.sqrt(apart) * USUAL_SCATTER[1])
+    if known.freedom:
+        scatter = ScatterPosterior.measured(squares, y.size - 1.0, known)
+    else:
+        low, high = USUAL_SCATTER
+        scatter = ScatterPosterior.between(low, math.sqrt(apart) * high, squares, y.size - 1.0)
     at = int(np.argmax(first))
     error = float(np.nan_to_num(errors[at]))
-    doubt, variance = _measure_distance_alone(y, at), HIGHEST_SQUARE[first.size - 1]
-    return DropModel(float(first[at]), variance, error, scatter, NO_EFFECTS, doubt, at, is_short=True)
+    distance, variance = _measure_distance_alone(y, at), HIGHEST_SQUARE[first.size - 1]
+    return DropModel(float(first[at]), variance, error, scatter, NO_EFFECTS, distance, at, is_short=True)
 
 
 def _measure_distance_alone(y: Floats, at: int) -> float:
@@ -241,12 +244,12 @@ def _model_fitted_series(readings: Readings, past: PastFit) -> DropModel:
     alone = LevelModel(base.y, base.newest, kept, base.n_temperature_columns).inverse_normal_matrix[0, 0]
     of_operators = float(base.inverse_normal_matrix[0, 0] - alone)
     lever = max(variance / spread**2 - of_operators, 1 / base.y.size)
-    scatter = ScatterPosterior.of(freedom * spread**2, freedom, readings.scatter_prior.single)
+    scatter = ScatterPosterior.measured(freedom * spread**2, freedom, readings.scatter_prior.single)
     return DropModel(start + rest, lever, 0.0, scatter, effects, base.first_distance)
 
 
 def _fit_effects(base: LevelModel, readings: Readings, past: PastFit) -> tuple[ConditionEffects, float]:
-    """Fit the effects of the conditions to what the line leaves of its points, and return the mean of that too."""
+    """Fit the effects of the conditions to the residuals of the line, and return their mean, too."""
     columns, n_warm = base.columns[: past.n_fitted, 1:], base.n_temperature_columns
     left = (base.y + readings.y[0] - past.fitted)[: past.n_fitted]
     rest = float(left.mean())

@@ -302,11 +302,14 @@ MAX_PRELOAD_RATIO = 2.0
 def estimate_preload(series: SeriesHistory, machine: Machine) -> RemainingPreload | None:
     """Estimate the preload left in the bearings from the change of their stiffness; see dsm.remaining_preload.
 
-    None without that change, where one of the calibrated bearings has rollers, or where the range is too wide to say
-    anything.
+    None until a change of the frequency is proven, where one of the calibrated bearings has rollers, or where the
+    range is too wide to say anything.
     """
+    trend = series.frequency.trend
+    if machine.spindle is None or trend is None or not trend.is_change_proven:
+        return None
     change = compare_bearings(series, machine)
-    if machine.spindle is None or change is None:
+    if change is None:
         return None
     calibrated = [bearing for bearing in machine.spindle.build().bearings if bearing.group]
     left = remaining_preload(calibrated, change.low / change.start, change.high / change.start)

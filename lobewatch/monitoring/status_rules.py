@@ -1,6 +1,6 @@
 """Status of a machine by remark code, in order of severity, remarks by date, and alarms.
 
-Imported with every look at a plant, so without numpy.
+Imported with every look at a fleet, so without numpy.
 """
 
 import math

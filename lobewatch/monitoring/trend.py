@@ -164,6 +164,11 @@ class Trend:
         return len(last) > 1 and all(one.is_proven and one.value * last[-1].value > 0 for one in last)
 
     @property
+    def is_change_proven(self) -> bool:
+        """True if the value has changed for certain: an open alarm, a rise, or two points that prove a drop."""
+        return bool(self.open_drop or self.detection.rise or self.is_drop_proven)
+
+    @property
     def has_certain_shape(self) -> bool:
         """True if a steady series has a weight of at most 5 %, so that a shape and its beginning can be stated."""
         past = self.past_fit
@@ -219,7 +224,7 @@ class Trend:
     def is_run_in(self) -> bool:
         """True if the open drop began among the first points and has slowed down, as of bearings that run in.
 
-        A crash never does: it is over at once.
+        A sudden drop does not: it is over at once.
         """
         if self.past_fit is None or self.open_drop is None or self.open_drop.change.point >= MIN_FORECAST_POINTS:
             return False
@@ -239,8 +244,8 @@ def fit_trend(
 ) -> Trend:
     """Fit the trend of a series of taps, oldest first, with at least one value.
 
-    now: its day tells whether that is too long ago for a forecast; other: of the other direction, also; known:
-    what is known of its scatter beforehand.
+    now: its day decides if the last point is too old for a forecast; other: taps of the other direction; known: prior
+    of the scatter.
     """
     points = list_newest_points(taps)
     percents, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))

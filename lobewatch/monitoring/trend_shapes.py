@@ -233,9 +233,9 @@ LEVEL_VARIANCES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 RATE_VARIANCES = (1.0, 10.0, 100.0, 1e3, 1e4)
 """Variances of a rate random walk (levels per span) over the span, relative to that of a point; chosen."""
 LATE_LEVEL_VARIANCES = (100.0, 1e3, 1e4, 1e5)
-"""The same for a level that is steady up to a later point: what happens from there on is larger; chosen."""
+"""Variances of a level random walk that begins at a later point, larger than from the first point on; chosen."""
 LATE_RATE_VARIANCES = (1e4, 1e5, 1e6, 1e7)
-"""The same for a rate that begins at a later point; chosen."""
+"""Variances of a rate random walk that begins at a later point; chosen."""
 
 
 class RandomWalkFits(NamedTuple):

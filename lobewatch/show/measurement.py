@@ -9,7 +9,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.measurement import Measurement, check_modes_together
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS, find_accepted_codes, format_not_asked
-from lobewatch.monitoring.series_history import SeriesHistory, build_series_history, estimate_preload
+from lobewatch.monitoring.series_history import build_series_history, estimate_preload
 from lobewatch.show.history import condition_texts
 from lobewatch.show.models import calibration_json
 from lobewatch.show.modes import grouped_remark_lines, mode_json, mode_table, sort_modes
@@ -50,7 +50,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
     if m.followed is not None:
         texts.append(f"followed mode: {m.followed.frequency:.2f} Hz")
     if m.calibration is not None:
-        texts += [str(m.calibration), *_proven_preload_texts(m, logbook)]
+        texts += [str(part) for part in (m.calibration, _remaining_preload(m, logbook)) if part is not None]
     assembly = logbook.assembly(until=m.tap_id)
     lobes = compute_lobes(assembly, logbook.machine).get(REFERENCE_CUT)
     if lobes is not None:
@@ -63,21 +63,11 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
 
 def _remaining_preload(measurement: Measurement, logbook: Logbook) -> RemainingPreload | None:
     """Compare the preload with that at the start of the series, as it was known at that time."""
-    history = _history_until(measurement, logbook)
-    return None if history is None else estimate_preload(history, logbook.machine)
-
-
-def _proven_preload_texts(measurement: Measurement, logbook: Logbook) -> list[str]:
-    """Return the remaining preload if the drop of the frequency is proven."""
-    history, preload = _history_until(measurement, logbook), _remaining_preload(measurement, logbook)
-    return [str(preload)] if history is not None and preload is not None and history.drop.is_proven else []
-
-
-def _history_until(measurement: Measurement, logbook: Logbook) -> SeriesHistory | None:
-    """Build the history of the series as it was known at a tap test; None if that does not belong to it."""
     series = logbook.history.series(measurement.tool, measurement.direction)
     rows = [row for row in series if row.time <= measurement.time]
-    return build_series_history(rows) if rows and rows[-1].tap_id == measurement.tap_id else None
+    if not rows or rows[-1].tap_id != measurement.tap_id:
+        return None
+    return estimate_preload(build_series_history(rows), logbook.machine)
 
 
 def _tap_conditions(m: Measurement, logbook: Logbook) -> Conditions:

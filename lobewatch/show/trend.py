@@ -18,7 +18,7 @@ from lobewatch.monitoring.forecast import MIN_FORECAST_POINTS
 from lobewatch.monitoring.threshold_dates import ThresholdDates, build_forecast_rows, date_of_days
 from lobewatch.monitoring.trend import Trend, days_since_epoch, point_days
 from lobewatch.monitoring.trend_shapes import TrendShape
-from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, format_csv, new_table
+from lobewatch.show.terminal.output import JsonObject, Texts, blank_nonfinite, count_noun, format_csv, new_table
 from lobewatch.show.terminal.sentences import capitalize, wrap_lines
 from lobewatch.show.terminal.status_labels import status_label
 
@@ -92,7 +92,7 @@ def trend_texts(outlook: MachineForecast, series: SeriesStatus, preload: Remaini
     """Return chart, facts and forecast dates of a series, the change of the other series, and the next step."""
     if series.trend is None:
         return [f"{series.name}: no tap test yet to compare later tests with"]
-    facts = [*_trend_facts(series), *preload_texts(series, preload)]
+    facts = [*_trend_facts(series), *([] if preload is None else [str(preload)])]
     texts: Texts = [*chart_lines(series.trend), f"{series.name}:", *wrap_lines(facts)]
     texts += [
         f"{other.name}: {change_since_start_text(other)}" for other in outlook.status.series if other is not series
@@ -116,20 +116,20 @@ def trend_remarks(outlook: MachineForecast) -> list[Remark]:
 
 def forecast_date_rows(outlook: MachineForecast) -> list[tuple[str, str, str]]:
     """Return when each program becomes doubtful and not stable, and when the fixed limits are reached."""
-    now, rows, asked = outlook.status.time, list[tuple[str, str, str]](), open_questions_text(outlook)
-    reason = {"unknown": asked} if asked else {}
+    now, rows, unknown = outlook.status.time, list[tuple[str, str, str]](), open_questions_text(outlook)
     for name, fate in outlook.programs.items():
-        dates = [reach_text(reach, now, **reason) for reach in (fate.doubtful, fate.not_stable)]
+        dates = [reach_text(reach, now, unknown) for reach in (fate.doubtful, fate.not_stable)]
         rows.append((name, *(("unknown, see lobewatch check",) * 2 if name in outlook.unknown_programs else dates)))
-    limits = [(f"-{percent:g} % (fixed limit)", reach_text(reach, now, **reason)) for percent, reach in outlook.limits]
+    limits = [(f"-{percent:g} % (fixed limit)", reach_text(reach, now, unknown)) for percent, reach in outlook.limits]
     return rows + [(name, "", text) for name, text in limits]
 
 
 def open_questions_text(outlook: MachineForecast) -> str:
-    """Return the number of tests with open questions in the series without a forecast; empty if there are none."""
+    """Return the number of tests with open questions in the series without a forecast; empty without any."""
     trends = [(series.history.frequency, series.trend) for series in outlook.status.series]
     asked = sum(int(one.has_questions.sum()) for one, trend in trends if trend is None or trend.forecast is None)
-    return f"unknown, {asked} tests with open questions do not count" if asked else ""
+    noun, verb = count_noun(asked, "test"), "does" if asked == 1 else "do"
+    return f"unknown, {noun} with open questions {verb} not count" if asked else ""
 
 
 def no_dates_text(outlook: MachineForecast) -> str:
@@ -168,11 +168,6 @@ def _trend_facts(series: SeriesStatus) -> list[str]:
     kind = trend_text(series) if series.is_change_proven else ""
     now = ", ".join(filter(None, (kind, rate_text(trend))))
     return [change, *interval, now, f"scatter of f1 {trend.spread:.2f} %, change score {score}"]
-
-
-def preload_texts(series: SeriesStatus, preload: RemainingPreload | None) -> list[str]:
-    """Return the remaining preload of a series with a proven change."""
-    return [str(preload)] if preload is not None and series.is_change_proven else []
 
 
 def rate_text(trend: Trend) -> str:
@@ -245,12 +240,12 @@ def _shape_text(shape: TrendShape, falls: bool) -> str:
     return words.get(shape.kind, f"{goes} {'faster and faster' if shape.accelerates else 'more and more slowly'}")
 
 
-def reach_text(reach: ThresholdDates, now: datetime, unknown: str = "history too short or too old") -> str:
-    """Return when a limit is reached in words; unknown: reason for no date."""
+def reach_text(reach: ThresholdDates, now: datetime, unknown: str = "") -> str:
+    """Return when a limit is reached in words; unknown: reason for no date other than a short or old history."""
     if reach.is_measured:
         return "already"
     if reach.forecast_end is None:
-        return unknown
+        return unknown or "history too short or too old"
     if reach.earliest is None:
         return f"not before {date_of_days(reach.forecast_end):%Y-%m}"
     today = days_since_epoch(now)

@@ -65,7 +65,7 @@ def _drop_columns(worst: SeriesSummary | None) -> JsonObject:
     interval, finding = worst.drop_interval, describe_drop(worst.drop, worst.drop_half_width, is_proven=worst.is_proven)
     columns: JsonObject = {"fall": worst.drop, "fall_std": worst.drop_std, "fall_interval": interval}
     columns |= {"is_change_proven": worst.is_proven, "series": worst.name, "points": worst.points}
-    return columns | {"change": change_cell(columns), "finding": finding}
+    return columns | {"change": _change_cell(columns), "finding": finding}
 
 
 def half_width_of(row: Mapping[str, Any]) -> float | None:
@@ -74,12 +74,16 @@ def half_width_of(row: Mapping[str, Any]) -> float | None:
     return None if low is None else (high - low) / 2
 
 
-def change_cell(row: Mapping[str, Any]) -> str:
+def has_comparison(row: Mapping[str, Any]) -> bool:
+    """Return whether a row has a drop from an earlier test."""
+    return row["fall"] is not None and half_width_of(row) != 0
+
+
+def _change_cell(row: Mapping[str, Any]) -> str:
     """Return the frequency change of a row in a table."""
-    if row["fall"] is None:
-        return ""
-    half_width = half_width_of(row)
-    return "first test" if half_width == 0 else format_change(row["fall"], half_width)
+    if has_comparison(row):
+        return format_change(row["fall"], half_width_of(row))
+    return "" if row["fall"] is None else "first test"
 
 
 def next_limit_text(limit: tuple[float, ThresholdDates] | None, now: datetime) -> str:
@@ -121,8 +125,7 @@ def due_text(days_left: float) -> str:
 
 def _fleet_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     light = f"{'early ' if row['is_early'] else ''}{status_name(row['light'])}"
-    change = change_cell(row)
-    drop = format_with_error(row["fall"], half_width_of(row)) if change.endswith("%") else change
+    drop = format_with_error(row["fall"], half_width_of(row)) if has_comparison(row) else row["change"]
     due, left = "", row["days_left"]
     if left is not None:
         last = f"{datetime.fromisoformat(row['last_tap']).astimezone():%Y-%m-%d}"

@@ -12,7 +12,7 @@ from lobewatch.monitoring.series_history import SeriesHistory, compare_bearings,
 from lobewatch.show.report.report_data import ReportData
 from lobewatch.show.report.section import DataTable, Paragraph, Section
 from lobewatch.show.terminal.sentences import capitalize
-from lobewatch.show.trend import INTERVAL_NOTE, preload_texts
+from lobewatch.show.trend import INTERVAL_NOTE
 
 CHANGE_VALUES = (
     ("damping_ratio", "damping ratio zeta (%)", 0.01),
@@ -34,7 +34,7 @@ def make_values(data: ReportData) -> list[Section]:
     if data.series.is_baseline:
         heads, rows, text = ["value", heads[2]], [[name, now] for name, _, now, _ in rows], ""
     preload = estimate_preload(history, data.machine)
-    left = "".join(f"{capitalize(text)}." for text in preload_texts(data.series, preload))
+    left = "" if preload is None else f"{capitalize(str(preload))}."
     parts = DataTable(heads, rows), Paragraph(text, is_small=True), Paragraph(left)
     return [Section("Measured values", parts, "folded")]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from lobewatch.logbook import Analysis, Logbook
 from lobewatch.monitoring.status_rules import StatusLevel
-from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, change_cell, due_text, half_width_of
+from lobewatch.show.fleet.fleet_status import FLEET_COLUMNS, due_text, half_width_of, has_comparison
 from lobewatch.show.report.page import make_gauge, render_page, write_page
 from lobewatch.show.report.report_data import ReportData, collect_report_data
 from lobewatch.show.report.section import NumberTable
@@ -100,16 +100,15 @@ def render_fleet(rows: Sequence[Mapping[str, Any]], name: str, now: datetime) ->
 
 def _machine_content(row: Mapping[str, Any]) -> JsonObject:
     """Return a machine for the template."""
-    left, last, change = row["days_left"], row["last_tap"], change_cell(row)
+    left, last, limits = row["days_left"], row["last_tap"], row["limits"]
     due = "never tapped" if left is None else due_text(left)
-    warn, alarm = row["limits"][:2] or (math.nan, math.nan)
-    is_good, has_changed = row["light"] is StatusLevel.GOOD, change.endswith("%")
+    is_good, has_gauge = row["light"] is StatusLevel.GOOD, limits and has_comparison(row)
     return {
         **row,
         "kind": status_css_class(row["light"], row["is_early"]),
         "reasons": row["reasons"] or ["no finding" if is_good else "-"],
-        "change": change or "first test",
-        "gauge": make_gauge(row["fall"], warn, alarm, half_width_of(row)) if has_changed else None,
+        "change": row["change"] or "first test",
+        "gauge": make_gauge(row["fall"], limits[0], limits[1], half_width_of(row)) if has_gauge else None,
         "spark": spark_points(row["points"]),
         "programs": program_lines(row["programs"]),
         "due": f"tap test {due}, last {last.partition('T')[0]}" if last else due,

@@ -303,6 +303,16 @@ def test_nothing_is_reported_of_preload_where_the_scatter_is_unknown(shop: Shop)
     assert "preload" not in printed_of(shop, newest)
 
 
+def test_nothing_is_reported_of_preload_without_a_proven_change(shop: Shop) -> None:
+    shares = 1 + np.tile([5e-4, -5e-4], 5)
+    newest = [shop.tap(30 * i, 1713.0 * share) for i, share in enumerate(shares.tolist())][-1]
+    assert not shop.logbook.status().series[0].is_change_proven
+    assert preload_in_trend(shop) is None
+    logbook = shop.logbook
+    assert measurement_json(logbook.measurement(newest), logbook)["preload_left"] is None
+    assert "preload" not in printed_of(shop, newest)
+
+
 def test_nothing_is_reported_of_preload_where_the_bearings_are_not_felt(shop: Shop) -> None:
     """They raise f_1 to 2301 Hz at most."""
     shop.tap(0, 2297.0)

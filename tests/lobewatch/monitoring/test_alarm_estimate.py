@@ -74,6 +74,13 @@ def test_a_slope_is_one_over_days_and_not_over_points() -> None:
     assert found.size == pytest.approx(0.01 * (days[-1] - days[16]), abs=found.half_width)
 
 
+def test_a_step_between_points_of_one_date_is_found() -> None:
+    days = np.minimum(10.0 * np.arange(11), 60.0)
+    found = estimate_drop(Readings(SCATTER[:11] - 3.0 * (late(8, 11) >= 0), days=days))
+    assert found.size == pytest.approx(3.0, abs=found.half_width)
+    assert found.half_width < 0.3
+
+
 def test_many_points_are_averaged_and_the_beginning_is_that_of_the_series() -> None:
     y = np.tile(SCATTER, 9) - 1.0 * (np.arange(360) >= 180)
     found = estimate_drop(Readings(y))

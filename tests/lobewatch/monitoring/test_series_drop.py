@@ -15,7 +15,7 @@ from lobewatch.monitoring.drop_text import describe_drop, format_below_start, fo
 from lobewatch.monitoring.machine_status import scatter_remarks
 from lobewatch.monitoring.scatter_check import check_scatter
 from lobewatch.monitoring.series_drop import HIGHEST_SQUARE, ScatterPosterior, SeriesDrop
-from lobewatch.monitoring.series_points import NO_SERIES_PRIOR, ScatterPrior, SeriesScatterPrior
+from lobewatch.monitoring.series_points import NO_SCATTER_PRIOR, NO_SERIES_PRIOR, ScatterPrior, SeriesScatterPrior
 from lobewatch.monitoring.trend import TapValue, Trend, fit_trend
 
 Floats = NDArray[np.float64]
@@ -46,15 +46,15 @@ def newest_drop(trend: Trend) -> SeriesDrop:
 
 @pytest.mark.parametrize("freedom", [4.0, 8.0, 30.0])
 def test_a_measured_scatter_gives_the_interval_of_student(freedom: float) -> None:
-    found = ScatterPosterior.of(freedom * 0.2**2, freedom)
+    found = ScatterPosterior.measured(freedom * 0.2**2, freedom, NO_SCATTER_PRIOR)
     assert found.half_width(1.5) == pytest.approx(0.2 * np.sqrt(1.5) * students.ppf(0.975, freedom), rel=0.01)
     assert found.tail(0.5, 1.0, 0.0) == pytest.approx(students.sf(2.5, freedom), rel=0.05)
-    prior = ScatterPosterior.of(0.0, 0.0, ScatterPrior(0.2, freedom))
+    prior = ScatterPosterior.measured(0.0, 0.0, ScatterPrior(0.2, freedom))
     assert prior.half_width(1.5) == pytest.approx(found.half_width(1.5))
 
 
 def test_an_unknown_scatter_is_that_of_the_usual_range() -> None:
-    found = ScatterPosterior.of(0.0, 0.0, highest=0.6)
+    found = ScatterPosterior.between(0.05, 0.6, 0.0, 0.0)
     assert found.percent == pytest.approx(np.sqrt((0.6**2 - 0.05**2) / (2 * np.log(12))), rel=0.02)
     assert 1.96 * found.percent < found.half_width(1.0) < 1.96 * 0.6
 

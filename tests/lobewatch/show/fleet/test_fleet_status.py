@@ -42,6 +42,16 @@ def test_the_next_step_comes_before_a_short_list_of_reasons(shop: Shop) -> None:
     assert lines[-1].strip().startswith("2 ")
 
 
+def test_a_drop_without_limits_has_no_gauge(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    (row,) = fleet_rows(Fleet({"m": shop.path}).assess_machines(shop.start))
+    drop = {**row, "fall": 2.0, "fall_interval": (1.0, 3.0)}
+    assert 'class="gauge"' in render_fleet([drop], "plant", shop.start)
+    page = render_fleet([{**drop, "limits": []}], "plant", shop.start)
+    assert 'class="gauge"' not in page
+    assert "nan" not in page
+
+
 @pytest.mark.parametrize(
     ("fall", "half", "shown"), [(10.0642, 0.0803, "10.064 ± 0.080"), (0.0012, 0.00081, "0.00120 ± 0.00081")]
 )

@@ -62,13 +62,7 @@ class RecordingServer(WebServerThread):
         Parameters
         ----------
         options
-            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
-            free one. `token` for full access and `watch_token` for read-only access, by default random.
-
-        Raises
-        ------
-        ValueError
-            If a token does not fit into an address.
+            Address, port and tokens as in `ServerOptions`. ValueError for an invalid token.
         """
         super().__init__(**options)
         add_pages(self.application, {"/": "phone.html"})

@@ -18,7 +18,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
-from lobewatch.tap.cut_recording import record_cut, record_cuts
+from lobewatch.tap.cut_recording import record_cuts
 from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
 from lobewatch.tap.emulated_cut import emulate_cut
 
@@ -59,7 +59,7 @@ def sound(*parts: tuple[float, bool]) -> Floats:
 
 def record(stream: Stream, patience: float = 60.0) -> Any:
     told: list[str] = []
-    return record_cut(stream, 0.005, patience, told.append), told  # type: ignore[arg-type]
+    return next(record_cuts(stream, 0.005, patience, told.append)), told  # type: ignore[arg-type]
 
 
 def test_one_cut_is_taken_with_the_air_around_it() -> None:
@@ -129,7 +129,7 @@ def test_scans_lost_in_the_part_that_is_kept_are_counted() -> None:
 
 
 def test_no_cut_in_time_is_reported() -> None:
-    with pytest.raises(DataError, match=r"3 s.*record_cut\.time_limit"):
+    with pytest.raises(DataError, match=r"3 s.*record_cuts\.time_limit"):
         record(Stream(sound((5.0, False))), 3.0)
 
 
@@ -150,7 +150,7 @@ def test_a_cut_that_comes_through_the_port_is_reported_with_its_true_speed(tmp_p
     emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage)
     with emulated.device as device, TapsSource(device.port) as source:
         source.start()
-        signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
+        signal = next(record_cuts(source, 60 / setting.speed_rpm, 30.0, lambda _text: None))
         source.stop()
     (found,) = compare_cuts(Logbook.open(folder.path), setting, signal)
     assert found.detected.verdict == "stable"

@@ -19,7 +19,7 @@ from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.tap.cut_recording import record_cuts
-from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
+from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, MAX_OVERLOAD_SPANS, SignalBuffer
 from lobewatch.tap.emulated_cut import emulate_cut
 
 RATE = 12800.0
@@ -110,6 +110,25 @@ def test_an_overload_marks_its_block_only_and_is_forgotten_with_it() -> None:
     for number in range(6000):
         buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), lost_before=number % 2, overload=number % 2))
     assert max(len(buffer.overloads), len(buffer.lost)) <= KEPT_SIGNAL_SECONDS * RATE / 256
+
+
+def test_a_part_of_a_stream_has_the_faults_within_it_from_its_own_beginning() -> None:
+    buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
+    for number in range(500):
+        lost, overload = 7 * (number in (50, 200, 450)), number in (100, 300, 470) or 480 < number
+        buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), lost_before=lost, overload=overload))
+    part = buffer.take(256 * 150 / RATE, 256 * 400 / RATE)
+    assert (part.lost_scans, part.overload_spans) == (7, ((256 * 150, 256 * 151),))
+    assert np.flatnonzero(part.clipped).tolist() == list(range(256 * 150, 256 * 151))
+
+
+def test_overloads_without_number_count_everywhere() -> None:
+    buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
+    for number in range(2 * MAX_OVERLOAD_SPANS + 2):
+        buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), overload=number % 2))
+    part = buffer.take(0.0, buffer.seconds)
+    assert (part.overload, part.overload_spans) == (True, ())
+    assert np.all(part.clipped)
 
 
 def test_a_cut_that_is_too_short_is_skipped() -> None:

@@ -18,7 +18,7 @@ def is_swapped(hit: Hit) -> bool:
         return False
     small = max(0.1 * larger, 6 * noise)
     smaller, larger = measure_swings(hit.force)
-    if smaller <= 0.3 * larger:
+    if smaller <= MAX_HAMMER_SWING * larger:
         return False
     force, response = (signal - find_median(signal) for signal in (hit.force, hit.acceleration))
     pulse = np.where(np.abs(response) < small, 0.0, response)

@@ -1,8 +1,8 @@
 """Questions on a tap test from all modes of its series: another spindle, exchanged directions, unstated window."""
 
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -68,19 +68,14 @@ def find_series_questions(followed: Mode, modes: Sequence[Mode], reference: Seri
     """
     same = check_same_direction(followed, modes, reference)
     asked = (*check_series(followed, reference), *filter(None, [same]))
-    change = followed.frequency / reference.level[-1].frequency if reference.level else 1.0
-    checks: Sequence[Callable[[Sequence[Mode], SeriesReference], Remark | None]]
-    others = partial(check_other_modes, change=change)
-    checks = () if asked else (others, check_exchanged_directions, check_other_stiffness, check_common_damping)
-    further = filter(None, (check(modes, reference) for check in checks))
-    return (*asked, *filter(None, [next(further, None)]))
+    if not asked:
+        change = followed.frequency / reference.level[-1].frequency if reference.level else 1.0
+        asked = (*islice(check_all_modes(modes, reference, change), 1),)
+    return asked
 
 
-def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change: float = 1.0) -> Remark | None:
-    """Return the question about a strong mode of all recent tests that is elsewhere now, or None.
-
-    Wear lowers modes slowly and raises none. So a strong mode that is gone, with a strong one that no recent test has,
-    is another spindle, although the followed mode of the tool is the same.
+def check_all_modes(modes: Sequence[Mode], reference: SeriesReference, change: float = 1.0) -> Iterator[Remark]:
+    """Yield the questions about all modes of a test that do not fit the earlier tests of its series.
 
     Parameters
     ----------
@@ -90,6 +85,19 @@ def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change:
         Earlier tests of the series.
     change
         Frequency of the followed mode over that of the newest test. The others may move as far.
+    """
+    others = check_other_modes(modes, reference, change)
+    checks = check_exchanged_directions, check_other_stiffness, check_common_damping
+    yield from filter(None, (others, *(check(modes, reference) for check in checks)))
+
+
+def check_other_modes(modes: Sequence[Mode], reference: SeriesReference, change: float = 1.0) -> Remark | None:
+    """Return the question about a strong mode of all recent tests that is elsewhere now, or None.
+
+    Wear lowers modes slowly and raises none. So a strong mode that is gone, with a strong one that no recent test has,
+    is another spindle, although the followed mode of the tool is the same.
+
+    change: frequency of the followed mode over that of the newest test. The others may move as far.
     """
     recent = [_tabulate_test(test)[:, 0] for test in reference.level[-N_RECENT_TESTS:]]
     if not recent:
@@ -123,13 +131,6 @@ def check_exchanged_directions(modes: Sequence[Mode], reference: SeriesReference
     """Return the question about x and y of one day that differ the other way round than on earlier days, or None.
 
     Both directions are tapped in one clamping, so its scatter cancels in their difference.
-
-    Parameters
-    ----------
-    modes
-        Modes of the test that count.
-    reference
-        Earlier tests of the series.
     """
     days = [(_tabulate_test(own), _tabulate_test(other)) for own, other in _level_pairs(reference)]
     now, other = _select_strong(_tabulate(modes))[:, 0], np.array(reference.same_day)
@@ -177,13 +178,6 @@ def check_other_stiffness(modes: Sequence[Mode], reference: SeriesReference) -> 
 
     Hits away from the tip change each mode by a factor of its own, that of the tool most. The scatter of this mode
     and that of all modes both count, as that of one in a few tests is uncertain.
-
-    Parameters
-    ----------
-    modes
-        Modes of the test that count.
-    reference
-        Earlier tests of the series.
     """
     strongest = max((mode.peak for mode in modes), default=0.0)
     strong = [mode for mode in modes if mode.peak >= MIN_STIFFNESS_PEAK_RATIO * strongest]
@@ -211,13 +205,6 @@ def check_common_damping(modes: Sequence[Mode], reference: SeriesReference) -> R
 
     An exponential window of time constant T raises each by 1 / T and changes no frequency. Damping of joints and
     bearings changes by a share of its own in each mode.
-
-    Parameters
-    ----------
-    modes
-        Modes of the test that count.
-    reference
-        Earlier tests of the series.
 
     References
     ----------
@@ -290,7 +277,6 @@ def _find(frequencies: Floats, table: Floats) -> Floats:
     """Return the row of the mode nearest to each frequency, NaN without one near it; shape (n, columns of table)."""
     if not table.size:
         return np.full((frequencies.size, table.shape[1]), np.nan)
-    distance = np.abs(np.log(frequencies[:, np.newaxis] / table[:, 0]))
-    is_near = np.min(np.nan_to_num(distance, nan=np.inf), axis=1) <= MAX_MATCH_CHANGE
-    nearest = table[np.argmin(np.nan_to_num(distance, nan=np.inf), axis=1)]
-    return np.where(is_near[:, np.newaxis], nearest, np.nan)
+    distance = np.nan_to_num(np.abs(np.log(frequencies[:, np.newaxis] / table[:, 0])), nan=np.inf)
+    is_near = np.min(distance, axis=1, keepdims=True) <= MAX_MATCH_CHANGE
+    return np.where(is_near, table[np.argmin(distance, axis=1)], np.nan)

@@ -117,13 +117,10 @@ class DashboardServer(WebServerThread):
         path
             Machine folder, or a folder of machine folders.
         options
-            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
-            free one. `token` for full access and `watch_token` for read-only access, by default random.
+            Address, port and tokens as in `ServerOptions`. ValueError for an invalid token.
 
         Raises
         ------
-        ValueError
-            If a token does not fit into an address.
         DataError
             If there is no machine.
         """

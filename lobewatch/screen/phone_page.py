@@ -5,7 +5,7 @@ from typing import Unpack
 
 from aiohttp import web
 
-from lobewatch.screen.uploaded_recording import MAX_UPLOAD_BYTES, evaluate_upload, parse_uploaded_cut
+from lobewatch.screen.uploaded_recording import MAX_UPLOAD_BYTES, evaluate_upload, parse_uploaded_cut, refuse
 from lobewatch.screen.web_server import ServerOptions, WebServerThread, add_pages
 
 MAX_UPLOAD_SECONDS = 120.0
@@ -22,35 +22,33 @@ def add_recording_upload(application: web.Application, prefix: str) -> None:
         cut = parse_uploaded_cut(request.query)
         if busy.locked():
             text = "lobewatch evaluates another recording. Send this recording again in a minute."
-            return web.json_response({"code": "busy", "error": text}, status=409)
+            return web.json_response(refuse("busy", text), status=409)
         async with busy:
-            content = await _read_recording(request)
+            try:
+                content = await _read_recording(request)
+            except TimeoutError:
+                text = f"the upload took more than {MAX_UPLOAD_SECONDS:g} s. Send a shorter recording."
+                return web.json_response(refuse("too-slow", text), status=408)
+            if content is None:
+                text = f"the recording is larger than {MAX_UPLOAD_BYTES / 1e6:g} MB. Send a shorter recording."
+                return web.json_response(refuse("too-large", text), status=413)
             answer = await asyncio.to_thread(evaluate_upload, content, cut)
         return web.json_response(answer, status=422 if "error" in answer else 200)
 
     application.router.add_post(f"{prefix}recording", evaluate)
 
 
-async def _read_recording(request: web.Request) -> bytearray:
-    """Read the body of a request; HTTPException if it is too large or takes too long."""
+async def _read_recording(request: web.Request) -> bytearray | None:
+    """Read the body of a request; None if it is too large, TimeoutError if it takes too long."""
     content = bytearray()
-    too_large = web.HTTPRequestEntityTooLarge(MAX_UPLOAD_BYTES, text=TOO_LARGE_TEXT)
     if (request.content_length or 0) > MAX_UPLOAD_BYTES:
-        raise too_large
-    try:
-        async with asyncio.timeout(MAX_UPLOAD_SECONDS):
-            async for chunk in request.content.iter_chunked(UPLOAD_CHUNK_BYTES):
-                content += chunk
-                if len(content) > MAX_UPLOAD_BYTES:
-                    raise too_large
-    except TimeoutError:
-        text = f"the upload took more than {MAX_UPLOAD_SECONDS:g} s. Send a shorter recording."
-        raise web.HTTPRequestTimeout(text=text) from None
+        return None
+    async with asyncio.timeout(MAX_UPLOAD_SECONDS):
+        async for chunk in request.content.iter_chunked(UPLOAD_CHUNK_BYTES):
+            content += chunk
+            if len(content) > MAX_UPLOAD_BYTES:
+                return None
     return content
-
-
-TOO_LARGE_TEXT = f"the recording is larger than {MAX_UPLOAD_BYTES / 1e6:g} MB. Send a shorter recording."
-"""Answer to a recording that is too large."""
 
 
 class RecordingServer(WebServerThread):
@@ -62,13 +60,7 @@ class RecordingServer(WebServerThread):
         Parameters
         ----------
         options
-            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
-            free one. `token` for full access and `watch_token` for read-only access, by default random.
-
-        Raises
-        ------
-        ValueError
-            If a token does not fit into an address.
+            Address, port and tokens as in `ServerOptions`. ValueError for an invalid token.
         """
         super().__init__(**options)
         add_pages(self.application, {"/": "phone.html"})

@@ -110,24 +110,25 @@ def evaluate_upload(content: bytes | bytearray, cut: UploadedCut) -> JsonObject:
     except subprocess.TimeoutExpired:
         return _too_slow()
     except subprocess.CalledProcessError as error:
-        if error.returncode == -signal.SIGXCPU:
+        if -error.returncode == getattr(signal, "SIGXCPU", None):  # Windows has no such signal
             return _too_slow()
         crashed = error.returncode < 0
-        return _refuse("unreadable", "the file crashes its decoder. Record the cut again.") if crashed else _failed()
+        return refuse("unreadable", "the file crashes its decoder. Record the cut again.") if crashed else _failed()
     answer: JsonObject = json.loads(output)
     return answer
 
 
-def _refuse(code: str, text: str) -> JsonObject:
+def refuse(code: str, text: str) -> JsonObject:
+    """Return the answer to a recording that is not evaluated."""
     return {"code": code, "error": text}
 
 
 def _too_slow() -> JsonObject:
-    return _refuse("too-slow", f"the recording needs more than {MAX_CPU_SECONDS:g} s of computing. Send a shorter one.")
+    return refuse("too-slow", f"the recording needs more than {MAX_CPU_SECONDS:g} s of computing. Send a shorter one.")
 
 
 def _failed() -> JsonObject:
-    return _refuse("failed", "lobewatch could not evaluate this recording. Record the cut again.")
+    return refuse("failed", "lobewatch could not evaluate this recording. Record the cut again.")
 
 
 def main() -> None:
@@ -143,12 +144,12 @@ def _evaluate(content: bytes, cut: UploadedCut) -> JsonObject:
         rate, columns = decode_audio(content, "recording", MAX_RECORDING_SECONDS)
         return _find_fault(rate, columns) or _hear(rate, columns, cut)
     except MissingDecoderError as error:
-        return _refuse("no-decoder", str(error))
+        return refuse("no-decoder", str(error))
     except DataError as error:
-        return _refuse("unreadable", str(error))
+        return refuse("unreadable", str(error))
     except MemoryError:
         text = f"the recording needs more than {MAX_MEMORY / 1e9:g} GB of memory. Send a shorter one."
-        return _refuse("too-large", text)
+        return refuse("too-large", text)
 
 
 def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
@@ -156,12 +157,12 @@ def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
     low, high = SAMPLE_RATES
     if not low <= rate <= high:
         text = f"sample rate {rate:g} Hz is not from {low:g} to {high:g} Hz. Record with 48000 Hz."
-        return _refuse("sample-rate", text)
+        return refuse("sample-rate", text)
     if columns.shape[1] > MAX_RECORDING_SECONDS * rate:
         text = f"the recording is longer than {MAX_RECORDING_SECONDS / 60:g} min. Send a shorter one."
-        return _refuse("too-long", text)
+        return refuse("too-long", text)
     if not np.all(np.isfinite(columns)):
-        return _refuse("unreadable", "the recording has infinite or missing values. Record the cut again.")
+        return refuse("unreadable", "the recording has infinite or missing values. Record the cut again.")
     return None
 
 
@@ -169,10 +170,9 @@ def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
     loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
     comparisons, found = hear_signal(CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR), "recording", cut.request)
     worst = find_worst_cut(comparisons)
-    texts = [text for text in recording_texts(comparisons) if isinstance(text, str)]
     finding = reason_text(worst) if worst.detected.verdict == "cannot tell" else ""
     sentence = next((text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)), "")
-    more = {"finding": finding, "texts": texts, "next_text": sentence}
+    more = {"finding": finding, "texts": recording_texts(comparisons), "next_text": sentence}
     return recorded_cut_json(worst) | next_speeds_json(found) | more
 
 

@@ -140,7 +140,7 @@ class ServerOptions(TypedDict, total=False):
     port: int
     """Port of the pages. Default: 0, any free one."""
     token: str | None
-    """Token for full access. Default: random."""
+    """Token for full access, 12 to 200 characters of A-Z, a-z, 0-9, _ and -. Default: random."""
     watch_token: str | None
     """Token for read-only access. Default: random."""
 
@@ -252,13 +252,7 @@ class ScreenServer(WebServerThread):
         session
             Live tap test.
         options
-            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
-            free one. `token` for full access and `watch_token` for read-only access, by default random.
-
-        Raises
-        ------
-        ValueError
-            If a token does not fit into an address.
+            Address, port and tokens as in `ServerOptions`. ValueError for an invalid token.
         """
         super().__init__(**options)
         add_pages(self.application, {"/": "screen.html"})
@@ -276,13 +270,7 @@ class CutScreenServer(WebServerThread):
         pictures
             Publisher of the states of the recording.
         options
-            `listen`, the address of this computer to listen at, by default 127.0.0.1. `port`, by default any
-            free one. `token` for full access and `watch_token` for read-only access, by default random.
-
-        Raises
-        ------
-        ValueError
-            If a token does not fit into an address.
+            Address, port and tokens as in `ServerOptions`. ValueError for an invalid token.
         """
         super().__init__(**options)
         add_pages(self.application, {"/": "listen.html"})

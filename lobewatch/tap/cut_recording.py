@@ -122,13 +122,6 @@ Publish = Callable[..., None]
 """Function called with changed fields of CutState."""
 
 
-def record_cut(
-    device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
-) -> CutSignal:
-    """Record the next whole cut of a started device, as `record_cuts` does."""
-    return next(record_cuts(device, turn, time_limit, show, publish))
-
-
 def record_cuts(
     device: Device, turn: float, time_limit: float, show: Callable[[str], None], publish: Publish = lambda **_: None
 ) -> Iterator[CutSignal]:
@@ -157,7 +150,7 @@ def record_cuts(
         if buffer.seconds > until:
             break
     if not n_cuts:
-        cure = "Start with the spindle running in air, then cut, or increase record_cut.time_limit"
+        cure = "Start with the spindle running in air, then cut, or increase record_cuts.time_limit"
         raise DataError(join_sentences(f"no cut was detected in {time_limit:g} s", cure))
 
 

@@ -55,7 +55,7 @@ class SignalBuffer:
             joined = self.overloads.pop()[0] if self.overloads and self.overloads[-1][1] == begin else begin
             self.overloads.append((joined, self.received))
         self.codes.append(codes)
-        self.forget((self.received / self.rate) - KEPT_SIGNAL_SECONDS)
+        self.forget(self.seconds - KEPT_SIGNAL_SECONDS)
         return np.asarray(codes * self._scales, np.float64)
 
     @property

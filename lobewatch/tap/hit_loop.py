@@ -175,7 +175,7 @@ class TapPhases:
         """
         blocks, stream = self._blocks(connection), connection.rate
         while stream is not None and stream.seconds < MAX_RATE_TIME and not stream.is_verified:
-            if not connection.read_on(blocks, RATE_STEP):
+            if connection.read_on(blocks, RATE_STEP) is None:
                 break
         if stream is not None and stream.seconds >= MAX_RATE_TIME and not stream.is_verified:
             self.questions.leave_open(RATE_NOT_VERIFIED.code)

@@ -204,10 +204,8 @@ class TapSession:
         self._publisher.show(**in_progress.shown)
         logbook = Logbook(self._folder)
         now = datetime.now(UTC) if self._guided else None
-        answered, left_open = self.questions.asked, self.questions.left_open
-        commit = partial(logbook.commit, now=now)
-        commit = partial(commit, answered=answered) if answered else commit
-        commit = partial(commit, asked=left_open) if left_open else commit
+        answered = self.questions.asked
+        commit = partial(logbook.commit, now=now, asked=self.questions.left_open, answered=answered)
         commit(tap)
         self.across = commit_cross_tap(in_progress, commit)
         self.saved = [tap.id, *([self.across.tap_id] if self.across and self.across.tap_id else [])]

@@ -35,8 +35,9 @@ Smallest vibration severity of ISO 10816-1:1995, table B.1. At 3000 rpm it is 0.
 1 m/s^2 there, and floors next to machines less than 0.2 mm/s.
 """
 MIN_NEW_LINE_VELOCITY, MIN_NEW_LINE_RATIO = 0.05e-3, 5.0
-"""RMS velocity (m/s) from which a line is asked about that is stronger than in an earlier record, and the least ratio
-of their rms; chosen. Vibration of the floor is in both records."""
+"""Smallest RMS velocity (m/s) of a new line, and smallest ratio of its rms to that in an earlier record; chosen.
+
+Vibration of the floor is in both records."""
 MIN_LINE_PROMINENCE = 60.0
 """Power of a line over the median of the lines around it, chosen: at most 58 in 1200 records of noise and drift."""
 NEIGHBOUR_LINES = 15

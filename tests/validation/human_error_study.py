@@ -114,8 +114,6 @@ class Count:
     """Machines without a code that names the right cause."""
     false_stable: int = 0
     """Machines with `stable` for a cut that chatters."""
-    silent_and_false: int = 0
-    """Machines with both."""
     said: Counter[str] = field(default_factory=Counter)
     """New codes, compared with the machine before the error."""
 
@@ -243,7 +241,7 @@ def measure(kinds: dict[str, HumanError], count: int, path: Path, *, first: int 
 def count_outcome(error: HumanError, seen: Seen, before: Seen) -> Count:
     """Count one outcome."""
     is_silent = not seen.codes & error.right
-    return Count(1, is_silent, seen.is_false, is_silent and seen.is_false, Counter(seen.codes - before.codes))
+    return Count(1, is_silent, seen.is_false, Counter(seen.codes - before.codes))
 
 
 def count_questions(shop: Workshop, months: int = 24) -> int:

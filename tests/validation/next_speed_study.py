@@ -102,11 +102,6 @@ class HiddenSpindle:
         limits = np.interp(np.log(stable), np.log(self.speeds), self.limits) if stable else np.zeros(1)
         return bool(np.max(limits) >= self.best / 2)
 
-    def is_cut(self, n_cuts: int) -> bool:
-        """Return whether one of the first cuts was stable at half of the best depth or deeper."""
-        deep = [cut.depth for cut in self.cuts[:n_cuts] if not cut.has_chatter]
-        return max(deep, default=0.0) >= 0.4999 * self.best
-
 
 def make_cuts(spindles: Sequence[HiddenSpindle], count: int) -> None:
     """Cut as suggested, all spindles side by side."""

@@ -10,18 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.measurement.series_modes import (
-    check_common_damping,
-    check_exchanged_directions,
-    check_other_modes,
-    check_other_stiffness,
-)
+from lobewatch.measurement.series_modes import check_all_modes
 from lobewatch.measurement.series_questions import EarlierTest, SeriesReference
 from modal import Mode
 
 N_TESTS = 24
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
-CHECKS = check_other_modes, check_exchanged_directions, check_other_stiffness, check_common_damping
 Array = NDArray[np.float64]
 
 
@@ -60,7 +54,7 @@ def ask_all(sessions: list[Array]) -> list[set[str]]:
         for direction, rows in enumerate(session):
             day = tuple(session[0, :, 0]) if direction else ()
             reference = SeriesReference(tuple(tests[direction]), tuple(tests[1 - direction]), day)
-            found = {remark.code for check in CHECKS if (remark := check([Mode(*row) for row in rows], reference))}
+            found = {remark.code for remark in check_all_modes([Mode(*row) for row in rows], reference)}
             codes |= found
             if not found:
                 time = START + timedelta(days=30 * number, hours=direction)

@@ -98,9 +98,9 @@ def find_deciding_check(chain: SensorChain, time: datetime, checks: Sequence[Mas
 
 
 def proves_sensitivities(chain: SensorChain | None, time: datetime, checks: Sequence[MassCheckEntry]) -> bool:
-    """Tell whether passed checks with a known mass before and after a tap test, each of its day, hold for it.
+    """Return whether checks with a known mass passed within a day before and within a day after a tap test.
 
-    One alone shows no amplifier that was switched between it and the test.
+    One of them alone shows no amplifier that was switched between it and the test.
     """
     decides = None if chain is None else find_deciding_check(chain, time, checks)
     if decides is None or not decides.passed:

@@ -79,7 +79,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     hit_decisions: tuple[HitDecision, ...] = ()
     """Decisions on its hits that count, from other lines."""
     is_mass_checked: bool = False
-    """True if a check with a known mass shows that its sensitivities are right, from other lines."""
+    """True if checks with a known mass show that its sensitivities are right, from other lines."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
@@ -112,7 +112,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         return msgspec.convert({key: line[key] for key in line if key != "conditions" or line[key]}, cls)
 
     def with_mass_checks(self, checks: Sequence[MassCheckEntry]) -> TapEntry:
-        """Return the entry with whether a check shows that its sensitivities are right.
+        """Return the entry, marked if checks show that its sensitivities are right.
 
         Parameters
         ----------

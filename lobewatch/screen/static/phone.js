@@ -30,7 +30,7 @@ function fail(text) {
   show("error");
 }
 
-// Counts the seconds, because nobody knows how long it takes.
+// Counts the seconds, as the duration is unknown.
 function startClock() {
   const begin = performance.now();
   const tick = () => put("doing", `Sending and evaluating: ${Math.round((performance.now() - begin) / 1000)} s`);
@@ -80,7 +80,7 @@ at("form").addEventListener("submit", async (event) => {
   for (const id of STORED) localStorage.setItem(id, at(id).value);
   const clock = startClock();
   at("send").disabled = true;
-  await ask(`recording?${new URLSearchParams(values)}`, "POST", recording).then(showResult, (error) => fail(error.message));
+  await ask(`recording?${new URLSearchParams(values)}`, "POST", recording).then(showResult).catch((error) => fail(error.message));
   clearInterval(clock);
   at("send").disabled = false;
 });

@@ -119,7 +119,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "ProgramTable.tool": "--tool",
     "ProgramTable.tool_diameter_mm": "--diameter",
     "rebuild_files.rebuild_files": "lobewatch rebuild",
-    "record_cut.time_limit": "--seconds",
+    "record_cuts.time_limit": "--seconds",
     "rotate_structure.degrees": "--askew",
     "rotate_structure.direction": "--direction",
     "screen.ScreenServer": "--screen",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 import pytest
 
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import exclude_entry
+from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain, proves_sensitivities
 from lobewatch.measurement.recording_questions import TOOL_COMPLIANCE, TOOL_MISMATCH_CODE
-from tests.lobewatch.logbook.conftest import Shop, entered, hit_mass, tap_both
+from tests.lobewatch.logbook.conftest import DAY, Shop, entered, hit_mass, tap_both
 
 STIFF_TOOL = '[[tool]]\nname = "plain"\ndiameter_mm = 50\ntool_material = "carbide"\nstick_out_mm = 220\n\n'
 """Tool that alone is softer than the tapped tip."""
@@ -60,3 +63,16 @@ def test_a_check_that_fails_or_is_excluded_or_of_another_chain_answers_nothing(m
     assert codes(mismatched) == {TOOL_MISMATCH_CODE}
     exclude_entry(mismatched.folder, passed.id, "wrong mass")
     assert codes(mismatched) == {TOOL_COMPLIANCE.code}
+
+
+def test_the_check_of_an_emulator_proves_no_sensitivities() -> None:
+    chain = SensorChain("1", 1e-3, 1e-2, 5.0, 5.0)
+
+    def proves(*masses: float | None) -> bool:
+        days = zip((-0.5, 0.5), masses, strict=True)
+        checks = [MassCheckEntry("m", DAY + timedelta(day), mass, 1.0, 1e-3, True, chain) for day, mass in days]
+        return proves_sensitivities(chain, DAY, checks)
+
+    assert proves(1.2, 1.2)
+    assert not proves(None, 1.2)
+    assert not proves(1.2, None)

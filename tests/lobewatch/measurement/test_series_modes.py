@@ -161,6 +161,22 @@ def test_directions_that_differ_otherwise_are_not_exchanged() -> None:
     assert check_exchanged_directions(of(moved(TOOL, 1.02)), SeriesReference(x, y, (TOOL[0],))) is not None
 
 
+@pytest.mark.parametrize("count", [3, 6])
+def test_the_difference_that_shows_exchanged_directions_is_that_of_student(count: int) -> None:
+    """Closed form without scatter: n + 1 degrees of freedom, and a prior of two days with 0.001."""
+    limit = np.sqrt(2 * 0.001**2 * (1 + 1 / count) / 4 * (1000 ** (2 / (count + 2)) - 1))
+    for share, is_asked in ((0.98, False), (1.02, True)):
+        other = moved(TOOL, np.exp(share * limit))
+        days = months_of((other,), count), months_of((TOOL,), count)
+        asked = check_exchanged_directions(of(TOOL), SeriesReference(*days, (other[0],)))
+        assert (asked is not None) == is_asked
+
+
+def test_modes_too_far_from_each_other_are_not_compared_over_directions() -> None:
+    days = months_of((TOOL,)), months_of((moved(TOOL, 1.3),))
+    assert check_exchanged_directions(of(moved(TOOL, 1.3)), SeriesReference(*days, (TOOL[0],))) is None
+
+
 def damped(rise: float, factor: float = 1.0) -> list[Mode]:
     """Return the modes with all decay rates times a factor and raised by a constant (1/s)."""
     return [Mode(f, factor * zeta + rise / (2 * np.pi * f), stiffness) for f, zeta, stiffness in (TOOL, SPINDLE)]
@@ -170,6 +186,7 @@ def damped(rise: float, factor: float = 1.0) -> list[Mode]:
 def test_a_constant_rise_of_all_decay_rates_is_an_unstated_window(rise: float, is_asked: bool) -> None:
     asked = check_common_damping(damped(rise), SeriesReference(months_of((TOOL, SPINDLE))))
     assert (asked is not None) == is_asked
+    assert asked is None or "all modes decay faster by 30 1/s, as with an exponential window of 33.3 ms" in str(asked)
 
 
 @pytest.mark.parametrize("count", [6, 20])

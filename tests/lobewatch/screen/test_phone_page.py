@@ -8,7 +8,10 @@ import json
 import re
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -34,13 +37,13 @@ Browser = Any
 
 def sound_of_a_cut(chatter: float | None = CHATTER) -> Floats:
     """Return one second of air, two of cutting and half a second of air, as shares of the full scale."""
-    random, time = np.random.default_rng(0), np.arange(round(3.5 * RATE)) / RATE
+    random, seconds = np.random.default_rng(0), np.arange(round(3.5 * RATE)) / RATE
     passing = FLUTES * RPM / 60
     lines = [(k * passing, 0.2 / k) for k in range(1, 12)]
     if chatter:
         lines += [(chatter + k * passing, 0.3 * 0.3 ** abs(k)) for k in range(-2, 4)]
-    cut = sum(height * np.sin(2 * np.pi * hz * time + random.uniform(0, 6)) for hz, height in lines)
-    sound = 0.01 * random.standard_normal(time.size) + np.where((time > 1) & (time < 3), cut, 0.0)
+    cut = sum(height * np.sin(2 * np.pi * hz * seconds + random.uniform(0, 6)) for hz, height in lines)
+    sound = 0.01 * random.standard_normal(seconds.size) + np.where((seconds > 1) & (seconds < 3), cut, 0.0)
     return np.asarray(0.6 * sound / np.max(np.abs(sound)))
 
 
@@ -162,6 +165,8 @@ def test_a_crash_and_too_long_a_wait_are_refused(monkeypatch: pytest.MonkeyPatch
     assert fail(subprocess.TimeoutExpired("lobewatch", 1)) == "too-slow"
     assert fail(subprocess.CalledProcessError(-11, "lobewatch")) == "unreadable"
     assert fail(subprocess.CalledProcessError(1, "lobewatch")) == "failed"
+    monkeypatch.delattr("signal.SIGXCPU", raising=False)  # as on Windows
+    assert fail(subprocess.CalledProcessError(1, "lobewatch")) == "failed"
 
 
 TEXTS = {"teeth": "2", "speed_rpm": "18000"}
@@ -189,8 +194,44 @@ def test_a_file_that_is_too_large_is_not_read(
     monkeypatch.setattr(phone_page, "MAX_UPLOAD_BYTES", 100_000)
     content = bytes(150_000)
     status, told = send(server, content if declared else iter([content]))  # type: ignore[arg-type]
-    assert status == 413
+    assert (status, told["code"]) == (413, "too-large")
     assert "MB" in told["error"]
+
+
+def test_an_upload_that_takes_too_long_is_refused(server: RecordingServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    def halting() -> Iterator[bytes]:
+        yield b"sound"
+        time.sleep(0.5)
+        yield b"sound"
+
+    monkeypatch.setattr(phone_page, "MAX_UPLOAD_SECONDS", 0.05)
+    status, told = send(server, halting())  # type: ignore[arg-type]
+    assert (status, told["code"]) == (408, "too-slow")
+
+
+def test_one_recording_is_evaluated_at_a_time(server: RecordingServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, end = threading.Event(), threading.Event()
+
+    def wait(*_: Any) -> dict[str, Any]:
+        begun.set()
+        end.wait(10)
+        return {}
+
+    monkeypatch.setattr(phone_page, "evaluate_upload", wait)
+    with ThreadPoolExecutor() as other:
+        first = other.submit(send, server, b"sound")
+        begun.wait(10)
+        status, told = send(server, b"sound")
+        end.set()
+    assert (status, told["code"]) == (409, "busy")
+    assert first.result() == (200, {})
+
+
+def test_a_recording_without_a_cut_is_answered_in_json_for_browsers(server: RecordingServer) -> None:
+    """Values that are unknown are null, as JSON has neither NaN nor infinity."""
+    status, told = send(server, encode(np.zeros(RATE), "WAV"))
+    assert (status, told["word"], told["reason"]) == (200, "cannot tell", "no-cut")
+    json.dumps(told, allow_nan=False)
 
 
 @pytest.mark.parametrize(

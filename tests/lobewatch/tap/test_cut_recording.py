@@ -18,8 +18,8 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.requested_cut import find_cut_setting
-from lobewatch.tap.cut_recording import record_cut, record_cuts
-from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
+from lobewatch.tap.cut_recording import record_cuts
+from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, MAX_OVERLOAD_SPANS, SignalBuffer
 from lobewatch.tap.emulated_cut import emulate_cut
 
 RATE = 12800.0
@@ -59,7 +59,7 @@ def sound(*parts: tuple[float, bool]) -> Floats:
 
 def record(stream: Stream, patience: float = 60.0) -> Any:
     told: list[str] = []
-    return record_cut(stream, 0.005, patience, told.append), told  # type: ignore[arg-type]
+    return next(record_cuts(stream, 0.005, patience, told.append)), told  # type: ignore[arg-type]
 
 
 def test_one_cut_is_taken_with_the_air_around_it() -> None:
@@ -112,6 +112,25 @@ def test_an_overload_marks_its_block_only_and_is_forgotten_with_it() -> None:
     assert max(len(buffer.overloads), len(buffer.lost)) <= KEPT_SIGNAL_SECONDS * RATE / 256
 
 
+def test_a_part_of_a_stream_has_the_faults_within_it_from_its_own_beginning() -> None:
+    buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
+    for number in range(500):
+        lost, overload = 7 * (number in (50, 200, 450)), number in (100, 300, 470) or 480 < number
+        buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), lost_before=lost, overload=overload))
+    part = buffer.take(256 * 150 / RATE, 256 * 400 / RATE)
+    assert (part.lost_scans, part.overload_spans) == (7, ((256 * 150, 256 * 151),))
+    assert np.flatnonzero(part.clipped).tolist() == list(range(256 * 150, 256 * 151))
+
+
+def test_overloads_without_number_count_everywhere() -> None:
+    buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
+    for number in range(2 * MAX_OVERLOAD_SPANS + 2):
+        buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), overload=number % 2))
+    part = buffer.take(0.0, buffer.seconds)
+    assert (part.overload, part.overload_spans) == (True, ())
+    assert np.all(part.clipped)
+
+
 def test_a_cut_that_is_too_short_is_skipped() -> None:
     found, told = record(Stream(sound((1.0, False), (0.3, True), (2.0, False), (1.5, True), (1.0, False))))
     assert found.duration == pytest.approx(1.0 + 1.5 + 0.3, abs=0.1)
@@ -129,7 +148,7 @@ def test_scans_lost_in_the_part_that_is_kept_are_counted() -> None:
 
 
 def test_no_cut_in_time_is_reported() -> None:
-    with pytest.raises(DataError, match=r"3 s.*record_cut\.time_limit"):
+    with pytest.raises(DataError, match=r"3 s.*record_cuts\.time_limit"):
         record(Stream(sound((5.0, False))), 3.0)
 
 
@@ -150,7 +169,7 @@ def test_a_cut_that_comes_through_the_port_is_reported_with_its_true_speed(tmp_p
     emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage)
     with emulated.device as device, TapsSource(device.port) as source:
         source.start()
-        signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
+        signal = next(record_cuts(source, 60 / setting.speed_rpm, 30.0, lambda _text: None))
         source.stop()
     (found,) = compare_cuts(Logbook.open(folder.path), setting, signal)
     assert found.detected.verdict == "stable"

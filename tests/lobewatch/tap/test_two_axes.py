@@ -175,10 +175,10 @@ def test_hits_that_only_the_second_sensor_cannot_follow_are_rejected_in_it_alone
 def test_a_disk_that_is_full_for_the_tap_across_leaves_the_other(short: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     commit = Logbook.commit
 
-    def full(logbook: Logbook, tap: TapTest, now: datetime | None = None) -> None:
+    def full(logbook: Logbook, tap: TapTest, **more: Any) -> None:
         if tap.circumstances.direction == "xy":
             raise OSError(errno.ENOSPC, "No space left on device")
-        commit(logbook, tap, now)
+        commit(logbook, tap, **more)
 
     monkeypatch.setattr(Logbook, "commit", full)
     session = tap(short, lambda: Bench(felt(X)))

@@ -115,7 +115,7 @@ def test_an_overload_marks_its_block_only_and_is_forgotten_with_it() -> None:
 def test_a_part_of_a_stream_has_the_faults_within_it_from_its_own_beginning() -> None:
     buffer = SignalBuffer([CHANNELS[1]], [0], RATE)
     for number in range(500):
-        lost, overload = 7 * (number in (50, 200, 450)), number in (100, 300, 470) or 480 < number
+        lost, overload = 7 * (number in (50, 200, 450)), number in (100, 300, 470) or number > 480
         buffer.add(Block(256 * number, np.zeros((1, 256), dtype=np.int32), lost_before=lost, overload=overload))
     part = buffer.take(256 * 150 / RATE, 256 * 400 / RATE)
     assert (part.lost_scans, part.overload_spans) == (7, ((256 * 150, 256 * 151),))

@@ -1,6 +1,6 @@
-"""Command `lobewatch observe`: record the result of a test cut by ear."""
+"""Command `lobewatch observe`: record the result of a test cut by ear, or the power of a cut."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from typer import Option
 
@@ -20,33 +20,43 @@ def observe(
     date: CutDate = None,
     as_json: Json = False,
 ) -> None:
-    """Store whether a test cut sounded stable.
+    """Store whether a cut sounded stable, its power, or both.
 
-    The result is stored in the journal. lobewatch exclude takes the cut out of all results.
+    The result is stored in the journal. lobewatch exclude takes the cut out of all results. The readings of one program
+    and day count once.
 
     Examples
     --------
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
       lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable --power 1.4
+      lobewatch observe mill-3 --program A --power 1.4
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.machine.folder_updates import find_contradicting_cuts, make_observed_cut, store_cut
+    from lobewatch.logbook.production import plan_next_cut
+    from lobewatch.machine.folder_updates import make_observed_cut, store_cut
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.notify.publish_status import publish_on_change
-    from lobewatch.show.history import contradiction_remark, cut_json, cut_text, untapped_remarks
+    from lobewatch.show.cuts.production_steps import next_step_json, next_step_lines
+    from lobewatch.show.history import cut_json, cut_text, saved_cut_remarks
 
-    if stable == chatter:
-        raise ValueError(
-            f"{'both' if stable else 'neither'} of --stable and --chatter. Give exactly one of the two options."
-        )
+    word = _choose_word(stable, chatter, power)
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
-    heard = make_observed_cut(setting, "stable" if stable else "chatter", frequency, date)
-    contradicting = find_contradicting_cuts(heard, logbook.cuts)
-    remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting)]
+    heard = make_observed_cut(setting, word, frequency, date)
     with publish_on_change(logbook):
-        stored = store_cut(logbook.folder, heard)
-        payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}
-        emit(payload, as_json, f"saved {cut_text(stored)}")
+        earlier, stored = logbook.cuts, store_cut(logbook.folder, heard)
+        plan = plan_next_cut(logbook, stored.program, [*earlier, stored])
+        remarks = saved_cut_remarks(logbook, stored, earlier)
+        payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]} | next_step_json(plan)
+        emit(payload, as_json, f"saved {cut_text(stored)}", *next_step_lines(plan, logbook.folder.path))
     print_remarks(remarks)
+
+
+def _choose_word(stable: bool, chatter: bool, power: float | None) -> Literal["stable", "chatter", "cannot tell"]:
+    """Return the verdict of the options; ValueError for both, or for none without a power."""
+    if stable and chatter:
+        raise ValueError("both of --stable and --chatter. Give one of the two options.")
+    if not (stable or chatter or power is not None):
+        raise ValueError("neither of --stable and --chatter, and no --power. Give one of these options.")
+    return "stable" if stable else "chatter" if chatter else "cannot tell"

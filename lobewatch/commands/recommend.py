@@ -26,10 +26,13 @@ def recommend(
     now: shared.Now = None,
     as_json: Json = False,
 ) -> None:
-    """Recommend a speed and a depth for a tool and a material.
+    """Recommend a speed and a depth for a tool and a material, then the next ordinary cuts.
 
     Finds the highest material removal rate that is stable with a margin in speed, depth and frequency. Missing values
     come from the programs of the tool if all these programs agree.
+
+    At most three ordinary cuts follow, each with at most 5 % chance of chatter. Enter each with lobewatch observe or
+    lobewatch listen, and lobewatch names the next one. lobewatch suggest gains more, but its test cuts may chatter.
 
     Exit code 1: no stable speed and depth.
 
@@ -40,8 +43,10 @@ def recommend(
       lobewatch recommend trial --depth 1.5 --json
     """
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.production import plan_recommended
     from lobewatch.logbook.requested_cuts import recommend_requested
     from lobewatch.machine.folder_updates import check_program_name, save_program
+    from lobewatch.show.cuts.production_steps import ladder_json, ladder_lines
     from lobewatch.show.programs.recommendations import recommendation_json, recommendation_lines, saved_lines
 
     cut = shared.cut_fields(speed, depth, tool, material, teeth, diameter, radial, direction)
@@ -51,10 +56,12 @@ def recommend(
         check_program_name(logbook.machine, save)
     with show_progress("searching stable speeds and depths"), time_step("lobes"):
         answer = recommend_requested(logbook, cut, save)
+        plan = plan_recommended(logbook, answer) if depth is None else None
     saved = None if answer.setting is None else save
     if saved is not None:
         save_program(logbook.folder, answer.program)
-    payload = recommendation_json(answer, logbook.remarks) | {"saved": saved}
-    next_lines = saved_lines(logbook.folder.path, saved) if saved else ()
+    ladder = ladder_json(plan, answer.setting)
+    payload = recommendation_json(answer, logbook.remarks) | {"saved": saved, "ladder": ladder}
+    next_lines = [*ladder_lines(plan, logbook.folder.path), *(saved_lines(logbook.folder.path, saved) if saved else ())]
     emit(payload, as_json, *recommendation_lines(answer, logbook.remarks), *next_lines)
     raise Exit(int(answer.setting is None))

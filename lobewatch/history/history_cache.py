@@ -136,7 +136,7 @@ def _hash_programs(machine: Machine, cuts: Sequence[CutEntry]) -> dict[str, str]
     """Return the hash of all that decides the stored verdict on each program, test cuts of its tool included."""
     hashes = hash_programs(machine)
     for program in machine.program:
-        taught = [f" {cut.id}" for cut in cuts if cut.is_usable and cut.tool == program.tool]
+        taught = [f" {cut.id}" for cut in cuts if cut.is_evidence and cut.tool == program.tool]
         hashes[program.name] += "".join(taught)
     return hashes
 

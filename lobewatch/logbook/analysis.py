@@ -94,8 +94,8 @@ class Analysis:
 
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
-        """Usable test cuts, oldest first."""
-        return tuple(cut for cut in self.files.contents.cuts if cut.is_usable)
+        """Usable test cuts and power readings, oldest first."""
+        return tuple(cut for cut in self.files.contents.cuts if cut.is_evidence)
 
     @property
     def history(self) -> History:

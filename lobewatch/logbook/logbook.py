@@ -134,7 +134,7 @@ class Logbook:
 
     @property
     def cuts(self) -> tuple[CutEntry, ...]:
-        """Usable test cuts, oldest first."""
+        """Usable test cuts and power readings, oldest first."""
         return self.analysis.cuts
 
     def series(self, tool: str, direction: str) -> list[TapEntry]:

@@ -15,7 +15,7 @@ from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import entries as lines
-from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
+from lobewatch.machine.journal.entries import CUT_LINE_KIND, POWER_READING, CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import JournalReading, make_entry
 from lobewatch.machine.journal.mass_checks import MASS_CHECK_KIND, MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -174,17 +174,22 @@ def _next_cut_id(folder: MachineFolder, reading: JournalReading) -> str:
 
 
 def make_observed_cut(
-    setting: CutSetting, word: Literal["stable", "chatter"], frequency: float | None = None, at: datetime | None = None
+    setting: CutSetting,
+    word: Literal["stable", "chatter", "cannot tell"],
+    frequency: float | None = None,
+    at: datetime | None = None,
 ) -> CutEntry:
-    """Make the entry of a test cut that a person has observed; `store_cut` gives it its identity.
+    """Make the entry of a cut that a person has observed; `store_cut` gives it its identity.
 
-    frequency: of the chatter (Hz). at: time of the cut, None for now. Raises ValueError for a frequency that cannot be
-    chatter, and for a date in the future.
+    word: "cannot tell" for a power reading without a verdict. frequency: of the chatter (Hz). at: time of the cut, None
+    for now. Raises ValueError for a frequency that cannot be chatter, and for a date in the future.
     """
     when = resolve_cutting_time(at, datetime.now(UTC))
     _check_chatter_frequency(setting, word, frequency)
     fields = setting.cut_entry_fields(setting.speed_rpm)
-    fields |= {"word": word, "chatter_frequency_hz": frequency, "by": "ear", "software": lobewatch_version()}
+    by, reason = ("display", POWER_READING) if word == "cannot tell" else ("ear", "")
+    fields |= {"word": word, "chatter_frequency_hz": frequency, "by": by, "reason": reason}
+    fields["software"] = lobewatch_version()
     return CutEntry("", when, **fields)
 
 
@@ -200,6 +205,8 @@ def _check_chatter_frequency(setting: CutSetting, word: str, frequency: float | 
     if frequency is None:
         return
     option = f"CutEntry.chatter_frequency_hz {frequency:g}"
+    if word == "cannot tell":
+        raise ValueError(f"{option} belongs to a cut that chatters. Give CutEntry.has_chatter too.")
     if word == "stable":
         raise ValueError(f"{option} contradicts a stable cut. Leave out the frequency, or give CutEntry.has_chatter.")
     if not 0 < frequency < 1e5:

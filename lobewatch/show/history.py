@@ -11,12 +11,13 @@ import msgspec
 
 from acquisition import Conditions, Remark
 from dsm import format_rounded
+from lobewatch.cuts.learning.power_readings import find_reading_remarks
 from lobewatch.cuts.learning.verdict_by_sound import make_contradiction_remark
 from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
-from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
+from lobewatch.machine.journal.entries import POWER_READING, CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.measurement.hit_choice import format_decisions
@@ -39,6 +40,8 @@ def cut_summary_text(cut: CutEntry) -> str:
 
 def cut_result_text(cut: CutEntry) -> str:
     """Return the result of a test cut in words."""
+    if cut.reason == POWER_READING:
+        return "power reading"
     heard: str = cut.word
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
@@ -91,7 +94,8 @@ def _acknowledgement_json(ack: Acknowledgement) -> JsonObject:
 def saved_cut_remarks(logbook: Logbook, cut: CutEntry, earlier: Sequence[CutEntry]) -> list[Remark]:
     """Return the remarks on a cut that was saved; earlier: cuts saved before."""
     contrary = find_contradicting_cuts(cut, earlier) if cut.is_usable else ()
-    return [*untapped_remarks(logbook, cut), *map(contradiction_remark, contrary)]
+    asked = find_reading_remarks(cut, logbook.machine, earlier)
+    return [*untapped_remarks(logbook, cut), *map(contradiction_remark, contrary), *asked]
 
 
 def untapped_remarks(logbook: Logbook, cut: CutEntry) -> list[Remark]:

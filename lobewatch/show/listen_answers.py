@@ -8,8 +8,10 @@ from lobewatch.cuts.learning.next_speed import NextSpeeds
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.logbook.heard_cuts import is_tool_untapped, suggest_by_sound
+from lobewatch.logbook.production import plan_next_cut
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
+from lobewatch.show.cuts.production_steps import next_step_json, next_step_lines
 from lobewatch.show.cuts.recorded_cuts import recording_json, recording_texts
 from lobewatch.show.history import saved_cut_remarks
 from lobewatch.show.terminal.output import JsonObject, Texts
@@ -39,7 +41,10 @@ def stored_answer(
     ]
     payload, texts = _suggest_untapped(logbook, comparisons, [*earlier, *stored])
     saved = recording_texts(comparisons, [cut.id for cut in stored])
-    return recording_json(comparisons, rows) | payload, [*saved, *texts], [remark for own in remarks for remark in own]
+    plan = plan_next_cut(logbook, stored[-1].program, [*earlier, *stored])
+    texts = [*texts, *next_step_lines(plan, logbook.folder.path)]
+    payload = recording_json(comparisons, rows) | payload | next_step_json(plan)
+    return payload, [*saved, *texts], [remark for own in remarks for remark in own]
 
 
 def _suggest_untapped(

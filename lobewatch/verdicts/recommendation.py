@@ -163,7 +163,7 @@ def recommend(
     if isinstance(tool, DataError):
         tap = f"Run TapSession.run MACHINE Circumstances.tool {shlex.quote(table.tool)}"
         return Recommendation(table, either, reason=str(tool), remedies=(tap,))
-    if gap := _find_gap(table, tool, machine) or _find_speed_conflict(CutRange.of(machine, table)):
+    if gap := find_gap(table, tool, machine) or _find_speed_conflict(CutRange.of(machine, table)):
         return Recommendation(table, either, reason=gap[0], remedies=gap[1:])
     search = SettingSearch(ProgramCase(at_speed.apply_coefficients(table), tool, machine, at_speed, either))
     if is_set and present_rpm is not None:
@@ -178,7 +178,7 @@ def recommend(
     return replace(_recommend_setting(search, table, setting), alternatives=others)
 
 
-def _find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
+def find_gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
     """Return why nothing can be called stable at any setting, and the remedies; empty if it can."""
     asked = find_program_questions(machine, table, tool.predicted or machine.tap.position_mm > 0)
     asked = [doubted for doubted in asked if doubted.key not in REQUESTED_KEYS]

@@ -56,13 +56,14 @@ class PowerEvidence:
     """Error of this reading only."""
 
 
-def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool) -> PowerEvidence:
-    """Estimate Kt from the drive power of a cut in a material."""
+def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool, days: int = 1) -> PowerEvidence:
+    """Estimate Kt from the drive power of a cut in a material; days: number of days that the power is averaged over."""
     of_edges = power.edge_share / (1 + power.edge_share)
     edge_spread = EDGE_FORCE_SPREAD if power.edge_known else UNKNOWN_EDGE_FORCE_SPREAD
     common = math.hypot(DRIVE_POWER_SPREAD, edge_spread * of_edges)
     median, scatter = (CHATTER_POWER_FACTOR, CHATTER_POWER_SPREAD) if chatters else (1.0, 0.0)
-    return PowerEvidence(power.tangential / cut.tangential / median, common, math.hypot(POWER_READING_SPREAD, scatter))
+    own = math.hypot(POWER_READING_SPREAD, scatter) / math.sqrt(days)
+    return PowerEvidence(power.tangential / cut.tangential / median, common, own)
 
 
 AGED_FREQUENCY_CHANGE = 0.02
@@ -115,9 +116,14 @@ class CutEvidence:
         return self.cut.repeats_per_turn * self.speed_rpm / 60
 
     @property
+    def has_verdict(self) -> bool:
+        """True unless the cut is a power reading only."""
+        return self.verdict != "cannot tell"
+
+    @property
     def has_chatter(self) -> bool:
         """True if the cut was not stable."""
-        return self.verdict != "stable"
+        return self.verdict in ("chatter", "flip")
 
     @property
     def has_frequency(self) -> bool:
@@ -153,6 +159,20 @@ def find_cut_to_repeat(cuts: Sequence[CutEvidence], rejected: Collection[CutEvid
     """Find the first rejected cut that was made only once, or None."""
     made_once = (cut for cut in cuts if sum(cut.is_repeat_of(other) for other in cuts) == 1)
     return next((cut for cut in made_once if cut in rejected), None)
+
+
+MIN_DEEPER_CHATTER = 3
+"""Number of deeper cuts that chatter against one stable cut from which its verdict is asked again."""
+
+
+def find_questioned_cut(cuts: Sequence[CutEvidence]) -> CutEvidence | None:
+    """Find the deepest stable cut if it was made once and at least three deeper cuts chatter, or None."""
+    stable = [cut for cut in cuts if cut.has_verdict and not cut.has_chatter]
+    deepest = max(stable, key=lambda cut: cut.depth, default=None)
+    if deepest is None or sum(deepest.is_repeat_of(cut) for cut in cuts) > 1:
+        return None
+    deeper = sum(cut.has_chatter and cut.depth > deepest.depth for cut in cuts)
+    return deepest if deeper >= MIN_DEEPER_CHATTER else None
 
 
 LIMIT_SPREAD = 0.05
@@ -207,7 +227,10 @@ class CutPrediction(NamedTuple):
 
 
 def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
-    """Predict what samples would do in the worst feed direction of a cut, at its own depth."""
+    """Predict what samples would do in the worst feed direction of a cut, at its own depth; NaN without a verdict."""
+    if not cut.has_verdict:
+        unknown = np.full(len(samples), np.nan)
+        return CutPrediction(unknown, unknown, unknown, np.zeros(len(samples), dtype=np.bool_))
     rows = samples.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
     speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * samples.at_rest.speed_rpm
     rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
@@ -221,8 +244,10 @@ def log_likelihood(cut: CutEvidence, prediction: CutPrediction, again: Sequence[
     """Return the log likelihood of the recorded verdict for each sample, shape (r,).
 
     again: the same cut as it was made at other times, whose verdicts are known: all have one truth, so that of two
-    verdicts that differ one is wrong, however near its limit the cut is.
+    verdicts that differ one is wrong, however near its limit the cut is. 0 without a verdict.
     """
+    if not cut.has_verdict:
+        return np.zeros(prediction.excess.shape)
     return np.asarray(np.log(sum(_likelihoods(cut, prediction, again))))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence, estimate_force_by_power
+from lobewatch.cuts.learning.power_readings import merge_readings
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
@@ -108,27 +109,26 @@ def _find_own_cuts(table: ProgramTable, tool: Assembly, machine: Machine, cuts: 
     """Find the cuts of this program, at speeds corrected for the change of the natural frequency."""
     shape = geometry_key(machine.build_cut(table))
     evidence = collect_evidence(cuts, table, tool, machine)
-    own = [cut for cut in evidence if cut.material == 0 and geometry_key(cut.cut) == shape]
+    own = [cut for cut in evidence if cut.has_verdict and cut.material == 0 and geometry_key(cut.cut) == shape]
     return [replace(cut, speed_rpm=cut.speed_rpm / cut.frequency_ratio) for cut in own]
 
 
 def collect_evidence(cuts: CutEntries, table: ProgramTable, tool: Assembly, machine: Machine) -> Iterator[CutEvidence]:
-    """Yield the usable cuts of the same tool, oldest first."""
+    """Yield the power readings of the same tool, one of each program, then the usable cuts, oldest first."""
     known = machine.coefficients(table)
     materials = [(known.material, known.tangential, known.radial)]
-    for entry in cuts:
-        if entry.tool != table.tool or not entry.is_usable:
-            continue
+    own = [entry for entry in cuts if entry.tool == table.tool]
+    for entry, days in (*merge_readings(own), *((cut, 1) for cut in own if cut.is_usable)):
         material = entry.coefficients, entry.cut.tangential, entry.cut.radial
         if material not in materials:
             materials.append(material)
-        yield _build_evidence(entry, materials.index(material), tool)
+        yield _build_evidence(entry, materials.index(material), tool, days)
 
 
-def _build_evidence(cut: CutEntry, material: int, tool: Assembly) -> CutEvidence:
+def _build_evidence(cut: CutEntry, material: int, tool: Assembly, days: int) -> CutEvidence:
     angles = FEED_ANGLES.values() if cut.feed == "both" else (FEED_ANGLES[cut.feed],)
     frequency = float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz
-    power = None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter)
+    power = None if cut.power is None else estimate_force_by_power(cut.power, cut.cut, cut.has_chatter, days)
     made = cut.cut, cut.speed_rpm, cut.depth, cut.word, frequency, tuple(angles), material
     return CutEvidence(*made, cut.by != "ear", _frequency_ratio(cut, tool), cut.id, power)
 

@@ -11,8 +11,9 @@ import numpy as np
 from acquisition import Remark
 from lobes import MillingRows
 from lobewatch.arrays import Floats, Indices
-from lobewatch.cuts.learning import cut_likelihood
+from lobewatch.cuts.learning import cut_likelihood, drive_gain
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
+from lobewatch.cuts.learning.power_readings import make_material_remark
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty
@@ -87,6 +88,15 @@ class Posterior(NamedTuple):
         return intervals
 
     @property
+    def drive_gain(self) -> Interval | None:
+        """Interval of the displayed power over that of the cuts by their verdicts only; None without a power."""
+        shown = drive_gain.compare_displayed_power(self.cuts, self.samples)
+        if shown is None:
+            return None
+        by_verdicts = self._replace(log_weight=self.log_weight - shown.log_likelihood)
+        return _weighted_interval(shown.gain, by_verdicts.weights)
+
+    @property
     def n_frequencies(self) -> int:
         """Number of cuts with a chatter frequency; without any, natural frequencies cannot be learned."""
         return sum(cut.has_frequency for cut in self.cuts)
@@ -138,6 +148,10 @@ class NewEvidence(NamedTuple):
         posterior = prior._replace(log_weight=prior.log_weight + likelihood, cuts=(*prior.cuts, self.cut))
         return _refresh(posterior) if posterior.effective_size < MIN_EFFECTIVE_SAMPLES else posterior
 
+    def without_power(self) -> "NewEvidence":
+        """Return the cut without its power."""
+        return self._replace(cut=replace(self.cut, power=None))
+
 
 def build_prior(
     rest: MillingRows,
@@ -158,7 +172,7 @@ def _cut_log_likelihood(
 ) -> Floats:
     """Return the log likelihood of one cut after those before it; an old cut counts less."""
     word = cut_likelihood.log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    return cut.weight * word + cut_likelihood.power_log_likelihood(cut, samples.force_factors(cut.material), before)
+    return cut.weight * word + drive_gain.power_log_likelihood(cut, samples, before)
 
 
 def _refresh(posterior: Posterior) -> Posterior:
@@ -231,6 +245,12 @@ class Contradiction(StrEnum):
     """Stable where most samples that explain the other cuts chatter."""
     POWER = "power"
     """Power with another Kt than that of the cuts before it."""
+    MATERIAL = "material"
+    """Power with a Kt that is off from that of the material by a factor of two."""
+
+
+POWER_CONTRADICTIONS = (Contradiction.POWER, Contradiction.MATERIAL)
+"""Contradictions that leave the verdict of a cut valid."""
 
 
 class InconsistentCut(NamedTuple):
@@ -281,12 +301,13 @@ def is_power_inconsistent(evidence: NewEvidence) -> bool:
 def find_inconsistent_cuts(posterior: Posterior) -> tuple[InconsistentCut, ...]:
     """Find the cuts to reject, of those that were learned from."""
     few = posterior.resample(N_CHECK_SAMPLES)
-    return tuple(filter(None, (find_contradiction(few.predict(cut)) for cut in posterior.cuts)))
+    return tuple(filter(None, (find_contradiction(few.predict(cut)) for cut in posterior.cuts if cut.has_verdict)))
 
 
 def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[InconsistentCut], about: str) -> Iterator[Remark]:
     """Yield remarks on rejected cuts and unusual frequencies; about: the program."""
     yield from map(_inconsistent_cut_remark, rejected)
+    yield from _gain_remarks(posterior.drive_gain, about)
     if posterior.is_frequency_unusual:
         low, high = posterior.samples.usual_frequency_interval
         usual = f"{low:.3g} to {high:.3g} times that of the tap test"
@@ -294,6 +315,15 @@ def inconsistent_cut_remarks(posterior: Posterior, rejected: Sequence[Inconsiste
         yield Remark(
             "frequency-far-off", about, text, "Tap again with a warm spindle and the tool and stick-out of the cuts"
         )
+
+
+def _gain_remarks(gain: Interval | None, about: str) -> Iterator[Remark]:
+    """Yield the remark on a drive whose display contradicts stable and chattering cuts."""
+    if gain is None or gain.low <= 1 <= gain.high or max(gain.mean, 1 / gain.mean) < drive_gain.MIN_DOUBTED_GAIN:
+        return
+    text = f"the drive shows {gain.mean:.2f} times the power of the cuts ({gain.low:.2f} to {gain.high:.2f})"
+    cure = "Subtract the power in air, convert per cent to kW, and multiply mains power by the efficiency of the drive"
+    yield Remark("drive-gain", about, text, cure)
 
 
 def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
@@ -304,6 +334,8 @@ def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
 def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     """Build the remark on a rejected cut."""
     cut = contradicting.cut
+    if contradicting.contradiction is Contradiction.MATERIAL:
+        return make_material_remark(cut.id, 1.0 if cut.power is None else cut.power.force)
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong according to the other cuts"

@@ -13,7 +13,8 @@ from lobewatch.arrays import Floats
 from lobewatch.cuts.learning import posterior as posteriors
 from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts, collect_evidence
-from lobewatch.cuts.learning.posterior import Contradiction, InconsistentCut, Posterior
+from lobewatch.cuts.learning.posterior import POWER_CONTRADICTIONS, Contradiction, InconsistentCut, Posterior
+from lobewatch.cuts.learning.power_readings import is_off_by_two
 from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.machine.journal.entries import geometry_key
@@ -46,12 +47,12 @@ class LearningResult(NamedTuple):
     @property
     def rejected_cuts(self) -> tuple[CutEvidence, ...]:
         """Cuts with a rejected label."""
-        return tuple(odd.cut for odd in self.inconsistent_cuts if odd.contradiction is not Contradiction.POWER)
+        return tuple(odd.cut for odd in self.inconsistent_cuts if odd.contradiction not in POWER_CONTRADICTIONS)
 
     @property
     def accepted_cuts(self) -> tuple[CutEvidence, ...]:
         """Cuts with an accepted label."""
-        return tuple(cut for cut in self.posterior.cuts if cut not in self.rejected_cuts)
+        return tuple(cut for cut in self.posterior.cuts if cut.has_verdict and cut not in self.rejected_cuts)
 
 
 class NextCut(NamedTuple):
@@ -76,16 +77,19 @@ def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: C
     """Learn from the cuts of a machine; cuts of other tools do not count."""
     resting, doubt = build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine)
     start = posteriors.build_prior(resting, doubt, drop=find_speed_drop(tool, machine, machine.speed.high_rpm))
-    posterior, odd_powers = start, []
+    posterior, odd_powers, material = start, list[InconsistentCut](), list[InconsistentCut]()
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
-        if posteriors.is_power_inconsistent(evidence):
+        force, is_odd = 1.0 if cut.power is None else cut.power.force, posteriors.is_power_inconsistent(evidence)
+        if is_odd:
             odd_powers.append(InconsistentCut(cut, Contradiction.POWER))
-            evidence = evidence._replace(cut=replace(cut, power=None))
-        posterior = evidence.update()
-    shape = geometry_key(machine.build_cut(table))
-    own_cuts = tuple(cut for cut in posterior.cuts if cut.material == 0 and geometry_key(cut.cut) == shape)
-    inconsistent = (*posteriors.find_inconsistent_cuts(posterior), *odd_powers)
+        elif is_off_by_two(force):
+            material = [InconsistentCut(cut, Contradiction.MATERIAL)]
+        is_left_out = is_odd or (force < 1 and is_off_by_two(force))
+        posterior = (evidence.without_power() if is_left_out else evidence).update()
+    shape, verdicts = geometry_key(machine.build_cut(table)), [cut for cut in posterior.cuts if cut.has_verdict]
+    own_cuts = tuple(cut for cut in verdicts if cut.material == 0 and geometry_key(cut.cut) == shape)
+    inconsistent = (*posteriors.find_inconsistent_cuts(posterior), *odd_powers, *material)
     return LearningResult(table, start, posterior, inconsistent, own_cuts)
 
 

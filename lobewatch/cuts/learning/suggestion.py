@@ -10,7 +10,13 @@ from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning import cut_likelihood
-from lobewatch.cuts.learning.cut_likelihood import CutEvidence, find_cut_to_repeat, is_setting_taken, predict_cut
+from lobewatch.cuts.learning.cut_likelihood import (
+    CutEvidence,
+    find_cut_to_repeat,
+    find_questioned_cut,
+    is_setting_taken,
+    predict_cut,
+)
 from lobewatch.cuts.learning.posterior import Posterior, wrong_label_probability
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.machine.journal.entries import CutVerdict
@@ -279,8 +285,11 @@ def _find_repeat(
 ) -> CutEvidence | None:
     """Find the cut whose verdict is worth a repetition, or None.
 
-    The last cut makes none again whose "stable" is rejected: that would gain nothing.
+    A stable cut against which three deeper ones chatter comes first. The last cut makes none again whose "stable" is
+    rejected: that would gain nothing.
     """
+    if (questioned := find_questioned_cut(cuts)) is not None:
+        return questioned
     again = find_cut_to_repeat(cuts, [cut for cut in rejected if cut.has_chatter or left > 1])
     if again is not None or left <= 1:
         return again

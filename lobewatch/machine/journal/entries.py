@@ -21,6 +21,8 @@ CutVerdict = Literal["stable", "chatter", "flip", "cannot tell"]
 """Result of a test cut; flip: chatter with the period of two teeth."""
 CUT_LINE_KIND = "cut"
 """Kind of its journal line."""
+POWER_READING = "power-reading"
+"""Reason of "cannot tell" of a power of normal production, which has no verdict."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +90,8 @@ class CutEntry:
     """Result of the cut."""
     chatter_frequency_hz: float | None
     """Chatter frequency (Hz); None without chatter or if unknown."""
-    by: Literal["ear", "accelerometer", "microphone"]
-    """Ear or instrument that detected the result."""
+    by: Literal["ear", "accelerometer", "microphone", "display"]
+    """Ear or instrument that detected the result; "display" of the drive for a power without a verdict."""
     software: str
     """Version of lobewatch that wrote the line."""
     chatter_frequency_std_hz: float | None = None
@@ -111,8 +113,22 @@ class CutEntry:
 
     @property
     def is_usable(self) -> bool:
-        """True if the cut counts for learning."""
+        """True if the verdict of the cut counts for learning."""
         return not self.excluded and self.word != "cannot tell"
+
+    @property
+    def is_power_reading(self) -> bool:
+        """True for a power of normal production that counts for learning."""
+        return not self.excluded and self.power is not None and self.reason == POWER_READING
+
+    @property
+    def is_evidence(self) -> bool:
+        """True if verdict or power of the cut count for learning."""
+        return self.is_usable or self.is_power_reading
+
+    def with_tangential_by_power(self, tangential: float) -> "CutEntry":
+        """Return the cut with another Kt by power (Pa)."""
+        return self if self.power is None else replace(self, power=replace(self.power, tangential=tangential))
 
     @property
     def has_chatter(self) -> bool:

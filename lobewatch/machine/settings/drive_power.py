@@ -122,15 +122,39 @@ def build_power_reading(
         raise ValueError(f"{option} {unknown}. Leave out the power, or read the power of a cut with one radial depth.")
     if power_kw > machine.drive.power_kw:
         raise ValueError(f"{option} is above power_kw={machine.drive.power_kw:g} of [drive]. {cure}")
-    cut, edge = machine.build_cut(table), machine.coefficients(table).tangential_edge
-    diameter, feed = table.tool_diameter_mm / 1e3, table.feed_per_tooth_mm / 1e3
-    reading = PowerReading(1e3 * power_kw, cut, depth, diameter, feed, edge)
+    reading = _power_reading(1e3 * power_kw, machine, table, table.feed_per_tooth_mm, depth)
     expected_kw = reading.expected_power(speed_rpm) / 1e3
     low, high = expected_kw / MAX_POWER_RATIO, expected_kw * MAX_POWER_RATIO
     if not low <= power_kw <= high:
-        expected = f"the {low:.2g} to {high:.2g} kW expected with Kt {cut.tangential / 1e6:.0f} N/mm2"
+        expected = f"the {low:.2g} to {high:.2g} kW expected with Kt {reading.cut.tangential / 1e6:.0f} N/mm2"
         raise ValueError(f"{option} is outside {expected}. {cure}")
     return reading
+
+
+def _power_reading(
+    watts: float, machine: Machine, table: CutTable, feed_per_tooth_mm: float, depth: float
+) -> PowerReading:
+    edge, diameter = machine.coefficients(table).tangential_edge, table.tool_diameter_mm / 1e3
+    return PowerReading(watts, machine.build_cut(table), depth, diameter, feed_per_tooth_mm / 1e3, edge)
+
+
+def expected_power(
+    machine: Machine, table: CutTable, speed_rpm: float, depth: float, force: float = 1.0
+) -> float | None:
+    """Return the power (W) of a cut with its own feed per tooth; None without a feed.
+
+    Parameters
+    ----------
+    machine, table
+        Machine and cut.
+    speed_rpm, depth
+        Speed (rpm) and axial depth ap (m).
+    force
+        Cutting forces over those of machine.toml.
+    """
+    if table.feed_per_tooth_mm is None or len(table.immersions) > 1:
+        return None
+    return force * _power_reading(0.0, machine, table, table.feed_per_tooth_mm, depth).expected_power(speed_rpm)
 
 
 SPEED_STEP_RPM, DEPTH_STEP_MM = 10.0, 0.05

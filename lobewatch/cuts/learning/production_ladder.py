@@ -1,0 +1,148 @@
+"""Ladder of ordinary cuts: each removes more than the one before it, and hardly chatters on what is known by then."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.cut_likelihood import (
+    LIMIT_SPREAD,
+    CutEvidence,
+    CutPrediction,
+    find_questioned_cut,
+    is_setting_taken,
+    predict_cut,
+)
+from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.learning.suggestion import MIN_CANDIDATE_DISTANCE, CutGrid, LimitCharts, floor_depth
+from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
+
+MAX_CUT_RISK = 0.05
+"""Largest chance of chatter of a production cut."""
+MAX_LADDER_CUTS = 3
+"""Largest number of named cuts."""
+N_LADDER_SAMPLES = 1000
+"""Number of samples from which the chance is computed."""
+N_VERIFIED_SPEEDS = 4
+"""Number of speeds whose depth is verified; chosen."""
+MIN_STEP_GAIN = 0.03
+"""Smallest gain in removal rate of a step over the one before it; chosen."""
+
+
+class LadderStep(NamedTuple):
+    """Ordinary cut of the ladder."""
+
+    speed_rpm: float
+    """Spindle speed (rpm)."""
+    depth: float
+    """Axial depth of cut (m)."""
+    chatter_probability: float
+    """Chance of chatter if all earlier steps are stable."""
+    gain: float
+    """Gain in removal rate over the running cut; inf without one."""
+
+    @property
+    def removal_rate(self) -> float:
+        """Speed times depth (rpm m)."""
+        return self.speed_rpm * self.depth
+
+
+class Ladder(NamedTuple):
+    """Next ordinary cuts."""
+
+    steps: tuple[LadderStep, ...]
+    """Cuts in their order; empty if none removes more with at most `MAX_CUT_RISK`."""
+    questioned: CutEvidence | None = None
+    """Stable cut that deeper cuts put in question; its answer comes before any step."""
+
+
+def find_ladder(
+    posterior: Posterior,
+    grid: CutGrid,
+    cuts: Sequence[CutEvidence],
+    rejected: Collection[CutEvidence],
+    running: float,
+    count: int = MAX_LADDER_CUTS,
+) -> Ladder:
+    """Find the next ordinary cuts.
+
+    Parameters
+    ----------
+    posterior
+        Spindle at speed after all cuts.
+    grid
+        Possible cuts.
+    cuts, rejected
+        Cuts of this program, and those with a rejected verdict.
+    running
+        Removal rate (rpm m) of the cut that runs now; 0 without one.
+    count
+        Largest number of steps.
+    """
+    if (questioned := find_questioned_cut(cuts)) is not None:
+        return Ladder((), questioned)
+    steps, rate = list[LadderStep](), running
+    while len(steps) < count and (step := _find_step(posterior, grid, cuts, rejected, rate)) is not None:
+        steps.append(step._replace(gain=step.removal_rate / running - 1 if running else np.inf))
+        rate = step.removal_rate
+        if len(steps) < count:
+            posterior = posterior.learn_from(grid.build_evidence(step.speed_rpm, step.depth))
+    return Ladder(tuple(steps))
+
+
+def _find_step(
+    posterior: Posterior, grid: CutGrid, cuts: Sequence[CutEvidence], rejected: Collection[CutEvidence], rate: float
+) -> LadderStep | None:
+    """Find the cut of the largest removal rate with little risk, or None if it gains nothing over a rate (rpm m)."""
+    few = posterior.resample(N_LADDER_SAMPLES)
+    steps = [_verify_speed(few, grid, *place) for place in _list_speeds(few, grid)]
+    free = [step for step in steps if step and not is_setting_taken(step.speed_rpm, step.depth, cuts, rejected)]
+    best = max(free, key=lambda step: step.removal_rate, default=None)
+    return best if best is not None and best.removal_rate > (1 + MIN_STEP_GAIN) * rate else None
+
+
+def _list_speeds(few: Posterior, grid: CutGrid) -> Iterator[tuple[float, float]]:
+    """Yield speeds (rpm) and depths (m) with the largest removal rates by the zero-order approximation."""
+    depths = np.quantile(LimitCharts.of(few.samples, grid).limits, MAX_CUT_RISK, axis=0)
+    chosen = list[float]()
+    for row in np.argsort(-grid.speeds * depths).tolist():
+        speed = float(grid.speeds[row])
+        if all(abs(np.log(speed / other)) > MIN_CANDIDATE_DISTANCE for other in chosen):
+            chosen.append(speed)
+            yield speed, float(depths[row])
+        if len(chosen) == N_VERIFIED_SPEEDS:
+            return
+
+
+def _verify_speed(few: Posterior, grid: CutGrid, speed: float, depth: float) -> LadderStep | None:
+    """Return the deepest cut with little risk at a speed (rpm), near a depth (m); None without one."""
+    deepest = float(np.interp(speed, grid.speeds, grid.max_depths))
+    depth = max(floor_depth(depth), DEPTH_STEP_MM / 1e3)
+    for _ in range(2):
+        prediction = _predict(few, grid, speed, depth)
+        depth = _deepest_with_little_risk(prediction, depth, deepest)
+        if depth <= 0:
+            return None
+    chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))
+    return LadderStep(speed, depth, chance, np.inf) if chance <= MAX_CUT_RISK else None
+
+
+def _predict(few: Posterior, grid: CutGrid, speed: float, depth: float) -> CutPrediction:
+    """Predict a cut at its commanded speed, from which the true one may differ."""
+    return predict_cut(replace(grid.build_evidence(speed, depth), speed_found=False), few.samples)
+
+
+def _deepest_with_little_risk(prediction: CutPrediction, depth: float, deepest: float) -> float:
+    """Return the deepest cut (m) with little risk, by how far the limits are from a depth (m)."""
+    depths = np.arange(DEPTH_STEP_MM / 1e3, floor_depth(deepest) + DEPTH_STEP_MM / 2e3, DEPTH_STEP_MM / 1e3)
+    chances = _chances_at(prediction, np.log(depths / depth))
+    fine = np.flatnonzero(chances <= MAX_CUT_RISK)
+    return floor_depth(float(depths[fine[-1]])) if fine.size else 0.0
+
+
+def _chances_at(prediction: CutPrediction, deeper: Floats) -> Floats:
+    """Return the chance of chatter at depths, as logarithms over that of a prediction, shape (d,)."""
+    return np.asarray(np.mean(scipy.special.ndtr((prediction.excess[:, np.newaxis] + deeper) / LIMIT_SPREAD), axis=0))

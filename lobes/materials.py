@@ -16,6 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from lobes.coefficient_distribution import JointCoefficients, Quantiles, pool_intervals
 from lobes.coefficients import CuttingCoefficients, SpecificForce
 
 
@@ -82,8 +83,8 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
     of_tests = [test.tangential for test in tests]
     tangential = float(np.mean([force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + of_tests))
     edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
-    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + of_tests
-    limits = [(1 + side * MIN_COEFFICIENT_RANGE) * tangential for side in (-1, 1)]
+    distribution = JointCoefficients(_pool_forces(forces, of_tests, tangential), _ratio_quantiles(ratio))
+    kt = distribution.tangential.values
     return CuttingCoefficients(
         material=row["material"],
         tangential=tangential,
@@ -94,10 +95,24 @@ def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
         iso_group=row["iso_group"],
         vdi_3323_group=row["vdi_3323_group"],
         equivalents=tuple(row["equivalents"].split(";")),
-        tangential_range=(min(*published, *limits), max(*published, *limits)),
+        tangential_range=(float(kt[0]), float(kt[-1])),
         ratio_range=(float(ratio["low"]), float(ratio["high"])),
         specific_forces=tuple(forces),
+        distribution=distribution,
     )
+
+
+def _pool_forces(forces: Sequence[SpecificForce], of_tests: Sequence[float], mean: float) -> Quantiles:
+    """Pool Kt (Pa): each publication over the chip thicknesses, each test, and the error of a single source."""
+    thin, thick = CHIP_THICKNESS_RANGE
+    published = [(force.tangential(thick), force.tangential(thin)) for force in forces]
+    error = (1 - MIN_COEFFICIENT_RANGE) * mean, (1 + MIN_COEFFICIENT_RANGE) * mean
+    return pool_intervals([*published, *((test, test) for test in of_tests), error])
+
+
+def _ratio_quantiles(row: dict[str, str]) -> Quantiles:
+    """Return the quantiles of Kr/Kt: as likely below as above the published one, evenly on either side."""
+    return Quantiles(np.array([0.0, 0.5, 1.0]), np.array([float(row[name]) for name in ("low", "middle", "high")]))
 
 
 def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:

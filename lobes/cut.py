@@ -47,6 +47,11 @@ class Cut:
     H = [[(Kt c + Kr s) s, (Kt c + Kr s) c], [(-Kt s + Kr c) s, (-Kt s + Kr c) c]], s = sin phi, c = cos phi,
     tau the time since the previous tooth passed.
 
+    Process damping: the flank of the tooth indents the wavy surface and resists the velocity v_r of the tooth along
+    the normal n = (s, c) of the surface with -b C / V v_r n, V = pi D rpm / 60 the surface speed. C / D is enough, as
+    C / V = C / D 60 / (pi rpm).
+    Source: Tyler & Schmitz, Analytical process damping stability prediction, J. Manuf. Process. 15 (2013) 69-76.
+
     Raises
     ------
     ValueError
@@ -78,6 +83,8 @@ class Cut:
     """Angle from x to the feed (rad): 0 feeds along x, pi/2 along y; angles half a turn apart are equivalent."""
     pitch: tuple[float, ...] = ()
     """Angle from each tooth to the previous one (rad), in order of entry; () for evenly spaced teeth."""
+    process_damping: float = 0.0
+    """Process damping coefficient C over cutter diameter D (Pa); 0 for none."""
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -91,6 +98,8 @@ class Cut:
         check_coefficients(self.tangential, self.radial)
         text = "rad/m is not a finite number >= 0. Give 2 tan(helix angle) / diameter."
         check_number("helix_lag", self.helix_lag, text, may_be_zero=True)
+        text = "Pa is not a finite number >= 0. Give the process damping coefficient C divided by the cutter diameter."
+        check_number("process_damping", self.process_damping, text, may_be_zero=True)
         if not np.isfinite(self.feed_angle):
             raise ValueError(
                 f"feed_angle={self.feed_angle} rad is not finite. Give 0 for a feed along x, pi/2 along y."

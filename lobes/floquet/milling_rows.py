@@ -38,6 +38,8 @@ class MillingRows:
     """Cutting coefficients Kr (Pa), shape (r,)."""
     feed_angle: Floats
     """Angles from x to the feed (rad), shape (r,)."""
+    process_damping: Floats
+    """Process damping coefficients over cutter diameter C / D (Pa), shape (r,)."""
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -73,6 +75,11 @@ class MillingRows:
         return tip_participation(self.damping_ratio, self.phase)
 
     @property
+    def damping_per_depth(self) -> Floats:
+        """Process damping per depth C / V (N s/m^2), shape (r,)."""
+        return np.asarray(self.process_damping * 60 / (np.pi * self.speed_rpm))
+
+    @property
     def tooth_period(self) -> Floats:
         """Mean time between two teeth (s), shape (r,)."""
         return np.asarray(60 / (self.cut.teeth * self.speed_rpm))
@@ -83,6 +90,7 @@ class MillingRows:
         return self.tooth_period * len(self.cut.pitch_pattern)
 
 
+_FIELDS_OF_CUT = ("tangential", "radial", "feed_angle", "process_damping")
 _VARYING_FIELDS = [field.name for field in fields(MillingRows) if field.name not in ("cut", "direction", "axes")]
 
 
@@ -137,7 +145,7 @@ def rows_at_speeds(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> Millin
         stiffness=ones * (system.frequency / system.shape) ** 2,
         vector=np.tile(system.vector, (speed_rpm.size, 1, 1)),
         speed_rpm=speed_rpm,
-        **{name: np.full(speed_rpm.shape, getattr(cut, name)) for name in ("tangential", "radial", "feed_angle")},
+        **{name: np.full(speed_rpm.shape, getattr(cut, name)) for name in _FIELDS_OF_CUT},
     )
 
 

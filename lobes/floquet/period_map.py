@@ -11,6 +11,8 @@ the cut the modes vibrate freely, exactly. For r rows and d depths:
     displacement = vector q, of a complex mode vector times its shares of q and velocity
     (`MillingRows.tip_participation`);  force = vector . F
 
+Process damping adds -b C / V n n' (d tip / dt) for each tooth, n the normal of the surface (`DampedResponse`).
+
 With unequal pitches each tooth meets the surface that the previous tooth left a delay of its own ago:
 
     F(t) = -b sum_j H_j(t) (d(t) - d(t - tau_j))
@@ -28,6 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobes.floquet.damped_response import DampedResponse
 from lobes.floquet.milling_rows import MillingRows, is_out_of_cut, segment_ends
 from lobes.floquet.piece_response import PieceResponse, Precision, free_response, gauss_nodes, interpolation_weights
 from lobes.tooth_force import feed_rotation, force_shares
@@ -219,13 +222,21 @@ class _Segment:
     """Time of each (s), shape (r,)."""
     forces: Floats | None
     """Depth times force matrix at the nodes (N/m), shape (delays, p, p, s, k, r, d); None without a cut."""
+    damping: Floats | None
+    """Depth times process damping matrix at the nodes (N s/m), shape (p, p, s, k, r, d); None without damping."""
 
     @classmethod
     def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> "_Segment":
         angle = (ends[:, 1] - ends[:, 0]) / number
         starts = ends[:, :1] + angle[:, np.newaxis] * np.arange(number)
         time = angle / sum(rows.cut.pitch_pattern) * rows.period
-        return cls(starts, angle, time, None if is_free else _force_matrices(rows, starts, angle, depth))
+        if is_free:
+            return cls(starts, angle, time, None, None)
+        forces = _force_matrices(rows, starts, angle, depth, np.stack((rows.tangential, rows.radial), axis=1))
+        if not np.any(rows.process_damping):
+            return cls(starts, angle, time, forces, None)
+        normal = np.stack((np.zeros(len(rows)), rows.damping_per_depth), axis=1)
+        return cls(starts, angle, time, forces, _force_matrices(rows, starts, angle, depth, normal).sum(axis=0))
 
     def free_response(self, rows: MillingRows) -> Floats:
         """Return the map of z over all pieces without a cut, shape (r, 1, 2n, 2n)."""
@@ -238,9 +249,24 @@ def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: Precision) 
         if segment.forces is None:
             pieces.append((False, segment.free_response(rows).astype(kind)))
         else:
-            maps = PieceResponse.of(rows, segment.time).as_precision(kind).cutting(segment.forces[0].astype(kind))
-            pieces += [(True, piece) for piece in maps]
+            pieces += [(True, piece) for piece in _cutting_maps(rows, segment, kind)]
     return PeriodMap(tuple(pieces), rows.direction.size, gauss_nodes().node.size * rows.axes.size)
+
+
+def _cutting_maps(rows: MillingRows, segment: _Segment, kind: Precision) -> Floats:
+    """Return the maps of even teeth over the pieces of a segment with a cut (k, r, d, m, m)."""
+    forces = np.asarray(segment.forces)[0].astype(kind)
+    if segment.damping is None:
+        return PieceResponse.of(rows, segment.time).as_precision(kind).cutting(forces)
+    return DampedResponse.of(rows, segment.time).as_precision(kind).cutting(forces, segment.damping.astype(kind))
+
+
+def _loaded_maps(rows: MillingRows, segment: _Segment) -> Floats:
+    """Return the maps of uneven teeth over the pieces of a segment with a cut (k, r, d, m, m)."""
+    forces = np.asarray(segment.forces).sum(axis=0)
+    if segment.damping is None:
+        return PieceResponse.of(rows, segment.time).loaded(forces)
+    return DampedResponse.of(rows, segment.time).loaded(forces, segment.damping)
 
 
 def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
@@ -255,22 +281,21 @@ def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
         if segment.forces is None:
             pieces.append(UnevenPiece(segment.free_response(rows)))
         else:
-            maps = PieceResponse.of(rows, segment.time).loaded(segment.forces.sum(axis=0))
-            pieces += [UnevenPiece(piece, next(met)) for piece in maps]
+            pieces += [UnevenPiece(piece, next(met)) for piece in _loaded_maps(rows, segment)]
     return UnevenMap(tuple(pieces), rows.direction.size, rows.axes.size)
 
 
-def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
-    """Return depth times force matrix of the teeth of each delay at the nodes of pieces (N/m).
+def _force_matrices(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats, coefficients: Floats) -> Floats:
+    """Return depth times force matrix of the teeth of each delay at the nodes of pieces.
 
-    The pieces start at angles (r, k). Shape (delays, p, p, s, k, r, d).
+    The pieces start at angles (r, k). coefficients (r, 2): along the cut and normal to it, Kt and Kr in Pa for a matrix
+    in N/m. Shape (delays, p, p, s, k, r, d).
     """
     is_alike = rows.cut.helix_lag == 0 or bool(np.all(depth[:, 0] == depth[0, 0]))
     apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
     at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_nodes().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
     frame = feed_rotation(rows.feed_angle)[..., rows.axes]
-    coefficients = np.stack((rows.tangential, rows.radial), axis=1)
     by_share = np.einsum("rc,rmi,rnj->rcmnij", coefficients, frame, frame).reshape(len(rows), 8, -1)
     matrix = shares.reshape(*shares.shape[:2], -1, 8) @ by_share
     matrix = matrix.reshape(*matrix.shape[:2], *at.shape[1:], *[rows.axes.size] * 2)

@@ -127,27 +127,27 @@ class PieceResponse:
         tx, both = t * x, t * x + twice[..., np.newaxis] * x
         begin, ones, weights = nodes.share @ nodes.node, nodes.share.sum(axis=-1), nodes.weight @ nodes.share
         per_theta, give = theta[..., np.newaxis], theta / rows.stiffness
-        place = np.stack((1 - per_theta * _weighted_sums(tx, begin), _weighted_sums(tx, ones)), axis=-1)
+        place = np.stack((1 - per_theta * weighted_sums(tx, begin), weighted_sums(tx, ones)), axis=-1)
         forced = t * tx
         if np.any(rows.phase):
             of_place, of_velocity = (share[..., np.newaxis] for share in rows.tip_participation)
-            velocity = np.stack((-per_theta * _weighted_sums(x, begin), _weighted_sums(x, ones)), axis=-1)
+            velocity = np.stack((-per_theta * weighted_sums(x, begin), weighted_sums(x, ones)), axis=-1)
             place = of_place[..., np.newaxis] * place + of_velocity[..., np.newaxis] * velocity
             forced = of_place * forced + of_velocity * tx
-        pushes = (give[..., np.newaxis] * _weighted_sums(of, weights) for of in (tx, x))
+        pushes = (give[..., np.newaxis] * weighted_sums(of, weights) for of in (tx, x))
         at_begin, at_ones = begin @ nodes.weight, ones @ nodes.weight
         end_state = _block_matrix(
-            1 - theta**2 * _weighted_sums(x, at_begin),
-            theta * _weighted_sums(x, at_ones),
-            theta**2 * _weighted_sums(both, at_begin) - theta,
-            1 - theta * _weighted_sums(both, at_ones),
+            1 - theta**2 * weighted_sums(x, at_begin),
+            theta * weighted_sums(x, at_ones),
+            theta**2 * weighted_sums(both, at_begin) - theta,
+            1 - theta * weighted_sums(both, at_ones),
         )
         flexible = forced / rows.stiffness[..., np.newaxis]
         flexible = np.einsum("rnk,rnp,rnq->rpqk", flexible, rows.vector, rows.vector)
         per_force = np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in pushes], axis=1)
         shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
         at_nodes = shown.reshape(*shown.shape[:3], -1)
-        return cls(end_state, at_nodes, _weighted_sums(flexible, nodes.share), per_force)
+        return cls(end_state, at_nodes, weighted_sums(flexible, nodes.share), per_force)
 
     def as_precision(self, kind: Precision) -> Self:
         """Return the response with numbers of another precision."""
@@ -211,7 +211,7 @@ def _cases_first(matrices: Floats, cases: Sequence[int]) -> Floats:
     return np.ascontiguousarray(np.moveaxis(flat, -1, 0)).reshape(*cases, *matrices.shape[:2])
 
 
-def _weighted_sums(values: Complexes, shares: Complexes) -> Floats:
+def weighted_sums(values: Complexes, shares: Complexes) -> Floats:
     """Return twice the real parts of the sums of values (..., k) at the roots times shares (k, ...)."""
     parts = np.concatenate((values.real, values.imag), axis=-1)
     weights = 2 * np.concatenate((shares.real, -shares.imag))

@@ -38,6 +38,8 @@ class SpindleAtSpeed:
     """Cutting coefficient Kt in the learned median (N/mm2)."""
     radial: float = math.nan
     """Cutting coefficient Kr in the learned median (N/mm2)."""
+    process_damping: float = 0.0
+    """Process damping coefficient C in the learned median (N/m), or what machine.toml is sure of."""
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential", ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
@@ -73,11 +75,13 @@ class SpindleAtSpeed:
         Returns
         -------
         ProgramTable or CutTable
-            The same with the learned Kt and Kr.
+            The same with the learned Kt, Kr and C.
         """
         if self.uncertainty is None:
             return table
-        return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
+        learned = {"tangential_n_per_mm2": self.tangential, "radial_n_per_mm2": self.radial}
+        damping = (self.process_damping, self.process_damping)
+        return msgspec.structs.replace(table, **learned, process_damping_n_per_m=damping)
 
 
 NO_TEST_CUTS = SpindleAtSpeed()

@@ -27,6 +27,8 @@ MAX_MODE_PHASE = np.radians(89)
 """Largest phase of a sample (rad)."""
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients by tool wear; chosen."""
+WORN_LAND_UM = 300.0
+"""Width of the wear land of a worn edge: end of tool life by uniform flank wear in ISO 8688-2 (um)."""
 
 
 RecordT = TypeVar("RecordT", MillingRows, Mode)
@@ -63,6 +65,8 @@ class LearnedSamples(NamedTuple):
     """Kt over its mean, shape (r,)."""
     ratio: Floats
     """Kr/Kt over its mean, shape (r,)."""
+    process_damping: Floats
+    """Process damping coefficients over cutter diameter C / D (Pa), shape (r,); 0 where it is not taught."""
 
     def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
         """Build samples around a median (a row), at its speed; without: a cause that is left out."""
@@ -73,7 +77,9 @@ class LearnedSamples(NamedTuple):
         factors = self.frequency, self.damping_ratio, self.stiffness
         f, zeta, k = (1 + (factor[take] - 1) * spindle for factor in factors)
         rows = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=force, radial=force)
-        return replace(rows, phase=rows.phase + self.phase_change[take] * spindle, radial=rows.radial * direction)
+        damping = self.process_damping[take] if is_counted else rows.process_damping
+        phase = rows.phase + self.phase_change[take] * spindle
+        return replace(rows, phase=phase, radial=rows.radial * direction, process_damping=damping)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +209,17 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
     """
     mixing = np.array([_tap_correlation(mode) for mode in (*(assembly.x or ()), *(assembly.y or ()))])
     speed, (tangential, ratio, joint) = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
-    given = table.wear if isinstance(table, ProgramTable) else None
-    axes, wear = assembly.principal_directions, WEAR_FACTORS[given or machine.doubt.wear]
+    axes, wear = assembly.principal_directions, _wear_factor(table, machine)
     modes = _mode_uncertainty(assembly, machine.doubt)
     return Uncertainty(modes, mixing, speed, tangential, ratio, wear, axes, joint=joint)
+
+
+def _wear_factor(table: CutTable, machine: Machine) -> float:
+    """Return the largest factor on the cutting coefficients by the wear of a cut, or by its wear land if larger."""
+    if not isinstance(table, ProgramTable):
+        return WEAR_FACTORS[machine.doubt.wear]
+    by_land = 1 + (WEAR_FACTORS["worn"] - 1) * (table.wear_land_um or 0.0) / WORN_LAND_UM
+    return max(WEAR_FACTORS[table.wear or machine.doubt.wear], by_land)
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:

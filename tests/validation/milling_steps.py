@@ -12,6 +12,9 @@ While all teeth cut this is F = -b H(phi) (q(t) - q(t - tau)) without any rest, 
 part hides a small deviation. Between steps the modes swing freely, which is exact; the force of a step acts as one
 impulse in its middle (Stoermer-Verlet with exact flight: second order, explicit, without numerical damping). Complex
 modes jump with an impulse: the force is that of the tip half way, to second order.
+
+Process damping: while a tooth cuts, its flank resists its velocity out of the cut, F = -b C / V (n . d') n with the
+surface speed V = pi D rpm / 60. The velocity is that half way through the impulse, found by iteration.
 """
 
 from __future__ import annotations
@@ -37,6 +40,8 @@ LAG = 0.3
 FEWEST_SLICES = 5
 PART = 0.02
 """Lag of the parts of a slice over which its angles in the cut are averaged (rad)."""
+DAMPED, SMALL = 3, 0.2
+"""Iterations of the velocity half way through an impulse, and the largest share of it that process damping takes."""
 SAMPLES = 24
 """Times a tooth period at which the deviation is recorded."""
 
@@ -67,6 +72,10 @@ class Case:
     speed_rpm: float
     depth: float
     """Axial depth (m)."""
+    process_damping: float = 0.0
+    """C (N/m)."""
+    diameter: float = math.nan
+    """Cutter diameter (m), of which the speed of the surface follows."""
 
     def __post_init__(self) -> None:
         """Reject cases that cannot be simulated."""
@@ -77,6 +86,8 @@ class Case:
             raise ValueError(f"{self.teeth} teeth, immersion {self.immersion}, {self.direction!r} is no cut")
         if min(self.tangential, self.speed_rpm, self.depth) <= 0 or min(self.radial, self.helix_lag) < 0:
             raise ValueError("Kt, speed and depth must be > 0, Kr and the helix lag >= 0")
+        if self.process_damping < 0 or (self.process_damping and not self.diameter > 0):
+            raise ValueError("process damping must be >= 0, and needs a diameter > 0")
 
     @property
     def arc(self) -> tuple[float, float]:
@@ -104,7 +115,15 @@ class Case:
         at_once = math.ceil((leave - entry) / pitch)
         cut = self.depth * math.hypot(self.tangential, self.radial) * at_once
         fastest = max(f * math.sqrt(1 + cut / k) for f, _, k, *_ in self.x + self.y)
-        return math.ceil(max(CYCLE * fastest * self.tooth_period, PERIOD, ARC * pitch / (leave - entry)))
+        rate = self.damping_per_velocity * at_once * sum((2 * math.pi * f) ** 2 / k for f, _, k, *_ in self.x + self.y)
+        resolved = max(CYCLE * fastest, rate / SMALL) * self.tooth_period
+        return math.ceil(max(resolved, PERIOD, ARC * pitch / (leave - entry)))
+
+    @property
+    def damping_per_velocity(self) -> float:
+        """Force of a tooth in the cut over its velocity out of it (N s/m)."""
+        surface_speed = math.pi * self.diameter * self.speed_rpm / 60
+        return self.depth * self.process_damping / surface_speed if self.process_damping else 0.0
 
 
 class Stepper:
@@ -120,6 +139,8 @@ class Stepper:
         self._flight = np.stack([flight for flight, _, _ in modal], axis=-1)
         self._shape = np.stack([shape for _, shape, _ in modal], axis=-1)
         self._kick = np.stack([kick for _, _, kick in modal], axis=-1)
+        self._pace = np.stack([_pace(case, most) for case in cases], axis=-1)
+        self._resist = np.stack([_resistance(case, steps, most) for case in cases], axis=-1)
         self._jump = np.einsum("imc,jmc->ijc", self._shape, self._kick.imag)
         tables = [_normals(case, steps) for case in cases]
         self._normal = np.zeros((steps, 2, max(table.shape[2] for table in tables), len(cases)))
@@ -131,7 +152,7 @@ class Stepper:
 
     def keep(self, which: NDArray[np.bool_]) -> None:
         """Go on with some of the cases only."""
-        for name in ("_flight", "_shape", "_kick", "_jump", "_normal", "_surface", "_swing"):
+        for name in ("_flight", "_shape", "_kick", "_pace", "_resist", "_jump", "_normal", "_surface", "_swing"):
             setattr(self, name, np.ascontiguousarray(getattr(self, name)[..., which]))
 
     def run(self, periods: int) -> Floats:
@@ -140,6 +161,7 @@ class Stepper:
         recorded = np.linspace(0, steps, SAMPLES, endpoint=False).astype(int)
         record = np.empty((periods, SAMPLES, 2, swing.shape[1]))
         history, jumps = np.empty((steps, 2, swing.shape[1])), bool(np.any(self._jump))
+        damped = bool(np.any(self._resist))
         for period in range(periods):
             for normal, surface, d in zip(self._normal, self._surface, history, strict=True):
                 np.multiply(swing, self._flight, out=swing)
@@ -149,9 +171,20 @@ class Stepper:
                     d += np.einsum("ijc,jec,ec->ic", self._jump, normal, thinner) / 2
                     thinner = np.minimum(surface - np.einsum("iec,ic->ec", normal, d), normal[0])
                 surface -= thinner
-                swing += np.einsum("imc,ic->mc", self._kick, np.einsum("iec,ec->ic", normal, thinner))
+                kick = np.einsum("imc,ic->mc", self._kick, np.einsum("iec,ec->ic", normal, thinner))
+                swing += kick + self._damping(swing, kick, normal * (thinner < normal[0])) if damped else kick
             record[period] = history[recorded]
         return np.moveaxis(record, -1, 0)
+
+    def _damping(self, swing: Floats, kick: Floats, normal: Floats) -> Floats:
+        """Swing of the process damping of a step, shape (m, c), of a swing before its impulse."""
+        given = np.zeros_like(swing)
+        for _ in range(DAMPED):
+            half_way = (swing + (kick + given) / 2) * self._pace
+            velocity = np.einsum("imc,mc->ic", self._shape, half_way.imag)
+            out = np.einsum("iec,ic->ec", normal, velocity)
+            given = -np.einsum("imc,ic->mc", self._resist, np.einsum("iec,ec->ic", normal, out))
+        return given
 
 
 def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], Floats, NDArray[np.complex128]]:
@@ -172,6 +205,28 @@ def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], F
     shape[:, : f.size] = along
     kick[:, : f.size] = force.T @ along * step * w**2 / (k * damped) * np.exp(1j * np.radians(phase))
     return flight, shape, kick
+
+
+def _pace(case: Case, most: int) -> NDArray[np.complex128]:
+    """Velocity over swing in free flight (1/s), shape (most,)."""
+    f, zeta, *_ = np.array([mode[:2] for mode in case.x + case.y]).T
+    pace = np.zeros(most, dtype=complex)
+    pace[: f.size] = 2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    return pace
+
+
+def _resistance(case: Case, steps: int, most: int) -> NDArray[np.complex128]:
+    """Swing of a step's velocities out of the cut, (2, most), by process damping."""
+    resist = np.zeros((2, most), dtype=complex)
+    if not case.process_damping:
+        return resist
+    f, zeta, k, phase = np.array([(*mode, 0.0)[:4] for mode in case.x + case.y]).T
+    w, step = 2 * np.pi * f, case.tooth_period / steps
+    c, s = math.cos(case.feed_angle), math.sin(case.feed_angle)
+    along = np.repeat([[c, s], [-s, c]], [len(case.x), len(case.y)], axis=1)
+    size = case.damping_per_velocity * step * w / (k * np.sqrt(1 - zeta**2))
+    resist[:, : f.size] = along * size * np.exp(1j * np.radians(phase))
+    return resist
 
 
 def _normals(case: Case, steps: int) -> Floats:

@@ -15,6 +15,7 @@ from lobewatch.cuts.learning import cut_likelihood, drive_gain
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
 from lobewatch.cuts.learning.power_readings import make_material_remark
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
+from lobewatch.cuts.learning.process_damping import NO_PROCESS_DAMPING, ProcessDamping
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty
 
@@ -159,12 +160,14 @@ def build_prior(
     count: int = N_PRIOR_SAMPLES,
     seed: int = 0,
     drop: SpeedDrop = DEFAULT_DROP,
+    damping: ProcessDamping = NO_PROCESS_DAMPING,
 ) -> Posterior:
     """Build the posterior before the first cut.
 
-    rest: the spindle without rotation in the median estimate (a row); drop: of its frequencies at speed.
+    rest: the spindle without rotation in the median estimate (a row); drop: of its frequencies at speed; damping: of
+    the process.
     """
-    return Posterior(sample_prior(rest, uncertainty, count, seed, drop), np.zeros(count), seed=seed)
+    return Posterior(sample_prior(rest, uncertainty, count, seed, drop, damping), np.zeros(count), seed=seed)
 
 
 def _cut_log_likelihood(

@@ -2,9 +2,10 @@
 
 f_n drops by the range of `[speed] drop_percent` (0 to 5 % if nothing is set), for each mode apart, as cuts tell modes
 apart. Standard deviations: zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1 +- 30 % (10 % if listed), for
-each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen: plausible, not
-measured. They are joined with the uncertainty of the program. Each number is a function of one that is standard
-normal, so that samples can be moved without leaving the prior out of sight.
+each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. The process damping
+coefficient C is that of `ProcessDamping`, for each material. Chosen: plausible, not measured. They are joined with the
+uncertainty of the program. Each number is a function of one that is standard normal, so that samples can be moved
+without leaving the prior out of sight.
 """
 
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ import scipy
 from lobes import MillingRows
 from lobes.coefficient_distribution import Quantiles
 from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.learning.process_damping import MAX_PROCESS_DAMPING, NO_PROCESS_DAMPING, ProcessDamping
 from lobewatch.verdicts import program_samples
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty, scale_fields
@@ -38,7 +40,7 @@ OPEN_FORCE_RATIO_SHARE = 0.3
 NUMBERS_PER_SPINDLE, NUMBERS_PER_MATERIAL = 4, 3
 """Number of values of a sample for the spindle and for each material, beyond f of each mode.
 
-Spindle: (zeta, K) in x, then in y. Material: Kt at speed, uncertain Kt, uncertain Kr/Kt."""
+Spindle: (zeta, K) in x, then in y. Material: Kt at speed, uncertain Kt, uncertain Kr/Kt, then C if it is open."""
 MIXTURE_TABLE_END, MIXTURE_TABLE_POINTS = 18, 3601
 """End (standard deviations) and number of points of the mixture table of `_mixture_quantiles`."""
 
@@ -48,13 +50,15 @@ class SpindleSamples:
     """Samples of the spindle at speed: drawn numbers, and the rows of a cut that follow."""
 
     normal: Floats
-    """Standard normal numbers for the differences from the spindle not rotating, shape (r, modes + 4 + 3 materials)."""
+    """Standard normal numbers for the differences from the spindle not rotating, shape (r, modes + 4 + 3 or 4 materials)."""
     at_rest: MillingRows
     """Spindles not rotating with the error of tap tests, r rows; their speeds are factors on the commanded one."""
     uncertainty: Uncertainty
     """Uncertainty that the coefficients were drawn from."""
     drop: SpeedDrop = DEFAULT_DROP
     """Frequency drop at speed before the cuts."""
+    damping: ProcessDamping = NO_PROCESS_DAMPING
+    """Process damping before the cuts."""
 
     def __len__(self) -> int:
         return len(self.normal)
@@ -64,14 +68,21 @@ class SpindleSamples:
 
     def with_materials(self, count: int, seed: int) -> "SpindleSamples":
         """Add cutting coefficients from the prior until there are `count` materials."""
-        missing = self._material_index(count) - self.normal.shape[1]
+        width = NUMBERS_PER_MATERIAL + self.damping.is_open
+        missing = (self._material_index(count) - self.normal.shape[1]) // width
         if missing <= 0:
             return self
-        more = np.random.default_rng((seed, 5, count)).standard_normal((len(self), missing))
-        return replace(self, normal=np.hstack((self.normal, more)))
+        shape = len(self), missing, NUMBERS_PER_MATERIAL
+        more = np.random.default_rng((seed, 5, count)).standard_normal(shape)
+        if self.damping.is_open:
+            damping = np.random.default_rng((seed, 6, count)).standard_normal((len(self), missing, 1))
+            more = np.concatenate((more, damping), axis=2)
+        return replace(self, normal=np.hstack((self.normal, more.reshape(len(self), -1))))
 
     def ratios(self) -> dict[str, Floats]:
         """Return all learned factors by name: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each.
+
+        "process_damping" is C of material 0 over `MAX_PROCESS_DAMPING`, where it is open.
 
         "frequency_x" is that of the mode in x which gives way most, "frequency_x_2" of the next.
         """
@@ -80,6 +91,8 @@ class SpindleSamples:
         frequency, sides = self._frequency_factors(), self._side_factors()
         soft = np.mean(1 / (2 * at_rest.damping_ratio * at_rest.stiffness), axis=0)
         values = {"tangential": tangential, "ratio": ratio}
+        if self.damping.is_open:
+            values["process_damping"] = self.process_damping(0) / MAX_PROCESS_DAMPING
         for axis, side in enumerate("xy"):
             modes = np.flatnonzero(at_rest.axes[at_rest.direction] == axis)
             for place, mode in enumerate(modes[np.argsort(-soft[modes], kind="stable")], 1):
@@ -95,6 +108,13 @@ class SpindleSamples:
         force, _ = self.uncertainty.coefficient_factors(self._coefficient_shares(material))
         return np.asarray(mean * np.maximum(at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
 
+    def process_damping(self, material: int) -> Floats:
+        """Return the process damping coefficients C of a material (N/m), shape (r,)."""
+        if not self.damping.is_open:
+            return np.full(len(self), self.damping.low)
+        normal = self.normal[:, self._material_index(material) + NUMBERS_PER_MATERIAL]
+        return self.damping.quantiles(scipy.special.ndtr(normal))
+
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
         at_side = self._side_factors()[:, self.at_rest.axes[self.at_rest.direction]]
@@ -103,11 +123,14 @@ class SpindleSamples:
         rows = scale_fields(self.at_rest, frequency=f, damping_ratio=zeta, stiffness=k)
         rows = replace(rows, damping_ratio=np.minimum(rows.damping_ratio, MAX_SAMPLED_DAMPING))
         speeds, force = np.full(len(self), speed_rpm), tangential * push
-        return replace(rows, speed_rpm=speeds, tangential=force, radial=radial * push * ratio)
+        damping = self.process_damping(material) / self.damping.diameter
+        return replace(rows, speed_rpm=speeds, tangential=force, radial=radial * push * ratio, process_damping=damping)
 
     def _material_index(self, material: int) -> int:
         """Place of the first number of a material."""
-        return self.at_rest.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL * material
+        return (
+            self.at_rest.direction.size + NUMBERS_PER_SPINDLE + (NUMBERS_PER_MATERIAL + self.damping.is_open) * material
+        )
 
     def _frequency_factors(self) -> Floats:
         """Factors of f of each mode, shape (r, n)."""
@@ -149,12 +172,20 @@ class SpindleSamples:
 
 
 def sample_prior(
-    median: MillingRows, uncertainty: Uncertainty, count: int, seed: int = 0, drop: SpeedDrop = DEFAULT_DROP
+    median: MillingRows,
+    uncertainty: Uncertainty,
+    count: int,
+    seed: int = 0,
+    drop: SpeedDrop = DEFAULT_DROP,
+    damping: ProcessDamping = NO_PROCESS_DAMPING,
 ) -> SpindleSamples:
     """Sample the prior around a spindle that does not rotate (a row), reproducible by seed."""
     at_rest = uncertainty.sample(replace(median, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     size = count, median.direction.size + NUMBERS_PER_SPINDLE + NUMBERS_PER_MATERIAL
-    return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty, drop)
+    normal = np.random.default_rng((seed, 2)).standard_normal(size)
+    if damping.is_open:
+        normal = np.hstack((normal, np.random.default_rng((seed, 6)).standard_normal((count, 1))))
+    return SpindleSamples(normal, at_rest, uncertainty, drop, damping)
 
 
 def _ratio_quantiles(uncertainty: Uncertainty, median: float) -> Quantiles:

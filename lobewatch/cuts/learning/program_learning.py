@@ -15,6 +15,8 @@ from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence
 from lobewatch.cuts.learning.pocket_depth import apply_test_cuts, collect_evidence
 from lobewatch.cuts.learning.posterior import POWER_CONTRADICTIONS, Contradiction, InconsistentCut, Posterior
 from lobewatch.cuts.learning.power_readings import is_off_by_two
+from lobewatch.cuts.learning.prior_samples import SpindleSamples
+from lobewatch.cuts.learning.process_damping import find_process_damping
 from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.machine.journal.entries import geometry_key
@@ -76,7 +78,8 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 def learn_program(table: ProgramTable, tool: Assembly, machine: Machine, cuts: CutEntries) -> LearningResult:
     """Learn from the cuts of a machine; cuts of other tools do not count."""
     resting, doubt = build_median_row(build_program(table, machine), tool), uncertainty_of(tool, table, machine)
-    start = posteriors.build_prior(resting, doubt, drop=find_speed_drop(tool, machine, machine.speed.high_rpm))
+    drop, damping = find_speed_drop(tool, machine, machine.speed.high_rpm), find_process_damping(table, machine)
+    start = posteriors.build_prior(resting, doubt, drop=drop, damping=damping)
     posterior, odd_powers, material = start, list[InconsistentCut](), list[InconsistentCut]()
     for cut in collect_evidence(cuts, table, tool, machine):
         evidence = posterior.predict(cut)
@@ -115,6 +118,8 @@ def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> Cut
     return CutGrid(cut, angles, speeds, deepest, trust)
 
 
+MAX_UNTAUGHT_SHARE = 0.05
+"""Largest share of samples with the lowest process damping at which test cuts have taught more; chosen."""
 INTERVAL_QUANTILES = (0.025, 0.975)
 """Quantiles of a 95 % interval."""
 
@@ -150,14 +155,26 @@ def _build_spindle(learning: LearningResult, tool: Assembly, machine: Machine) -
     push, ratio = float(np.mean(force)), float(np.mean(direction))
     frequency, damping, stiffness = (part / mean for part, mean in zip(parts, median, strict=True))
     direction_over_mean = direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape)
-    left = LearnedSamples(frequency, damping, stiffness, phases, force / np.mean(force), direction_over_mean)
+    taught = _taught_process_damping(samples)
+    force_over_mean = force / np.mean(force)
+    left = LearnedSamples(
+        frequency, damping, stiffness, phases, force_over_mean, direction_over_mean, taught / samples.damping.diameter
+    )
     widths = {TEST_CUTS.name: _half_widths(parts, phases)}
     mixing, speed = np.tile(np.eye(4), (at_rest.direction.size, 1, 1)), machine.doubt.speed_percent / 100
     ranges, axes = (_factor_range(force), _factor_range(direction)), tool.principal_directions
     uncertainty = Uncertainty(widths, mixing, speed, *ranges, axes=axes, learned=left)
     kt, kr = float(at_rest.tangential[0]) * push / 1e6, float(at_rest.radial[0]) * push * ratio / 1e6
     intervals = _factor_ranges(learning.prior), _factor_ranges(learning.posterior)
-    return SpindleAtSpeed(len(learning.accepted_cuts), (), uncertainty, np.stack(median, axis=1), kt, kr, *intervals)
+    factors, mean_damping = np.stack(median, axis=1), float(np.mean(taught))
+    return SpindleAtSpeed(len(learning.accepted_cuts), (), uncertainty, factors, kt, kr, mean_damping, *intervals)
+
+
+def _taught_process_damping(samples: SpindleSamples) -> Floats:
+    """Return C of each sample (N/m), or the lowest before the cuts while they may be explained by it, shape (r,)."""
+    damping, lowest = samples.process_damping(0), samples.damping.low
+    is_taught = np.mean(damping <= lowest) <= MAX_UNTAUGHT_SHARE
+    return damping if is_taught else np.full(damping.shape, lowest)
 
 
 def _half_widths(parts: Sequence[Floats], turned: Floats) -> Floats:

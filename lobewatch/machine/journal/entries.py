@@ -139,6 +139,7 @@ class CutEntry:
     def line(self) -> dict[str, Any]:
         """Journal line."""
         fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        del fields["cut"]["process_damping"]
         if not self.parts:
             del fields["parts"]
         return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}

@@ -18,6 +18,8 @@ ValueRange = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
 """Lower and upper limit. msgspec 0.22 misreads the fixed length `tuple[A, B]` in a union with a number."""
 CuttingPressure = Annotated[Positive, Plausible(200, 6000)]
 """Tangential cutting coefficient Kt, or specific cutting force (N/mm2)."""
+ProcessDamping = Annotated[tuple[NotNegative, ...], Meta(min_length=2, max_length=2), Plausible(500, 2e6)]
+"""Lowest and highest process damping coefficient C (N/m)."""
 ToolWear = Literal["new", "used", "worn"]
 """Wear of the cutting edges."""
 
@@ -25,6 +27,12 @@ ToolWear = Literal["new", "used", "worn"]
 def convert_pitch(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
     """Convert pitch angles to radians, () for equal pitch; ValueError for invalid pitches."""
     return normalize_pitch([math.radians(angle) for angle in pitch_deg or ()], teeth)
+
+
+def _check_rising(name: str, limits: Sequence[float] | None) -> None:
+    """Raise ValueError for limits that are not in rising order."""
+    if limits is not None and limits[0] > limits[-1]:
+        raise ValueError(f"{name}=[{limits[0]:g}, {limits[-1]:g}] is not in rising order. Give [smallest, largest].")
 
 
 def corner_engagement(tool: float, radial: float, corner: float) -> float:
@@ -81,6 +89,8 @@ class CutTable(TomlTable, frozen=True):
     """Angles from tooth to tooth (deg); None for equal pitch."""
     feed: str = "both"
     """Axis of the feed, "x", "y" or "both"."""
+    process_damping_n_per_m: ProcessDamping | None = None
+    """Lowest and highest process damping coefficient C (N/m); None: that of the material, else unknown."""
 
     @property
     def feed_axes(self) -> tuple[str, ...]:
@@ -109,9 +119,9 @@ class CutTable(TomlTable, frozen=True):
         return self.tool_diameter_mm if self.flute_length_mm is None else self.flute_length_mm
 
     def __post_init__(self) -> None:
-        least, most = self.radial_mm
-        if least > most:
-            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] is not in rising order. Give [smallest, largest].")
+        _check_rising("radial_depth_mm", self.radial_mm)
+        _check_rising("process_damping_n_per_m", self.process_damping_n_per_m)
+        most = self.radial_mm[1]
         if most > self.tool_diameter_mm:
             raise ValueError(f"radial_depth_mm={most:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}")
         missing = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
@@ -145,6 +155,8 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     """Radius of the tightest corner on the path (mm); None for a straight path."""
     wear: ToolWear | None = None
     """Allowed tool wear; None: that of [doubt]."""
+    wear_land_um: Annotated[Positive, Plausible(5, 999)] | None = None
+    """Width of the wear land on the flank (um); None if unknown."""
     thin: bool = False
     """True if the cut wall is flexible: then the verdict is never stable."""
 
@@ -202,6 +214,8 @@ class MaterialTable(TomlTable, frozen=True):
     force_angle_deg: Annotated[float, Meta(gt=0, le=90), Plausible(39, 90)] | None = None
     tangential_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
     radial_edge_n_per_mm: Annotated[NotNegative, Plausible(0.5, 400)] = math.nan
+    process_damping_n_per_m: ProcessDamping | None = None
+    """Lowest and highest process damping coefficient C (N/m); None if unknown."""
     source: str = "machine.toml"
     iso_group: Literal["P", "M", "K", "N", "S", "H"] | None = None
     """Group of materials by ISO 513."""
@@ -212,6 +226,7 @@ class MaterialTable(TomlTable, frozen=True):
         if sorted(counts) != [0, 2]:
             cure = f"Give either {' and '.join(first)}, or {' and '.join(second)}."
             raise ValueError(f"cutting coefficients do not fit together. {cure}")
+        _check_rising("process_damping_n_per_m", self.process_damping_n_per_m)
 
     def build(self) -> CuttingCoefficients:
         """Build the coefficients in SI units."""

@@ -142,7 +142,21 @@ class Machine(toml.TomlTable, frozen=True):
         lag = 2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter
         pitch = cutting.convert_pitch(self.pitch_deg(table), table.teeth)
         shape, pressures = (table.teeth, table.immersion), (coefficients.tangential, coefficients.radial)
-        return Cut(*shape, table.direction, *pressures, helix_lag=lag, pitch=pitch)
+        damping = self.process_damping(table)[0] / diameter
+        return Cut(*shape, table.direction, *pressures, helix_lag=lag, pitch=pitch, process_damping=damping)
+
+    def process_damping(self, table: CutTable) -> tuple[float, float]:
+        """Return the lowest and highest process damping coefficient C of a cut (N/m); (0, inf) if unknown.
+
+        Parameters
+        ----------
+        table
+            Cut or program.
+        """
+        name = fold_material_name(table.material or "")
+        own = {fold_material_name(material.name): material.process_damping_n_per_m for material in self.material}
+        low, high = table.process_damping_n_per_m or own.get(name) or (0.0, math.inf)
+        return low, high
 
     def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
         """Return a cut at each radial depth along its path, feed along x.

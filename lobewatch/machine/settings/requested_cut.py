@@ -20,7 +20,7 @@ REQUIRED_CUT_KEYS = (*SETTING_KEYS, *("tool", "material", "teeth", "tool_diamete
 """Keys of a [[program]] that a requested cut needs."""
 COEFFICIENT_KEYS = {"tangential_n_per_mm2", "radial_n_per_mm2"}
 """Keys that replace a material."""
-ENGAGEMENT_KEYS = ("radial_depth_mm", "direction", "corner_radius_mm", "feed", "wear", "thin")
+ENGAGEMENT_KEYS = ("radial_depth_mm", "direction", "corner_radius_mm", "feed", "wear", "wear_land_um", "thin")
 """Keys of the engagement, which other programs do not share with a cut whose setting is requested."""
 
 
@@ -57,6 +57,7 @@ class CutSetting:
         feed, power = self.table.feed_per_tooth_mm, None if self.power is None else self.power.at(speed_rpm)
         fields = {name: getattr(self, name) for name in ("program", "tool", "cut", "feed", "depth")}
         fields |= {"feed_per_tooth": None if feed is None else feed / 1e3, "coefficients": self.material}
+        fields["cut"] = replace(self.cut, process_damping=0.0)  # test cuts teach it
         return fields | {"commanded_rpm": self.speed_rpm, "speed_rpm": speed_rpm, "power": power}
 
 
@@ -194,8 +195,10 @@ def _complete_values(machine: Machine, values: Mapping[str, Any]) -> dict[str, A
     programs = machine.all_programs
     tool = given.get("tool") or (find_common_values(programs).get("tool") if programs else machine.tap.tool)
     common = find_common_values([program for program in programs if program.tool == tool])
+    replaced = {"process_damping_n_per_m"} if "material" in given else set()
     if "material" in given or not common.keys() >= COEFFICIENT_KEYS:
-        common = {key: value for key, value in common.items() if key not in COEFFICIENT_KEYS}
+        replaced |= COEFFICIENT_KEYS
+    common = {key: value for key, value in common.items() if key not in replaced}
     if tool is None:
         return common | given
     properties = find_tool_properties(machine, tool)

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
+from lobewatch.cuts.learning.process_damping import MAX_PROCESS_DAMPING
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, SpeedTable, UncertaintyTable
 from lobewatch.measurement.chain_check import find_weakest_check
@@ -32,14 +33,20 @@ CHECK_HINT = "Causes and stable settings: lobewatch check"
 """Next step below a table with verdicts other than stable."""
 FROM_MACHINE_FILE = "machine.toml"
 DEGREES_PER_RADIAN = 180 / np.pi
+NAMED_FACTORS = {
+    "tangential": "Kt",
+    "ratio": "Kr/Kt",
+    "process_damping": f"process damping C / {MAX_PROCESS_DAMPING / 1e3:.0f} kN/m",
+}
+"""Texts of the learned factors that belong to the material."""
 MIN_SHOWN_WIDTH = 5e-5
 """Smallest half-width that is shown."""
 
 
 def factor_text(name: str) -> str:
     """Return the name of a learned factor, such as "frequency in x, mode 2" for "frequency_x_2"."""
-    if "_" not in name:
-        return {"tangential": "Kt", "ratio": "Kr/Kt"}[name]
+    if name in NAMED_FACTORS:
+        return NAMED_FACTORS[name]
     quantity, direction, *mode = name.split("_")
     return f"{quantity} in {direction}" + (f", mode {mode[0]}" if mode else "")
 

@@ -31,7 +31,7 @@ def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tup
     J. Manuf. Sci. Eng. 125 (2003) 29-34.
     """
     depth, chatter = np.full(tooth_frequency.shape, np.inf), np.full(tooth_frequency.shape, np.nan)
-    for rows, grid in _frequency_blocks(branch, cut, tooth_frequency):
+    for rows, grid in frequency_blocks(branch, cut, tooth_frequency):
         loop = branch.receptance(grid) * mean_regeneration(cut, grid / tooth_frequency[rows, np.newaxis])
         row, step = np.nonzero((loop.imag[:, 1:] < 0) != (loop.imag[:, :-1] < 0))
         loop_at = partial(_loop_response, branch, cut, tooth_frequency[rows][row])
@@ -45,7 +45,7 @@ def uneven_limits(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> tup
     return depth, chatter
 
 
-def _frequency_blocks(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> Iterator[tuple[Indices, Floats]]:
+def frequency_blocks(branch: TipResponse, cut: Cut, tooth_frequency: Floats) -> Iterator[tuple[Indices, Floats]]:
     """Yield indices of speeds and the frequencies to be searched for them (Hz)."""
     size = np.abs(branch.on_grid)
     loud = branch.grid[size > MIN_UNEVEN_RESPONSE * np.max(size)]

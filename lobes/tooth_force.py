@@ -1,5 +1,6 @@
 """Directional force matrix H of the rotating cutter, and its integrals; conventions in `Cut`."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +15,14 @@ def mean_force(cut: Cut) -> Floats:
     H0 = N / (2 pi) times the integral of H. A helix does not change it.
     """
     return cut.teeth / (2 * np.pi) * _to_machine_axes(cut, _tooth_integral(cut, np.array(cut.exit_angle)))
+
+
+def mean_damping(cut: Cut) -> Floats:
+    """Return C / D times n n' of all teeth averaged over a turn (Pa), n the normal of the surface, shape (2, 2).
+
+    The process damping per depth and velocity (N s/m^2) is 60 / (pi rpm) times as much.
+    """
+    return mean_force(replace(cut, radial=cut.process_damping)) - mean_force(replace(cut, radial=0.0))
 
 
 @lru_cache(maxsize=64)

@@ -1,5 +1,6 @@
 """Stability lobes by the zero-order approximation and by the average tooth angle."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,11 @@ from numpy.typing import ArrayLike
 
 from acquisition import Remark
 from lobes.cut import Cut
-from lobes.loop_limits import MEAN_FORCE_REMEDY, loop_limits
+from lobes.damped_loop import DampedLoop
+from lobes.loop_limits import MEAN_FORCE_REMEDY, frequency_blocks, loop_limits
 from lobes.stability_lobes import StabilityLobes, check_speeds
 from lobes.tip_response import TipData, TipResponse, common_grid, cross_response, tip_responses, weighted_sum
-from lobes.tooth_force import interval_forces, mean_force
+from lobes.tooth_force import interval_forces, mean_damping, mean_force
 from modal.arrays import Complexes, Floats
 
 MIN_NET_FORCE_RATIO = 0.7
@@ -31,7 +33,7 @@ def zero_order_lobes(
 
     b = -1 / (2 Re L) for the eigenvalues L of H0 G with Re L < 0; the lowest b over both and over all lobes counts.
     A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower, at half immersion it
-    can be 15 % off at a given speed.
+    can be 15 % off at a given speed. For process damping see `lobes.damped_loop`; then there are no lobe curves.
 
     Parameters
     ----------
@@ -82,11 +84,32 @@ def zero_order_lobes(
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
-        return replace(lobes, remarks=(*_cancellation_remarks(cut, axis), *lobes.remarks))
+        lobes = replace(lobes, remarks=(*_cancellation_remarks(cut, axis), *lobes.remarks))
+        return _with_process_damping(lobes, cut, {axis: tip})
     responses = [tip for _, tip in tips]
     if cross is not None:
         responses.append(cross_response(cross, float(responses[0].grid[-1])))
-    return loop_limits(_loop_eigenvalues(force, *responses), cut, speed, "zero order")
+    lobes = loop_limits(_loop_eigenvalues(force, *responses), cut, speed, "zero order")
+    return _with_process_damping(lobes, cut, dict(enumerate(responses)))
+
+
+def _with_process_damping(lobes: StabilityLobes, cut: Cut, tips: Mapping[int, TipResponse]) -> StabilityLobes:
+    """Return limits with process damping, without lobe curves; tips: receptances xx, yy and xy by their place."""
+    if cut.process_damping == 0:
+        return lobes
+
+    def receptances(frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
+        xx, yy, xy = (tips[i].receptance(frequency) if i in tips else 0j * frequency for i in range(3))
+        return xx, yy, xy
+
+    size = TipResponse(common_grid([*tips.values()]), lambda f: np.sum(np.abs(receptances(f)), axis=0) + 0j)
+    loop = DampedLoop(cut, mean_force(cut)[np.newaxis], mean_damping(cut)[np.newaxis], receptances)
+    teeth = cut.teeth * lobes.speed_rpm / 60
+    depth, chatter = np.empty((2, teeth.size))
+    for rows, grid in frequency_blocks(size, cut, teeth):
+        depth[rows], chatter[rows] = (part[0] for part in loop.limits(grid[np.newaxis], teeth[np.newaxis, rows]))
+    kind, crossings = np.where(np.isfinite(depth), "hopf", ""), depth[:, np.newaxis]
+    return replace(lobes, depth=depth, chatter_frequency=chatter, kind=kind, crossings=crossings, curves=tuple)
 
 
 def _cancellation_remarks(cut: Cut, axis: int) -> tuple[Remark, ...]:
@@ -144,7 +167,8 @@ def average_angle_lobes(x: TipData | None, y: TipData | None, cut: Cut, speed_rp
 
     b = -1 / (2 Ks Nt* Re G_or) for Re G_or < 0, and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ...,
     eps / 2 = atan2(-Re G_or, Im G_or). The limit is the lowest b over all lobes j; `crossings` holds only it.
-    A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower.
+    A mean force has no flip lobes: at low immersion (below 0.25) the true limit can be lower. Process damping is left
+    out.
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 """Stability boundary over speed by semi-discretisation, and its chatter frequencies."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,7 +13,7 @@ from lobes.floquet.multipliers import largest_multipliers, spectral_radii
 from lobes.milling_system import MillingSystem, build_milling_system
 from lobes.stability_lobes import StabilityLobes, check_speeds, check_vector
 from lobes.tip_response import TipModes
-from lobes.tooth_force import interval_forces, mean_force, mean_regeneration
+from lobes.tooth_force import interval_forces, mean_damping, mean_force, mean_regeneration
 from modal.arrays import Complexes, Floats, Integers
 
 MAX_CHATTER_FREQUENCY_RATIO = 2.0
@@ -28,7 +30,7 @@ def loudest_chatter_frequency(system: MillingSystem, cut: Cut, mu: Complexes, de
     base (n,): frequency at which the cut repeats (Hz), the tooth frequency of even teeth. A multiplier leaves
     |+-arg(mu) / (2 pi) + j| times base, j whole. The first choice nearly closes the loop of the
     mean force. The result is the largest in the balance of harmonics around it, over the delays tau,
-    d_k = -b G_k sum_l sum_tau H_(tau, k-l) (1 - exp(-i w_l tau)) d_l.
+    d_k = -b G_k sum_l (sum_tau H_(tau, k-l) (1 - exp(-i w_l tau)) + i w_l C / V N_(k-l)) d_l.
     """
     waves = _nearest_to_mean_force_loop(system, cut, mu, depth, base)[:, np.newaxis]
     reach = BALANCE_HARMONICS * len(cut.pitch_pattern)
@@ -38,6 +40,10 @@ def loudest_chatter_frequency(system: MillingSystem, cut: Cut, mu: Complexes, de
     delays = np.array(cut.delays) / sum(cut.pitch_pattern)
     regenerated = 1 - np.exp(-2j * np.pi * harmonics[..., np.newaxis] * delays)
     forces = np.einsum("gklpq,nlg->nkplq", _force_harmonics(system, cut, harmonics.shape[1]), regenerated)
+    if cut.process_damping:
+        normal = _damping_harmonics(system, cut, harmonics.shape[1])
+        rate = 2j * cut.repeats_per_turn * harmonics  # i w C / V over C / D
+        forces = forces + np.einsum("klpq,nl->nkplq", normal, rate)
     balance = np.einsum("gkpr,gkrlq->gkplq", receptance, forces)
     size = harmonics.shape[1] * system.axes.size
     values, vectors = np.linalg.eig(balance.reshape(-1, size, size))
@@ -54,9 +60,12 @@ def _nearest_to_mean_force_loop(system: MillingSystem, cut: Cut, mu: Complexes, 
     whole = np.arange(int(highest / np.min(base)) + 3 * len(cut.pitch_pattern))
     waves = np.concatenate((whole + part, whole + 1 - part), axis=1)
     gain = depth[:, np.newaxis] * mean_regeneration(cut, waves / len(cut.pitch_pattern))
-    force = mean_force(cut)[np.ix_(system.axes, system.axes)]
+    both = np.ix_(system.axes, system.axes)
     receptance = system.receptance(waves * base[:, np.newaxis])
-    loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * (force @ receptance)
+    loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * (mean_force(cut)[both] @ receptance)
+    if cut.process_damping:
+        rate = 2j * cut.repeats_per_turn * waves * depth[:, np.newaxis]
+        loop = loop + rate[..., np.newaxis, np.newaxis] * (mean_damping(cut)[both] @ receptance)
     best = np.argmin(np.abs(np.linalg.det(loop)), axis=1)[:, np.newaxis]
     return np.take_along_axis(waves, best, axis=1)[:, 0]
 
@@ -68,6 +77,13 @@ def _force_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
     harmonics = np.fft.fft(forces, axis=1) / samples
     order = np.arange(number)
     return np.asarray(harmonics[:, order[:, np.newaxis] - order])
+
+
+def _damping_harmonics(system: MillingSystem, cut: Cut, number: int) -> Complexes:
+    """Return harmonics N_(k-l) of C / D n n' of all teeth, shape (number, number, p, p)."""
+    cuts = [replace(cut, radial=radial) for radial in (cut.process_damping, 0.0)]
+    normal, without = (_force_harmonics(system, each, number).sum(axis=0) for each in cuts)
+    return np.asarray(normal - without)
 
 
 def spectral_radius(

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lobes import Cut, MillingRows
-from lobes.tooth_force import interval_forces, mean_force, mean_regeneration, rotate_to_machine
-from lobewatch.arrays import Complexes, Floats
+from lobes.damped_loop import DampedLoop
+from lobes.tooth_force import interval_forces, mean_damping, mean_force, mean_regeneration, rotate_to_machine
+from lobewatch.arrays import Complexes, Flags, Floats, Indices
 
 FREQUENCIES_PER_WAVE = 16
 """Smallest number of frequencies per turn of the regeneration phase of the longest delay."""
@@ -81,6 +82,15 @@ class ZeroOrderBatch:
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, rotate_to_machine(force, rows.feed_angle))
 
+    def __getitem__(self, which: Flags | Indices | slice) -> "ZeroOrderBatch":
+        return ZeroOrderBatch(self.rows[which], self.force[which])
+
+    @property
+    def damping(self) -> Floats:
+        """Mean process damping matrix C / D n n' of each spindle (Pa) in machine x and y, shape (r, 2, 2)."""
+        per_coefficient = mean_damping(replace(self.rows.cut, process_damping=1.0, feed_angle=0.0))
+        return rotate_to_machine(np.multiply.outer(self.rows.process_damping, per_coefficient), self.rows.feed_angle)
+
     def limits(self, speed_rpm: Floats, deepest: float = np.inf) -> tuple[Floats, Floats]:
         """Return the lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) of each row.
 
@@ -88,12 +98,31 @@ class ZeroOrderBatch:
         """
         speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
         depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
+        undamped = self.rows.process_damping == 0
+        if not np.all(undamped):
+            spindles = ZeroOrderBatch(self.rows[~undamped], self.force[~undamped])
+            depth[~undamped], chatter[~undamped] = spindles._damped_limits(speeds[~undamped])
+            if np.any(undamped):
+                depth[undamped], chatter[undamped] = self[undamped].limits(speeds[undamped], deepest)
+            return depth, chatter
         size = max(1, MAX_BATCH_NUMBERS // (speeds.shape[1] * FREQUENCY_GRID_POINTS * self.rows.direction.size))
         for first in range(0, len(self.rows), size):
             part = slice(first, first + size)
             spindles = ZeroOrderBatch(self.rows[part], self.force[part])
             depth[part], chatter[part] = spindles._limits_of_part(speeds[part] * self.rows.cut.teeth / 60, deepest)
         return depth, chatter
+
+    def _damped_limits(self, speeds: Floats) -> tuple[Floats, Floats]:
+        """Return limits and chatter frequencies with process damping at speeds (rpm) (r, s)."""
+        teeth, cut = speeds * self.rows.cut.teeth / 60, self.rows.cut
+        grid = refine_frequency_grid(self._frequency_grid(), cut, teeth)
+
+        def receptances(frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
+            omega = 2 * np.pi * frequency
+            xx, yy, xy = (self._receptance(omega, *axes) for axes in ((0, 0), (1, 1), (0, 1)))
+            return xx, yy, xy
+
+        return DampedLoop(cut, self.force, self.damping, receptances).limits(grid, teeth)
 
     def _limits_of_part(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Return limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
@@ -129,6 +158,8 @@ class ZeroOrderBatch:
 
     def _characteristic(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
         """Return det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
+        if np.any(self.rows.process_damping):
+            return self._damped_characteristic(s, tau, depth)
         (gx, dx), (gy, dy) = self._receptance_with_derivative(s, 0, 0), self._receptance_with_derivative(s, 1, 1)
         h = self.force[..., np.newaxis]
         wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
@@ -143,6 +174,23 @@ class ZeroOrderBatch:
             minor, dminor = minor - product * gxy**2, dminor - 2 * product * gxy * dxy
         slope = dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor
         return 1 + gain * trace + gain**2 * minor, slope
+
+    def _damped_characteristic(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
+        """Return det(I + b ((1 - exp(-s tau)) H0 + s C / V N0) G) and its derivative by s."""
+        axes = ((0, 0), (0, 1), (1, 0), (1, 1))
+        (gx, dx), (gxy, dxy), _, (gy, dy) = (self._receptance_with_derivative(s, *pair) for pair in axes)
+        wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
+        rate = self.rows.cut.teeth * tau / np.pi  # C / V over C / D: 60 / (pi rpm)
+        forces = [(self.force[:, i, j, np.newaxis], rate * self.damping[:, i, j, np.newaxis]) for i, j in axes]
+        xx, xy, yx, yy = (depth * ((1 - wave) * h + s * n) for h, n in forces)
+        dxx, dxy_, dyx, dyy = (depth * (tau * wave * h + n) for h, n in forces)
+        trace = xx * gx + (xy + yx) * gxy + yy * gy
+        dtrace = dxx * gx + xx * dx + (dxy_ + dyx) * gxy + (xy + yx) * dxy + dyy * gy + yy * dy
+        product, flexible = xx * yy - xy * yx, gx * gy - gxy**2
+        dproduct = dxx * yy + xx * dyy - dxy_ * yx - xy * dyx
+        return 1 + trace + product * flexible, dtrace + dproduct * flexible + product * (
+            dx * gy + gx * dy - 2 * gxy * dxy
+        )
 
     @property
     def _is_rotated(self) -> bool:

@@ -340,8 +340,7 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
-        unstable = ZeroOrderBatch(mean.rows[beyond], mean.force[beyond])
-        _, loudest = unstable.fastest_growth(rows.speed_rpm[beyond], cut.depth)
+        _, loudest = mean[beyond].fastest_growth(rows.speed_rpm[beyond], cut.depth)
         frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
     base, at_limit = (fold_frequency(part, 1 / rows.tooth_period) for part in (frequency, at_limit))
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))

@@ -50,7 +50,9 @@ class SpindleSamples:
     """Samples of the spindle at speed: drawn numbers, and the rows of a cut that follow."""
 
     normal: Floats
-    """Standard normal numbers for the differences from the spindle not rotating, shape (r, modes + 4 + 3 or 4 materials)."""
+    """Standard normal numbers for the differences from the spindle not rotating, shape (r, modes + 4 + 3 materials).
+
+    With 4 for each material where process damping is open."""
     at_rest: MillingRows
     """Spindles not rotating with the error of tap tests, r rows; their speeds are factors on the commanded one."""
     uncertainty: Uncertainty

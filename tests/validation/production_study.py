@@ -91,7 +91,7 @@ class HiddenSpindle:
         )
         self.tangential = draw.uniform(*listed.tangential_range)
         self.radial = self.tangential * draw.uniform(*listed.ratio_range)
-        self.process_damping = draw.uniform(0.2, 1) * MOST_PROCESS_DAMPING if self.is_damped else 0.0
+        self.process_damping = draw.uniform(0, 1) * MOST_PROCESS_DAMPING if self.is_damped else 0.0
         drop = draw.uniform(0, MOST_DROP)
         self.x, self.y = (_at_speed(modes, drop, draw) for modes in (x, y))
         self.tool = _tapped(x, y, draw)

@@ -26,6 +26,8 @@ MAX_LADDER_CUTS = 3
 """Largest number of named cuts."""
 N_LADDER_SAMPLES = 1000
 """Number of samples from which the chance is computed."""
+N_PROPOSAL_SAMPLES, PROPOSED_SPEED_STEP = 150, 2
+"""Number of samples that propose speeds, and step in the speeds of the grid; chosen."""
 N_VERIFIED_SPEEDS = 4
 """Number of speeds whose depth is verified; chosen."""
 MIN_STEP_GAIN = 0.03
@@ -98,18 +100,22 @@ def _find_step(
 ) -> LadderStep | None:
     """Find the cut of the largest removal rate with little risk, or None if it gains nothing over a rate (rpm m)."""
     few = posterior.resample(N_LADDER_SAMPLES)
-    steps = [_verify_speed(few, grid, *place) for place in _list_speeds(few, grid)]
+    steps = [_verify_speed(few, grid, *place) for place in _list_speeds(posterior, grid)]
     free = [step for step in steps if step and not is_setting_taken(step.speed_rpm, step.depth, cuts, rejected)]
     best = max(free, key=lambda step: step.removal_rate, default=None)
     return best if best is not None and best.removal_rate > (1 + MIN_STEP_GAIN) * rate else None
 
 
-def _list_speeds(few: Posterior, grid: CutGrid) -> Iterator[tuple[float, float]]:
+def _list_speeds(posterior: Posterior, grid: CutGrid) -> Iterator[tuple[float, float]]:
     """Yield speeds (rpm) and depths (m) with the largest removal rates by the zero-order approximation."""
-    depths = np.quantile(LimitCharts.of(few.samples, grid).limits, MAX_CUT_RISK, axis=0)
+    part = slice(None, None, PROPOSED_SPEED_STEP)
+    speeds, trust = grid.speeds[part], grid.zero_order_trust[part]
+    coarse = grid._replace(speeds=speeds, max_depths=grid.max_depths[part], zero_order_trust=trust)
+    limits = LimitCharts.of(posterior.resample(N_PROPOSAL_SAMPLES).samples, coarse).limits
+    depths = np.quantile(limits, MAX_CUT_RISK, axis=0)
     chosen = list[float]()
-    for row in np.argsort(-grid.speeds * depths).tolist():
-        speed = float(grid.speeds[row])
+    for row in np.argsort(-speeds * depths).tolist():
+        speed = float(speeds[row])
         if all(abs(np.log(speed / other)) > MIN_CANDIDATE_DISTANCE for other in chosen):
             chosen.append(speed)
             yield speed, float(depths[row])

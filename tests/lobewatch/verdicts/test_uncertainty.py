@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
-from lobes import Cut, MillingRows, Program
+from lobes import Cut, MillingRows, Program, materials_by_name
+from lobes.materials import find_joint_coefficients
 from lobewatch.verdicts.program_samples import build_median_row
-from lobewatch.verdicts.uncertainty import LearnedSamples, uncertainty_of
+from lobewatch.verdicts.uncertainty import LearnedSamples, Uncertainty, uncertainty_of
 from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from modal import Mode
 from tests.lobewatch.conftest import Shop
@@ -67,3 +69,52 @@ def test_a_prediction_is_doubted_as_machine_toml_says(shop: Shop) -> None:
     percents = [given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent]
     assert widths[:, :3] == pytest.approx(np.tile(np.array(percents) / 100, (2, 1)))
     assert widths[:, 3] == pytest.approx([np.radians(10.0), 0.0])
+
+
+LISTED = '[[program]]\nname = "listed"\nteeth = 4\nradial_depth_mm = 6\ntool_diameter_mm = 12\nspeed_rpm = 9000\n'
+LISTED += 'direction = "down"\ndepth_mm = 1.0\n'
+
+
+def doubt_of_listed(shop: Shop, more: str) -> Uncertainty:
+    """Return the uncertainty of a program with more keys."""
+    shop.tap_both()
+    shop.edit("[speed]", f"{LISTED}{more}\n\n[speed]")
+    machine = shop.logbook.machine
+    table = next(program for program in machine.program if program.name == "listed")
+    return uncertainty_of(shop.logbook.assembly(), table, machine)
+
+
+def test_kt_and_kr_of_a_listed_material_follow_its_joint_distribution(shop: Shop, middle: MillingRows) -> None:
+    doubt, known = doubt_of_listed(shop, 'material = "42CrMo4"'), materials_by_name()["42crmo4"]
+    rows, joint = doubt.sample(middle, 4000), find_joint_coefficients(known)
+    assert joint is not None
+    force = rows.tangential / middle.tangential * known.tangential
+    ratio = rows.radial / rows.tangential * middle.tangential / middle.radial * known.radial / known.tangential
+    shares = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    assert np.quantile(force, shares) == pytest.approx(joint.tangential.at(shares), rel=0.02)
+    assert np.quantile(ratio, shares) == pytest.approx(joint.ratio.at(shares), rel=0.04)
+    assert spearmanr(force, ratio).statistic == pytest.approx(joint.correlation, abs=0.05)
+
+
+def test_stated_coefficients_stay_even_within_their_percents_and_apart(shop: Shop, middle: MillingRows) -> None:
+    doubt = doubt_of_listed(shop, 'material = "42CrMo4"\ntangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 600')
+    rows = doubt.sample(middle, 4000)
+    force, ratio = (
+        rows.tangential / middle.tangential,
+        rows.radial / rows.tangential * middle.tangential / middle.radial,
+    )
+    assert doubt.joint is None
+    assert np.quantile(force, [0, 0.5, 1]) == pytest.approx([0.8, 1.0, 1.2], abs=0.01)
+    assert np.quantile(ratio, [0, 0.5, 1]) == pytest.approx([0.8, 1.0, 1.2], abs=0.01)
+    assert abs(spearmanr(force, ratio).statistic) < 0.05
+
+
+@pytest.mark.parametrize(("kind", "correlation"), [("listed", 0.0), ("stated", 1.0)])
+def test_wear_of_a_listed_material_is_drawn_apart(
+    shop: Shop, middle: MillingRows, kind: str, correlation: float
+) -> None:
+    stated = "\ntangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 600" if kind == "stated" else ""
+    doubt = doubt_of_listed(shop, f'material = "42CrMo4"\nwear = "worn"{stated}')
+    sharp, worn = (doubt.sample(middle, 2000, without=cause).tangential for cause in ("wear", ""))
+    assert np.quantile(worn / sharp, [0, 0.5, 1]) == pytest.approx([1.0, 1.3, 1.6], abs=0.002)
+    assert spearmanr(worn / sharp, sharp).statistic == pytest.approx(correlation, abs=0.06)

@@ -10,7 +10,7 @@ from scipy.stats import spearmanr
 
 from lobes import Cut, MillingRows, Program, materials_by_name
 from lobes.materials import find_joint_coefficients
-from lobewatch.verdicts.program_samples import build_median_row
+from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_rotating_samples
 from lobewatch.verdicts.uncertainty import LearnedSamples, Uncertainty, uncertainty_of
 from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from modal import Mode
@@ -118,3 +118,16 @@ def test_wear_of_a_listed_material_is_drawn_apart(
     sharp, worn = (doubt.sample(middle, 2000, without=cause).tangential for cause in ("wear", ""))
     assert np.quantile(worn / sharp, [0, 0.5, 1]) == pytest.approx([1.0, 1.3, 1.6], abs=0.002)
     assert spearmanr(worn / sharp, sharp).statistic == pytest.approx(correlation, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("more", "spread"), [("", 0.1), ("\ntangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 600", 0.3)]
+)
+def test_the_chance_of_chatter_varies_kt_of_a_listed_material_less(
+    shop: Shop, middle: MillingRows, more: str, spread: float
+) -> None:
+    doubt = doubt_of_listed(shop, f'material = "42CrMo4"{more}')
+    samples = ProgramSamples(doubt.sample(middle, 4000), (Cut(4, 1.0, "down", 1e9, 3e8),), np.full(1, np.inf), 1, doubt)
+    push = draw_rotating_samples(samples).rows.tangential / samples.rows.tangential
+    assert np.mean(push) == pytest.approx(1.0, abs=0.02)
+    assert np.std(push) == pytest.approx(spread, rel=0.05)

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobes.coefficient_distribution import JointCoefficients
-
 
 @dataclass(frozen=True)
 class SpecificForce:
@@ -114,8 +112,6 @@ class CuttingCoefficients:
     """Lowest and highest published Krc/Ktc (-); None if no spread is published."""
     specific_forces: tuple[SpecificForce, ...] = ()
     """Published specific cutting forces behind the coefficients; empty if they were measured directly."""
-    distribution: JointCoefficients | None = None
-    """Joint distribution of Ktc (Pa) and Krc/Ktc from the sources of a listed material; None for others."""
 
     def __post_init__(self) -> None:
         """Check the coefficients."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from lobes import MillingRows
 from lobes.coefficient_distribution import JointCoefficients
+from lobes.materials import find_joint_coefficients
 from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, UncertaintyTable
 from lobewatch.tool.assembly import Assembly
@@ -273,7 +274,7 @@ def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange,
     if known.tangential_range is None or known.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
         return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share), None
-    ratio, joint = known.radial / known.tangential, known.distribution
+    ratio, joint = known.radial / known.tangential, find_joint_coefficients(known)
     tangential = FactorRange(*(limit / known.tangential for limit in known.tangential_range))
     ratios = FactorRange(*(limit / ratio for limit in known.ratio_range))
     return tangential, ratios, joint and joint.over(known.tangential, ratio)

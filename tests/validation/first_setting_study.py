@@ -25,13 +25,15 @@ from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import NO_TEST_CUTS
 from lobewatch.verdicts.recommendation import recommend
+from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode
 
-LOW, HIGH = 600.0, 20000.0
+LOW, HIGH = 400.0, 20000.0
 """Spindle speeds (rpm)."""
 FILE = f'[machine]\nname = "drawn"\n[speed]\nlow_rpm = {LOW}\nhigh_rpm = {HIGH}\n'
 FAST_FILE = f'{FILE}[[tool]]\nname = "reference"\ncutting_speed_m_min = [20, 800]\n'
 CATALOGUE, FAST = parse_machine_file(FILE), parse_machine_file(FAST_FILE)
+"""Machines with the cutting speeds of the table, and with a tool that bears any speed of the spindle."""
 MATERIALS = (
     "C45",
     "42CrMo4",
@@ -54,61 +56,91 @@ FEED_ANGLES = (0.0, math.pi / 4, math.pi / 2, 3 * math.pi / 4)
 
 
 @dataclass(frozen=True)
-class FirstSetting:
-    """First recommendation for one material on one spindle."""
+class Outcome:
+    """Setting of one material on one spindle, recommended or called stable, and its truth."""
 
     material: str
-    share: float
+    share: float = 0.0
     """Removal rate over the true optimum; 0 without a setting."""
-    chance: float
+    risk: float = math.nan
     """Chance of chatter as stated; NaN without a setting."""
     cases: tuple[Case, ...] = ()
     """Truth of the setting in each feed direction; none without a setting."""
 
 
-def first_setting(number: int, machine: Machine, seed: int = 41) -> FirstSetting:
+class Spindle:
+    """A spindle as tapped and as it is at speed, with the true Kt and Kr of a listed material."""
+
+    def __init__(self, number: int, machine: Machine, seed: int) -> None:
+        self.draw = draw = np.random.default_rng((seed, number))
+        self.material, self.machine = MATERIALS[number % len(MATERIALS)], machine
+        x = _draw_modes(draw)
+        y = tuple(
+            (f * draw.uniform(0.9, 1.1), z * draw.uniform(0.8, 1.25), k * draw.uniform(0.7, 1.4)) for f, z, k in x
+        )
+        listed = materials_by_name()[fold_material_name(self.material)]
+        assert listed.tangential_range is not None
+        assert listed.ratio_range is not None
+        self.tangential = draw.uniform(*listed.tangential_range)
+        self.radial = self.tangential * draw.uniform(*listed.ratio_range)
+        drop = draw.uniform(0, MOST_DROP)
+        sides, time = (_tap(x, draw), _tap(y, draw)), datetime(2026, 1, 1, tzinfo=UTC)
+        self.tool = Assembly("reference", time, "drawn", *sides, ("x", "y"), None, {}, False, ())
+        self.x, self.y = _drop(x, drop), _drop(y, drop)
+
+    def program(self, speed_rpm: float, depth_mm: float) -> ProgramTable:
+        """Return a slot as written in machine.toml."""
+        return ProgramTable(
+            name="drawn",
+            teeth=TEETH,
+            radial_depth_mm=DIAMETER,
+            tool_diameter_mm=DIAMETER,
+            direction="down",
+            material=self.material,
+            speed_rpm=speed_rpm,
+            depth_mm=depth_mm,
+            feed="both",
+        )
+
+    def outcome(self, speed_rpm: float, depth_mm: float, risk: float) -> Outcome:
+        """Return a setting with its truth."""
+        reach = CutRange.of(self.machine, self.program(speed_rpm, depth_mm))
+        speeds = list_speeds(reach.low_rpm, reach.high_rpm)
+        best = float(np.max(speeds * slot_limits(self.x, self.y, self.tangential, self.radial, speeds)))
+        forces = self.tangential, self.radial
+        cases = tuple(
+            Case(self.x, self.y, angle, TEETH, 1.0, "down", *forces, 0.0, speed_rpm, depth_mm / 1e3)
+            for angle in FEED_ANGLES
+        )
+        return Outcome(self.material, speed_rpm * depth_mm / 1e3 / best, risk, cases)
+
+
+def recommend_first(number: int, machine: Machine, seed: int = 41) -> Outcome:
     """Draw a spindle and a material, and recommend."""
-    material = MATERIALS[number % len(MATERIALS)]
-    draw = np.random.default_rng((seed, number))
-    x = _draw_modes(draw)
-    y = tuple((f * draw.uniform(0.9, 1.1), z * draw.uniform(0.8, 1.25), k * draw.uniform(0.7, 1.4)) for f, z, k in x)
-    listed = materials_by_name()[fold_material_name(material)]
-    assert listed.tangential_range is not None
-    assert listed.ratio_range is not None
-    tangential = draw.uniform(*listed.tangential_range)
-    radial = tangential * draw.uniform(*listed.ratio_range)
-    drop = draw.uniform(0, MOST_DROP)
-    table = ProgramTable(
-        name="drawn",
-        teeth=TEETH,
-        radial_depth_mm=DIAMETER,
-        tool_diameter_mm=DIAMETER,
-        direction="down",
-        material=material,
-        speed_rpm=HIGH,
-        depth_mm=1.0,
-        feed="both",
-    )
-    tapped = (_tap(x, draw), _tap(y, draw))
-    tool = Assembly("reference", datetime(2026, 1, 1, tzinfo=UTC), "drawn", *tapped, ("x", "y"), None, {}, False, ())
-    setting = recommend(table, tool, machine, NO_TEST_CUTS).setting
+    spindle = Spindle(number, machine, seed)
+    setting = recommend(spindle.program(HIGH, 1.0), spindle.tool, machine, NO_TEST_CUTS).setting
     if setting is None:
-        return FirstSetting(material, 0.0, math.nan)
-    true_x, true_y = _drop(x, drop), _drop(y, drop)
-    reach = CutRange.of(machine, table)
-    speeds = list_speeds(reach.low_rpm, reach.high_rpm)
-    best = float(np.max(speeds * slot_limits(true_x, true_y, tangential, radial, speeds)))
-    depth = setting.depth_mm / 1e3
-    cases = tuple(
-        Case(true_x, true_y, angle, TEETH, 1.0, "down", tangential, radial, 0.0, setting.speed_rpm, depth)
-        for angle in FEED_ANGLES
+        return Outcome(spindle.material)
+    return spindle.outcome(setting.speed_rpm, setting.depth_mm, setting.chatter_risk)
+
+
+def check_program(number: int, machine: Machine, seed: int = 43) -> Outcome:
+    """Draw a spindle, a material, a speed and a depth near the border of `stable`, and check."""
+    spindle = Spindle(number, machine, seed)
+    reach = CutRange.of(machine, spindle.program(HIGH, 1.0))
+    speed = spindle.draw.uniform(reach.low_rpm, reach.high_rpm)
+    limit = evaluate_program(spindle.program(speed, 1.0), spindle.tool, machine).limit_low
+    verdict = evaluate_program(
+        spindle.program(speed, 1e3 * limit * spindle.draw.uniform(0.6, 1.0)), spindle.tool, machine
     )
-    return FirstSetting(material, setting.speed_rpm * depth / best, setting.chatter_risk, cases)
+    if verdict.stability is not Stability.STABLE:
+        return Outcome(spindle.material)
+    return spindle.outcome(speed, verdict.program.depth_mm, verdict.chatter_risk)
 
 
-def chattering(settings: Sequence[FirstSetting]) -> NDArray[np.bool_]:
-    """Return which settings chatter in any feed direction; what has not converged counts."""
-    judged = milling_simulation.judge([case for setting in settings for case in setting.cases])
+def chattering(outcomes: Sequence[Outcome]) -> NDArray[np.bool_]:
+    """Return which outcomes with a setting chatter in any feed direction; what has not converged counts."""
+    judged = milling_simulation.judge([case for outcome in outcomes for case in outcome.cases])
     is_bad = judged.chatters | (judged.doubt >= np.abs(judged.growth))
     return np.any(is_bad.reshape(-1, len(FEED_ANGLES)), axis=1)
 

@@ -126,8 +126,7 @@ class Machine(toml.TomlTable, frozen=True):
         known = by_name[name]
         if table.tangential_n_per_mm2 is None:
             return known
-        unpublished: dict[str, Any] = dict.fromkeys(("tangential_range", "ratio_range", "distribution"))
-        unpublished["specific_forces"] = ()
+        unpublished: dict[str, Any] = {"tangential_range": None, "ratio_range": None, "specific_forces": ()}
         return replace(known, tangential=tangential, radial=radial, source=USER_SOURCE, **unpublished)
 
     def build_cut(self, table: CutTable) -> Cut:

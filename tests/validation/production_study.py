@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.materials import fold_material_name, materials_by_name
-from lobewatch.cuts.learning.production_ladder import find_ladder
 from lobewatch.cuts.learning.program_learning import build_cut_grid, find_next_cut, learn_program
-from lobewatch.cuts.learning.suggestion import find_best_removal_rate
+from lobewatch.logbook.production import climb
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.folder_updates import make_observed_cut
 from lobewatch.machine.journal.entries import CutEntry
@@ -122,10 +121,7 @@ class HiddenSpindle:
             found = find_next_cut(self.table, self.tool, self.machine, self.cuts, count).suggestion
             return None if found is None else (found.speed_rpm, found.depth)
         learning = learn_program(self.table, self.tool, self.machine, self.cuts)
-        rejected = learning.rejected_cuts
-        running = find_best_removal_rate([cut for cut in learning.own_cuts if cut not in rejected])
-        grid = build_cut_grid(self.table, self.tool, self.machine)
-        ladder = find_ladder(learning.posterior, grid, learning.own_cuts, rejected, running, 1)
+        ladder = climb(learning, build_cut_grid(self.table, self.tool, self.machine), self.machine, count=1)
         step = next(iter(ladder.steps), None)
         return None if step is None else (step.speed_rpm, step.depth)
 
@@ -144,7 +140,7 @@ class HiddenSpindle:
         self.chattered.append(chatters)
 
     def _power_kw(self, speed_rpm: float, depth: float) -> float | None:
-        """Displayed power (kW): chips and edges of two teeth at all times, within what the command takes."""
+        """Return the displayed power (kW): chips and edges of two teeth at all times, within what the command takes."""
         if not self.has_power:
             return None
         per_depth = DIAMETER * TEETH * speed_rpm / 60 * self.tangential * (FEED + self.dull * EDGE_LENGTH * math.pi / 2)

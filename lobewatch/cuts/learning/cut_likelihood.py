@@ -336,7 +336,8 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
     limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
-    excess = np.clip(np.log(cut.depth / limit), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    finite = np.minimum(limit, cut.depth * math.exp(2 * MAX_LOG_EXCESS))
+    excess = np.clip(np.log(cut.depth / finite), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:

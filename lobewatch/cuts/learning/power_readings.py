@@ -7,7 +7,7 @@ from statistics import median
 from acquisition import Remark
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.journal.entries import CutEntry, geometry_key, material_key
-from lobewatch.machine.settings.drive_power import expected_power
+from lobewatch.machine.settings.drive_power import predict_power
 
 MAX_MATERIAL_RATIO = 2.0
 """Largest ratio of Kt by power to that of the material, either way, without a question; chosen."""
@@ -86,7 +86,8 @@ def _is_power_of(entry: CutEntry, table: ProgramTable, machine: Machine, force: 
     """Return whether another program has the power of a reading; force: Kt by power over that of machine.toml."""
     if entry.power is None or table.name == entry.program or table.tool != entry.tool:
         return False
-    expected = expected_power(machine, table, table.speed_rpm, table.depth_mm / 1e3, force)
+    expected = predict_power(machine, table, table.speed_rpm, table.depth_mm / 1e3)
     if expected is None:
         return False
-    return max(entry.power.watts / expected, expected / entry.power.watts) <= MAX_OTHER_PROGRAM_RATIO
+    ratio = entry.power.watts / (force * expected.watts)
+    return max(ratio, 1 / ratio) <= MAX_OTHER_PROGRAM_RATIO

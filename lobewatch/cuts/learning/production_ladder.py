@@ -12,6 +12,7 @@ from lobewatch.cuts.learning.cut_likelihood import (
     LIMIT_SPREAD,
     CutEvidence,
     CutPrediction,
+    PowerEvidence,
     find_questioned_cut,
     is_setting_taken,
     predict_cut,
@@ -42,9 +43,9 @@ class LadderStep(NamedTuple):
     depth: float
     """Axial depth of cut (m)."""
     chatter_probability: float
-    """Chance of chatter if all earlier steps are stable."""
-    gain: float
-    """Gain in removal rate over the running cut; inf without one."""
+    """Chance of chatter if all earlier steps are stable, with the expected power if it is read."""
+    gain: float = np.inf
+    """Gain in removal rate over the running cut, 0 for this cut itself; inf without one."""
 
     @property
     def removal_rate(self) -> float:
@@ -66,10 +67,13 @@ def find_ladder(
     grid: CutGrid,
     cuts: Sequence[CutEvidence],
     rejected: Collection[CutEvidence],
-    running: float,
+    running: tuple[float, float] | None,
     count: int = MAX_LADDER_CUTS,
+    power: PowerEvidence | None = None,
 ) -> Ladder:
     """Find the next ordinary cuts.
+
+    Without a better cut, the running one is the first step if its power can teach Kt.
 
     Parameters
     ----------
@@ -80,19 +84,42 @@ def find_ladder(
     cuts, rejected
         Cuts of this program, and those with a rejected verdict.
     running
-        Removal rate (rpm m) of the cut that runs now; 0 without one.
+        Speed (rpm) and depth (m) of the cut that runs now; None without one.
     count
         Largest number of steps.
+    power
+        Errors of a power reading of the cuts; None if it cannot be read.
     """
     if (questioned := find_questioned_cut(cuts)) is not None:
         return Ladder((), questioned)
-    steps, rate = list[LadderStep](), running
-    while len(steps) < count and (step := _find_step(posterior, grid, cuts, rejected, rate)) is not None:
-        steps.append(step._replace(gain=step.removal_rate / running - 1 if running else np.inf))
-        rate = step.removal_rate
+    steps, rate = list[LadderStep](), 0.0 if running is None else running[0] * running[1]
+    while len(steps) < count:
+        step = _find_step(posterior, grid, cuts, rejected, steps[-1].removal_rate if steps else rate)
+        if step is None and not steps and running is not None and power is not None:
+            step = _build_running_step(posterior, grid, *running)
+        if step is None:
+            break
+        steps.append(step._replace(gain=step.removal_rate / rate - 1 if rate else np.inf))
         if len(steps) < count:
-            posterior = posterior.learn_from(grid.build_evidence(step.speed_rpm, step.depth))
+            posterior = posterior.learn_from(_expect(step, posterior, grid, power))
     return Ladder(tuple(steps))
+
+
+def _expect(step: LadderStep, posterior: Posterior, grid: CutGrid, power: PowerEvidence | None) -> CutEvidence:
+    """Return the expected result of a step: stable, with the power of the mean Kt."""
+    made = grid.build_evidence(step.speed_rpm, step.depth)
+    if power is None:
+        return made
+    return replace(made, power=replace(power, force=posterior.intervals["tangential"].mean))
+
+
+def _build_running_step(posterior: Posterior, grid: CutGrid, speed: float, depth: float) -> LadderStep | None:
+    """Return the running cut as a step that teaches Kt; None if it was read before or chatters too easily."""
+    if any(cut.power is not None and cut.material == 0 for cut in posterior.cuts):
+        return None
+    few = posterior.resample(N_LADDER_SAMPLES)
+    chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))
+    return LadderStep(speed, depth, chance) if chance <= MAX_CUT_RISK else None
 
 
 def _find_step(
@@ -133,7 +160,7 @@ def _verify_speed(few: Posterior, grid: CutGrid, speed: float, depth: float) -> 
         if depth <= 0:
             return None
     chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))
-    return LadderStep(speed, depth, chance, np.inf) if chance <= MAX_CUT_RISK else None
+    return LadderStep(speed, depth, chance) if chance <= MAX_CUT_RISK else None
 
 
 def _predict(few: Posterior, grid: CutGrid, speed: float, depth: float) -> CutPrediction:

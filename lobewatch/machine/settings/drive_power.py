@@ -138,10 +138,8 @@ def _power_reading(
     return PowerReading(watts, machine.build_cut(table), depth, diameter, feed_per_tooth_mm / 1e3, edge)
 
 
-def expected_power(
-    machine: Machine, table: CutTable, speed_rpm: float, depth: float, force: float = 1.0
-) -> float | None:
-    """Return the power (W) of a cut with its own feed per tooth; None without a feed.
+def predict_power(machine: Machine, table: CutTable, speed_rpm: float, depth: float) -> CutPower | None:
+    """Predict the power of a cut with the coefficients of machine.toml; None without a feed or with several depths.
 
     Parameters
     ----------
@@ -149,12 +147,11 @@ def expected_power(
         Machine and cut.
     speed_rpm, depth
         Speed (rpm) and axial depth ap (m).
-    force
-        Cutting forces over those of machine.toml.
     """
     if table.feed_per_tooth_mm is None or len(table.immersions) > 1:
         return None
-    return force * _power_reading(0.0, machine, table, table.feed_per_tooth_mm, depth).expected_power(speed_rpm)
+    watts = _power_reading(0.0, machine, table, table.feed_per_tooth_mm, depth).expected_power(speed_rpm)
+    return _power_reading(watts, machine, table, table.feed_per_tooth_mm, depth).at(speed_rpm)
 
 
 SPEED_STEP_RPM, DEPTH_STEP_MM = 10.0, 0.05

@@ -53,7 +53,10 @@ def ladder_lines(plan: ProductionPlan | None, folder: Path) -> Iterator[str]:
         yield f"Next ordinary cuts, each with at most {100 * MAX_CUT_RISK:g} % chance of chatter:"
         steps = zip(plan.ladder.steps, plan.powers_kw, strict=True)
         for number, (step, power) in enumerate(steps, 1):
-            yield f"  {number}. {_step_text(step, power)}" + (", if the cut before was stable" if number > 1 else "")
+            yield f"  {number}. {_step_text(step, power)}"
+        if len(plan.ladder.steps) > 1:
+            shown = "" if plan.powers_kw[0] is None else " with the expected power"
+            yield f"Cuts 2 and 3 follow if each cut before is stable{shown}"
     yield from _answer_lines(plan, folder)
     if plan.is_saved:
         program = shlex.join(["lobewatch", "suggest", str(folder), "--program", plan.learning.program.name])
@@ -72,7 +75,7 @@ def next_step_lines(plan: ProductionPlan | None, folder: Path) -> Iterator[str]:
 
 
 def _step_text(step: LadderStep, power: float | None) -> str:
-    gain = f", {100 * step.gain:.0f} % more removal rate" if math.isfinite(step.gain) else ""
+    gain = f", {100 * step.gain:.0f} % more removal rate" if 0 < step.gain < math.inf else ""
     shown = "" if power is None else f", {power:.2g} kW expected"
     chance = chance_text(step.chatter_probability)
     return f"{format_rpm(step.speed_rpm)} rpm, ap {1e3 * step.depth:.4g} mm (chance of chatter {chance}{gain}{shown})"

@@ -1,0 +1,82 @@
+"""Ordinary cuts of `recommend` and the next step after `observe`, and powers without a verdict."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from tests.lobewatch.commands.invoke import invoke
+
+Shop = Any
+"""Machine fixture of tests/lobewatch/conftest.py."""
+MORE = 'feed_per_tooth_mm = 0.1\nfeed = "x"\nprocess_damping_n_per_m = [0, 0]'
+
+
+@pytest.fixture
+def mill(shop: Shop) -> Shop:
+    """With both directions tapped and one slot with a feed."""
+    shop.tap_both()
+    shop.run(("A", 12900, 0.5), more=MORE)
+    return shop
+
+
+def answer(shop: Shop, name: str, *words: str) -> Any:
+    return json.loads(invoke([name, str(shop.path), *words, "--json"]).stdout)
+
+
+def observe(shop: Shop, *words: str) -> Any:
+    return answer(shop, "observe", "--program", "A", *words)
+
+
+def test_a_recommendation_ends_in_ordinary_cuts_and_each_cut_names_the_next(mill: Shop) -> None:
+    found = answer(mill, "recommend", "--tool", "reference")
+    ladder, recommended = found["ladder"], found["recommended"]
+    assert ladder["now"] == {key: recommended[key] for key in ("speed_rpm", "depth_mm")}
+    assert 1 <= len(ladder["steps"]) <= 3
+    rates = [step["speed_rpm"] * step["depth_mm"] for step in (ladder["now"], *ladder["steps"])]
+    assert rates == sorted(rates)
+    for step in ladder["steps"]:
+        assert 0 <= step["chance_of_chatter"] <= 0.05
+        assert step["tells"] == ["power", "verdict", "frequency"]
+        assert step["expected_power_kw"] > 0
+    first = ladder["steps"][0]
+    place = "--speed", f"{first['speed_rpm']:g}", "--depth", f"{first['depth_mm']:g}"
+    made = observe(mill, *place, "--stable", "--power", f"{0.8 * first['expected_power_kw']:.3f}")
+    assert made["next_step"]["speed_rpm"] * made["next_step"]["depth_mm"] > rates[1]
+    assert made["asks"] is None
+
+
+def test_the_help_of_recommend_names_both_policies() -> None:
+    text = invoke(["recommend", "--help"]).stdout
+    assert all(name in text for name in ("observe", "listen", "suggest"))
+
+
+def test_a_power_without_a_verdict_is_stored_and_counts_once_a_day(mill: Shop) -> None:
+    made = observe(mill, "--power", "1.1")
+    assert (made["cut"]["word"], made["cut"]["reason"], made["cut"]["by"]) == (
+        "cannot tell",
+        "power-reading",
+        "display",
+    )
+    assert made["cut"]["power_kw"] == pytest.approx(1.1)
+    assert made["next_step"] is not None
+    assert observe(mill, "--power", "1.1")["next_step"] == made["next_step"]
+    assert answer(mill, "suggest", "--program", "A")["cuts_made"] == 0
+    assert "power reading" in invoke(["history", str(mill.path)]).stdout
+
+
+def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing(mill: Shop) -> None:
+    for words in ((), ("--stable", "--chatter", "--power", "1.1"), ("--power", "1100"), ("--power", "0.01")):
+        with pytest.raises(ValueError, match=r"--(stable|power)"):
+            observe(mill, *words)
+    assert answer(mill, "history")["cuts"] == []
+
+
+def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name(mill: Shop) -> None:
+    observe(mill, "--depth", "2", "--stable")
+    made = [observe(mill, "--depth", depth, "--chatter") for depth in ("3", "2.6", "2.3")]
+    assert [each["asks"] for each in made] == [None, None, "c1"]
+    assert made[-1]["next_step"] is None
+    assert answer(mill, "suggest", "--program", "A")["suggested"]["repeats"] == "c1"

@@ -1,0 +1,92 @@
+"""The ladder of ordinary cuts: risk, gain, what chatter and power change, and a stable word that is asked again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, find_questioned_cut, predict_cut
+from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, Ladder, find_ladder
+from lobewatch.cuts.learning.suggestion import suggest_cut
+from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
+
+
+def stable(depth: float, speed: float = 9000.0, name: str = "c1") -> CutEvidence:
+    return CutEvidence(SLOT, speed, depth, "stable", id=name)
+
+
+def chatter(depth: float, speed: float = 9000.0) -> CutEvidence:
+    return CutEvidence(SLOT, speed, depth, "chatter")
+
+
+@pytest.fixture(scope="module")
+def mill() -> Mill:
+    return Mill()
+
+
+@pytest.fixture(scope="module")
+def ladder(mill: Mill) -> Ladder:
+    return find_ladder(mill.prior, mill.grid, (), (), None)
+
+
+def test_each_step_removes_more_and_hardly_chatters_after_the_steps_before(mill: Mill, ladder: Ladder) -> None:
+    posterior, rate = mill.prior, 0.0
+    assert 1 <= len(ladder.steps) <= 3
+    for step in ladder.steps:
+        made = mill.grid.build_evidence(step.speed_rpm, step.depth)
+        chance = np.sum(posterior.weights * predict_cut(made, posterior.samples).chatter_probability)
+        assert step.chatter_probability <= MAX_CUT_RISK
+        assert chance <= MAX_CUT_RISK + 0.02
+        assert step.removal_rate > rate
+        posterior, rate = posterior.learn_from(made), step.removal_rate
+
+
+def test_no_step_gains_less_than_what_runs(mill: Mill, ladder: Ladder) -> None:
+    first = ladder.steps[0]
+    running = first.speed_rpm, first.depth
+    assert find_ladder(mill.prior, mill.grid, (), (), running, 1).steps == ()
+    (step,) = find_ladder(mill.prior, mill.grid, (), (), (first.speed_rpm, 0.5 * first.depth), 1).steps
+    assert step.gain == pytest.approx(1.0)
+
+
+def test_without_a_better_cut_the_running_one_teaches_kt_by_its_power_once(mill: Mill, ladder: Ladder) -> None:
+    running, power = (ladder.steps[0].speed_rpm, ladder.steps[0].depth), PowerEvidence(1.0, 0.15, 0.05)
+    now, deeper = find_ladder(mill.prior, mill.grid, (), (), running, 2, power).steps
+    assert (now.speed_rpm, now.depth, now.gain) == (*running, 0.0)
+    assert deeper.gain > 0.03
+    learnt = mill.prior.learn_from(replace(stable(running[1], running[0]), power=replace(power, force=2.0)))
+    assert find_ladder(learnt, mill.grid, (), (), running, 1, power).steps == ()
+
+
+def test_a_low_power_leads_deeper_and_chatter_less_deep(mill: Mill, ladder: Ladder) -> None:
+    first = ladder.steps[0]
+    read = CutEvidence(SLOT, first.speed_rpm, first.depth, "cannot tell", power=PowerEvidence(0.8, 0.15, 0.05))
+    deeper = find_ladder(mill.prior.learn_from(read), mill.grid, (), (), None, 1).steps[0]
+    assert deeper.removal_rate > 1.1 * first.removal_rate
+    made = replace(chatter(first.depth, first.speed_rpm), frequency=1720.0)
+    less = find_ladder(mill.prior.learn_from(made), mill.grid, [made], (), None, 1).steps
+    assert all(step.removal_rate < first.removal_rate for step in less)
+
+
+def test_three_deeper_cuts_that_chatter_put_one_stable_word_in_question(mill: Mill) -> None:
+    word, deeper = (
+        stable(2e-3),
+        [chatter(depth, speed) for depth, speed in ((2.2e-3, 9000), (3e-3, 7000), (2.5e-3, 9e3))],
+    )
+    assert find_questioned_cut([word, *deeper]) == word
+    assert find_questioned_cut([word, *deeper[:2]]) is None
+    assert find_questioned_cut([word, *deeper, replace(word, id="c5")]) is None
+    assert find_questioned_cut([word, *deeper[:2], chatter(1.9e-3)]) is None
+    assert find_questioned_cut([word, *deeper, stable(3.5e-3, name="c5")]) is None
+    found = find_ladder(mill.prior, mill.grid, [word, *deeper], (), None)
+    assert (found.steps, found.questioned) == ((), word)
+
+
+@pytest.mark.parametrize("left", [1, 3])
+def test_a_questioned_word_is_suggested_again_before_anything_else(mill: Mill, left: int) -> None:
+    made = [stable(2e-3), *(chatter(depth) for depth in (3e-3, 2.6e-3, 2.3e-3))]
+    suggestion = suggest_cut(mill.learnt_from(made), mill.grid, made, left)
+    assert suggestion is not None
+    assert (suggestion.repeats, suggestion.speed_rpm, suggestion.depth) == ("c1", 9000.0, 2e-3)

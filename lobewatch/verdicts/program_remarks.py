@@ -116,6 +116,11 @@ def assumption_remarks(case: ProgramCase, result: MonteCarloResult) -> Iterator[
         risk = f"at ae/D {min(table.immersions):.2g} a helix may change the limit by a factor of 0.7 to 1.7"
         text = f"helix_deg is missing, 0 is assumed ({risk})"
         yield Remark("helix-not-written", table.name, text, "Set helix_deg, 0 for straight edges")
+    if case.program.cut.process_damping > 0:
+        damping = case.machine.process_damping(table)[0]
+        source = "test cuts" if case.at_speed.n_cuts else "machine.toml"
+        text = f"process damping counts with C {damping / 1e3:.3g} kN/m ({source})"
+        yield Remark("process-damping", table.name, text, "Set process_damping_n_per_m to [0, 0] for sharp new edges")
     if result.axes_ratio > MIN_CROSS_LIMIT_RATIO:
         used = "" if result.chatters_otherwise else ", worst case used"
         effect = f"limit changes by up to {100 * (result.axes_ratio - 1):.0f} %{used}"

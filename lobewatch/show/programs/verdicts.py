@@ -161,7 +161,8 @@ def _uncertainty_parts(verdict: Verdict, doubt: Uncertainty, assembly: Assembly,
 
 def _learned_parts(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     before, after = at_speed.prior_ranges, at_speed.posterior_ranges
-    for key in ("tangential", "ratio", *(name for name in before if name.startswith("frequency"))):
+    named = [name for name in NAMED_FACTORS if name in before]
+    for key in (*named, *(name for name in before if name.startswith("frequency"))):
         prior, posterior = (f"{factor.low:.2f}..{factor.high:.2f}" for factor in (before[key], after[key]))
         yield f"{factor_text(key)} times {posterior} (times {prior} before the test cuts)"
     yield f"speed {_half_width_text(speed)}"

@@ -24,12 +24,20 @@ from rich.text import Text
 
 from acquisition import Remark, merge_remarks
 from acquisition.errors import CONTROL_CHARACTERS
+from lobewatch.machine.settings.display_units import metric_output
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-Json = Annotated[bool, typer.Option("--json", help="JSON on stdout.")]
+
+def _keep_metric(ctx: typer.Context, is_json: bool) -> bool:
+    if is_json:
+        ctx.with_resource(metric_output())
+    return is_json
+
+
+Json = Annotated[bool, typer.Option("--json", callback=_keep_metric, is_eager=True, help="JSON on stdout.")]
 
 JsonObject = dict[str, Any]
 """Object of the JSON output."""

@@ -29,25 +29,25 @@ class _LoopParts(NamedTuple):
     """Determinant of G (m^2/N^2)."""
 
 
-class _Bracket(NamedTuple):
-    """Steps between two frequencies (Hz) with a real loop, and the resultant at both, shape (r,) or (r, s) each."""
+class _Steps(NamedTuple):
+    """Steps between two frequencies (Hz) in which a loop (1/m) becomes real, shape (r,) or (r, s) each."""
 
     low: Floats
     high: Floats
-    at_low: Floats
-    at_high: Floats
+    at_low: Complexes
+    at_high: Complexes
 
-    @property
-    def frequency(self) -> Floats:
-        """Frequencies at which the resultant is 0 on a line (Hz)."""
-        rise = self.at_high - self.at_low
-        return np.asarray(self.low - self.at_low * (self.high - self.low) / np.where(rise == 0, 1.0, rise))
+    def interpolate(self) -> tuple[Floats, Complexes]:
+        """Return frequency and loop where the loop is real on a line."""
+        rise = self.at_high.imag - self.at_low.imag
+        share = -self.at_low.imag / np.where(rise == 0, 1.0, rise)
+        return self.low + share * (self.high - self.low), self.at_low + share * (self.at_high - self.at_low)
 
-    def with_inner(self, frequency: Floats, value: Floats) -> "_Bracket":
-        """Return the part on one side of a frequency inside."""
-        is_low = (value < 0) == (self.at_low < 0)
+    def narrow(self, frequency: Floats, loop: Complexes) -> "_Steps":
+        """Return the parts on one side of frequencies inside."""
+        is_low = (loop.imag < 0) == (self.at_low.imag < 0)
         low, high = np.where(is_low, frequency, self.low), np.where(is_low, self.high, frequency)
-        return _Bracket(low, high, np.where(is_low, value, self.at_low), np.where(is_low, self.at_high, value))
+        return _Steps(low, high, np.where(is_low, loop, self.at_low), np.where(is_low, self.at_high, loop))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,7 @@ class DampedLoop:
         L = eigenvalue of ((1 - exp(-i w tau)) H0 + 2 i N (f_c / f_t) (C / D) N0) G,     b = -1 / L,
 
     as i w C / V = 2 i N (f_c / f_t) C / D. The lowest b counts for which L is real and negative. For uneven teeth the
-    regeneration is the mean over the delays. Where the trace t and the determinant d of this matrix share a real b with
-    1 + b t + b^2 d = 0, the resultant of its real and imaginary part is 0.
+    regeneration is the mean over the delays.
     Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Tyler & Schmitz, J. Manuf. Process. 15 (2013) 69-76, who
     find the same b by iteration.
     """
@@ -81,15 +80,15 @@ class DampedLoop:
         """
         parts = self._parts(grid)
         found = [self._lowest_step(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
-        bracket = _Bracket._make(np.stack(part, axis=1) for part in zip(*found, strict=True))
+        steps = _Steps._make(np.stack(part, axis=1) for part in zip(*found, strict=True))
         for _ in range(REFINEMENT_STEPS):
-            frequency = bracket.frequency
-            invariants = self._invariants(self._parts(frequency), frequency, tooth_frequency)
-            bracket = bracket.with_inner(frequency, self._resultant(*invariants))
-        frequency = bracket.frequency
-        depth = _real_limit(*self._invariants(self._parts(frequency), frequency, tooth_frequency))
-        exists = (bracket.at_low < 0) != (bracket.at_high < 0)
-        return np.where(exists, depth, np.inf), np.where(exists & np.isfinite(depth), frequency, np.nan)
+            frequency, near = steps.interpolate()
+            half, root = self._eigenvalues(self._parts(frequency), frequency, tooth_frequency)
+            is_first = np.abs(half + root - near) < np.abs(half - root - near)
+            steps = steps.narrow(frequency, np.where(is_first, half + root, half - root))
+        frequency, loop = steps.interpolate()
+        limited = loop.real < 0
+        return np.where(limited, -1 / np.where(limited, loop.real, -1.0), np.inf), np.where(limited, frequency, np.nan)
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)
@@ -108,42 +107,27 @@ class DampedLoop:
         (n, c), (d, m) = np.moveaxis(self.damping, 0, -1)[..., np.newaxis]
         return h * k - a * b, h * m + n * k - a * d - c * b, n * m - c * d
 
-    def _invariants(self, parts: _LoopParts, frequency: Floats, tooth_frequency: Floats) -> tuple[Complexes, Complexes]:
-        """Return trace (1/m) and determinant (1/m^2) of the loop matrix, shape (r, k) each."""
+    def _eigenvalues(
+        self, parts: _LoopParts, frequency: Floats, tooth_frequency: Floats
+    ) -> tuple[Complexes, Complexes]:
+        """Return mean and half difference of both loops (1/m), shape (r, k) each."""
         waves = frequency / tooth_frequency
         gain, rate = mean_regeneration(self.cut, waves), 2j * self.cut.teeth * waves
         cutting, both, damping = self._determinants
         determinant = (gain * (gain * cutting + rate * both) + rate**2 * damping) * parts.flexibility
-        return gain * parts.cutting + rate * parts.damping, determinant
+        half = (gain * parts.cutting + rate * parts.damping) / 2
+        return half, np.sqrt(half**2 - determinant)
 
-    def _resultant(self, trace: Complexes, determinant: Complexes) -> Floats:
-        """Return what is 0 where the loop is real; with one direction only, the loop is the trace."""
-        if not np.any(determinant):
-            return trace.imag
-        inner = determinant.imag - trace.imag * trace.real
-        return np.asarray(determinant.imag * inner + trace.imag**2 * determinant.real)
-
-    def _lowest_step(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Bracket:
+    def _lowest_step(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
         """Return the step of the lowest limit of each system at its tooth frequency (r, 1); of zeros without one."""
-        trace, determinant = self._invariants(parts, grid, tooth_frequency)
-        value = self._resultant(trace, determinant)
-        row, step = np.nonzero((value[:, 1:] < 0) != (value[:, :-1] < 0))
-        steps = _Bracket(grid[row, step], grid[row, step + 1], value[row, step], value[row, step + 1])
-        share = steps.at_low / (steps.at_low - steps.at_high)
-        between = (part[row, step] + share * (part[row, step + 1] - part[row, step]) for part in (trace, determinant))
-        order = np.lexsort((_real_limit(*between), row))
+        half, root = self._eigenvalues(parts, grid, tooth_frequency)
+        root[:, 1:] *= np.cumprod(np.where(np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0, -1.0, 1.0), axis=1)
+        loop = np.stack((half + root, half - root), axis=1)
+        row, branch, step = np.nonzero((loop.imag[..., 1:] < 0) != (loop.imag[..., :-1] < 0))
+        ends = loop[row, branch, step], loop[row, branch, step + 1]
+        steps = _Steps(grid[row, step], grid[row, step + 1], *ends)
+        order = np.lexsort((steps.interpolate()[1].real, row))
         first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-        lowest = np.zeros((4, len(grid)))
+        lowest = np.zeros((4, len(grid)), np.complex128)
         lowest[:, row[first]] = np.array(steps)[:, first]
-        return _Bracket(*lowest)
-
-
-def _real_limit(trace: Complexes, determinant: Complexes) -> Floats:
-    """Return b = -1 / L (m) for the eigenvalue that is nearest to real; inf unless it is negative."""
-    half = trace / 2
-    root = np.sqrt(half**2 - determinant)
-    large = half + np.where(np.abs(half + root) < np.abs(half - root), -root, root)
-    loops = np.stack((large, determinant / np.where(large == 0, 1.0, large)))
-    skew = np.where(loops.real == 0, np.inf, np.abs(loops.imag) / np.where(loops.real == 0, 1.0, np.abs(loops.real)))
-    loop = np.take_along_axis(loops.real, np.argmin(skew, axis=0)[np.newaxis], axis=0)[0]
-    return np.where(loop < 0, -1 / np.where(loop < 0, loop, -1.0), np.inf)
+        return _Steps(lowest[0].real, lowest[1].real, lowest[2], lowest[3])

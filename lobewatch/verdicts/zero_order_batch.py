@@ -58,6 +58,8 @@ FREQUENCY_GRID_POINTS = 49
 """Number of frequencies near each natural frequency, densest close to it."""
 MAX_BATCH_NUMBERS = 300_000
 """Largest number of values computed at once."""
+SPEEDS_PER_FREQUENCY_GRID = 10
+"""Number of neighbouring speeds with process damping that share their frequencies."""
 NEWTON_STEPS = 14
 """Number of Newton steps for a root."""
 CONSTANT_FORCE_TOLERANCE = 1e-6
@@ -101,7 +103,7 @@ class ZeroOrderBatch:
         undamped = self.rows.process_damping == 0
         if not np.all(undamped):
             spindles = ZeroOrderBatch(self.rows[~undamped], self.force[~undamped])
-            depth[~undamped], chatter[~undamped] = spindles._damped_limits(speeds[~undamped])
+            depth[~undamped], chatter[~undamped] = spindles._damped_limits(speeds[~undamped], deepest)
             if np.any(undamped):
                 depth[undamped], chatter[undamped] = self[undamped].limits(speeds[undamped], deepest)
             return depth, chatter
@@ -112,17 +114,41 @@ class ZeroOrderBatch:
             depth[part], chatter[part] = spindles._limits_of_part(speeds[part] * self.rows.cut.teeth / 60, deepest)
         return depth, chatter
 
-    def _damped_limits(self, speeds: Floats) -> tuple[Floats, Floats]:
+    def _damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Return limits and chatter frequencies with process damping at speeds (rpm) (r, s)."""
         teeth, cut = speeds * self.rows.cut.teeth / 60, self.rows.cut
-        grid = refine_frequency_grid(self._frequency_grid(), cut, teeth)
 
         def receptances(frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
             omega = 2 * np.pi * frequency
-            xx, yy, xy = (self._receptance(omega, *axes) for axes in ((0, 0), (1, 1), (0, 1)))
-            return xx, yy, xy
+            xy = self._receptance(omega, 0, 1) if self._is_rotated else np.zeros((1, 1), np.complex128)
+            return self._receptance(omega, 0, 0), self._receptance(omega, 1, 1), xy
 
-        return DampedLoop(cut, self.force, self.damping, receptances).limits(grid, teeth)
+        loop, near = DampedLoop(cut, self.force, self.damping, receptances), self._frequency_grid()
+        reach = self._damped_range(near, receptances(near), teeth, deepest)
+        order = np.argsort(np.min(teeth, axis=0))
+        depth, chatter = np.empty((2, *teeth.shape))
+        for part in np.array_split(order, -(-order.size // SPEEDS_PER_FREQUENCY_GRID)):
+            step = float(np.min(teeth[:, part])) * 2 * np.pi / (cut.teeth * max(cut.delays)) / FREQUENCIES_PER_WAVE
+            even = np.arange(max(reach[0], step), reach[1], step)
+            grid = np.sort(np.hstack((near, np.broadcast_to(even, (len(near), even.size)))), axis=1)
+            depth[:, part], chatter[:, part] = loop.limits(grid, teeth[:, part])
+        return depth, chatter
+
+    def _damped_range(
+        self, grid: Floats, receptances: tuple[Complexes, ...], teeth: Floats, deepest: float
+    ) -> tuple[float, float]:
+        """Return the lowest and highest frequency (Hz) of limits up to a depth (m), among those of a grid (r, k).
+
+        A loop is at most as large as the product of the norms of its factors; the lowest frequency of the grid stands
+        for all below, where process damping is weak.
+        """
+        force, damping = (np.linalg.norm(part, axis=(1, 2))[:, np.newaxis] for part in (self.force, self.damping))
+        waves = grid / np.min(teeth, axis=1, keepdims=True)
+        flexible = np.sqrt(sum(np.abs(part) ** 2 for part in receptances))
+        large = (2 * force + 2 * self.rows.cut.teeth * waves * damping) * flexible * deepest >= 1
+        if not np.any(large):
+            return 0.0, 0.0
+        return 0.0 if np.any(large[:, 0]) else float(np.min(grid[large])), float(np.max(grid[large]))
 
     def _limits_of_part(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Return limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
@@ -177,8 +203,9 @@ class ZeroOrderBatch:
 
     def _damped_characteristic(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
         """Return det(I + b ((1 - exp(-s tau)) H0 + s C / V N0) G) and its derivative by s."""
-        axes = ((0, 0), (0, 1), (1, 0), (1, 1))
-        (gx, dx), (gxy, dxy), _, (gy, dy) = (self._receptance_with_derivative(s, *pair) for pair in axes)
+        axes, none = ((0, 0), (0, 1), (1, 0), (1, 1)), (np.zeros(1), np.zeros(1))
+        (gx, dx), (gy, dy) = self._receptance_with_derivative(s, 0, 0), self._receptance_with_derivative(s, 1, 1)
+        gxy, dxy = self._receptance_with_derivative(s, 0, 1) if self._is_rotated else none
         wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
         rate = self.rows.cut.teeth * tau / np.pi  # C / V over C / D: 60 / (pi rpm)
         forces = [(self.force[:, i, j, np.newaxis], rate * self.damping[:, i, j, np.newaxis]) for i, j in axes]

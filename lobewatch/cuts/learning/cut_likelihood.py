@@ -191,6 +191,8 @@ MULTIPLIER_ACCURACY = 1e-3
 """Relative accuracy of a multiplier."""
 FLIP_ANGLE_TOLERANCE = 1e-3
 """Distance of the angle of a multiplier from pi (rad) within which chatter is of period two."""
+CLEARLY_STABLE_RATIO = 2.0
+"""Limit over depth beyond which a cut is stable for certain: 14 times `LIMIT_SPREAD`."""
 MAX_LOG_EXCESS = 5.0
 """Largest absolute logarithm of depth over limit that counts: a hundred times `LIMIT_SPREAD`."""
 
@@ -335,9 +337,8 @@ def _folded_chatter(cut: CutEvidence) -> Floats:
 def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
     """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
-    limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
-    finite = np.minimum(limit, cut.depth * math.exp(2 * MAX_LOG_EXCESS))
-    excess = np.clip(np.log(cut.depth / finite), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    limit, at_limit = _limits_near(mean, cut.depth)
+    excess = np.clip(np.log(np.maximum(cut.depth / limit, 1e-9)), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
@@ -345,6 +346,13 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
         frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
     base, at_limit = (fold_frequency(part, 1 / rows.tooth_period) for part in (frequency, at_limit))
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
+
+
+def _limits_near(batch: ZeroOrderBatch, depth: float) -> tuple[Floats, Floats]:
+    """Return limits (m) and chatter frequencies (Hz), with process damping only up to twice a depth (m)."""
+    deepest = CLEARLY_STABLE_RATIO * depth if np.any(batch.rows.process_damping) else np.inf
+    limit, chatter = batch.limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
+    return limit[:, 0], chatter[:, 0]
 
 
 def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
@@ -359,7 +367,7 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
     angle = np.abs(np.angle(multiplier))
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
     if cut.has_frequency:
-        at_limit = ZeroOrderBatch.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
+        _, at_limit = _limits_near(ZeroOrderBatch.of(rows), cut.depth)
     is_flip = np.pi - angle < FLIP_ANGLE_TOLERANCE
     return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), is_flip)
 

@@ -16,6 +16,7 @@ from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, p
 from lobewatch.cuts.learning.power_readings import make_material_remark
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
 from lobewatch.cuts.learning.process_damping import NO_PROCESS_DAMPING, ProcessDamping
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty
 
@@ -339,7 +340,7 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     cut = contradicting.cut
     if contradicting.contradiction is Contradiction.MATERIAL:
         return make_material_remark(cut.id, 1.0 if cut.power is None else cut.power.force)
-    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    at = f"at {cut.speed_rpm:.6g} rpm, {LENGTH.text(1e3 * cut.depth, '.4g')}"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong according to the other cuts"
     kind, exclude = contradicting.contradiction, "exclude the cut with folder_updates.exclude_entry"

@@ -9,6 +9,7 @@ import scipy
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning.cut_likelihood import (
+    CLEARLY_STABLE_RATIO,
     LIMIT_SPREAD,
     CutEvidence,
     CutPrediction,
@@ -31,6 +32,8 @@ N_PROPOSAL_SAMPLES, PROPOSED_SPEED_STEP = 150, 2
 """Number of samples that propose speeds, and step in the speeds of the grid; chosen."""
 N_VERIFIED_SPEEDS = 4
 """Number of speeds whose depth is verified; chosen."""
+N_DEPTH_TRIES = 2
+"""Number of depths at which the distance of the limits is computed, each by the one before; chosen."""
 MIN_STEP_GAIN = 0.03
 """Smallest gain in removal rate of a step over the one before it; chosen."""
 
@@ -154,9 +157,9 @@ def _verify_speed(few: Posterior, grid: CutGrid, speed: float, depth: float) -> 
     """Return the deepest cut with little risk at a speed (rpm), near a depth (m); None without one."""
     deepest = float(np.interp(speed, grid.speeds, grid.max_depths))
     depth = max(floor_depth(depth), DEPTH_STEP_MM / 1e3)
-    for _ in range(2):
-        prediction = _predict(few, grid, speed, depth)
-        depth = _deepest_with_little_risk(prediction, depth, deepest)
+    for _ in range(N_DEPTH_TRIES):
+        within = min(deepest, CLEARLY_STABLE_RATIO * depth)
+        depth = _deepest_with_little_risk(_predict(few, grid, speed, depth), depth, within)
         if depth <= 0:
             return None
     chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))

@@ -129,13 +129,12 @@ def check_program(number: int, machine: Machine, seed: int = 43) -> Outcome:
     spindle = Spindle(number, machine, seed)
     reach = CutRange.of(machine, spindle.program(HIGH, 1.0))
     speed = spindle.draw.uniform(reach.low_rpm, reach.high_rpm)
-    limit = evaluate_program(spindle.program(speed, 1.0), spindle.tool, machine).limit_low
-    verdict = evaluate_program(
-        spindle.program(speed, 1e3 * limit * spindle.draw.uniform(0.6, 1.0)), spindle.tool, machine
-    )
+    limit = min(1e3 * evaluate_program(spindle.program(speed, 1.0), spindle.tool, machine).limit_low, DIAMETER)
+    program = spindle.program(speed, limit * spindle.draw.uniform(0.6, 1.0))
+    verdict = evaluate_program(program, spindle.tool, machine)
     if verdict.stability is not Stability.STABLE:
         return Outcome(spindle.material)
-    return spindle.outcome(speed, verdict.program.depth_mm, verdict.chatter_risk)
+    return spindle.outcome(speed, program.depth_mm, verdict.chatter_risk)
 
 
 def chattering(outcomes: Sequence[Outcome]) -> NDArray[np.bool_]:

@@ -48,7 +48,7 @@ class LadderStep(NamedTuple):
     chatter_probability: float
     """Chance of chatter if all earlier steps are stable, with the expected power if it is read."""
     gain: float = np.inf
-    """Gain in removal rate over the running cut, 0 for this cut itself; inf without one."""
+    """Gain in removal rate over the running cut; inf without one."""
 
     @property
     def removal_rate(self) -> float:
@@ -76,7 +76,7 @@ def find_ladder(
 ) -> Ladder:
     """Find the next ordinary cuts.
 
-    Without a better cut, the running one is the first step if its power can teach Kt.
+    Without a better cut, the running one is the first step if its power can teach Kt, or the best with little risk.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def find_ladder(
     steps, rate = list[LadderStep](), 0.0 if running is None else running[0] * running[1]
     while len(steps) < count:
         step = _find_step(posterior, grid, cuts, rejected, steps[-1].removal_rate if steps else rate)
-        if step is None and not steps and running is not None and power is not None:
-            step = _build_running_step(posterior, grid, *running)
+        if step is None and not steps and power is not None and not _is_power_known(posterior):
+            step = _build_running_step(posterior, grid, running) or _find_step(posterior, grid, cuts, rejected, 0.0)
         if step is None:
             break
         steps.append(step._replace(gain=step.removal_rate / rate - 1 if rate else np.inf))
@@ -116,13 +116,17 @@ def _expect(step: LadderStep, posterior: Posterior, grid: CutGrid, power: PowerE
     return replace(made, power=replace(power, force=posterior.intervals["tangential"].mean))
 
 
-def _build_running_step(posterior: Posterior, grid: CutGrid, speed: float, depth: float) -> LadderStep | None:
-    """Return the running cut as a step that teaches Kt; None if it was read before or chatters too easily."""
-    if any(cut.power is not None and cut.material == 0 for cut in posterior.cuts):
+def _is_power_known(posterior: Posterior) -> bool:
+    """Return whether a power in the material of the program was read."""
+    return any(cut.power is not None and cut.material == 0 for cut in posterior.cuts)
+
+
+def _build_running_step(posterior: Posterior, grid: CutGrid, running: tuple[float, float] | None) -> LadderStep | None:
+    """Return the running cut (rpm, m) as a step, whose power teaches Kt; None if it chatters too easily."""
+    if running is None:
         return None
-    few = posterior.resample(N_LADDER_SAMPLES)
-    chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))
-    return LadderStep(speed, depth, chance) if chance <= MAX_CUT_RISK else None
+    chance = float(np.mean(_predict(posterior.resample(N_LADDER_SAMPLES), grid, *running).chatter_probability))
+    return LadderStep(*running, chance) if chance <= MAX_CUT_RISK else None
 
 
 def _find_step(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, LadderStep
 from lobewatch.logbook.production import ProductionPlan
+from lobewatch.machine.settings.display_units import LENGTH, length_argument
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import chance_text
 from lobewatch.show.terminal.output import JsonObject
@@ -78,7 +79,8 @@ def _step_text(step: LadderStep, power: float | None) -> str:
     gain = f", {100 * step.gain:.0f} % more removal rate" if 0 < step.gain < math.inf else ""
     shown = "" if power is None else f", {power:.2g} kW expected"
     chance = chance_text(step.chatter_probability)
-    return f"{format_rpm(step.speed_rpm)} rpm, ap {1e3 * step.depth:.4g} mm (chance of chatter {chance}{gain}{shown})"
+    depth = LENGTH.text(1e3 * step.depth, ".4g")
+    return f"{format_rpm(step.speed_rpm)} rpm, ap {depth} (chance of chatter {chance}{gain}{shown})"
 
 
 def _answer_lines(plan: ProductionPlan, folder: Path) -> Iterator[str]:
@@ -86,8 +88,9 @@ def _answer_lines(plan: ProductionPlan, folder: Path) -> Iterator[str]:
     asked, program = plan.ladder.questioned, plan.learning.program
     observe = ["lobewatch", "observe", str(folder), "--program", program.name]
     if asked is not None:
-        deep = f"{1e3 * asked.depth:.4g}"
-        yield f"Was {asked.id} stable at {format_rpm(asked.speed_rpm)} rpm, {deep} mm? Deeper cuts chatter."
+        place = f"{format_rpm(asked.speed_rpm)} rpm, {LENGTH.text(1e3 * asked.depth, '.4g')}"
+        yield f"Was {asked.id} stable at {place}? Deeper cuts chatter."
+        deep = length_argument(1e3 * asked.depth, ".4g")
         again = shlex.join([*observe, "--speed", f"{asked.speed_rpm:g}", "--depth", deep])
         yield f"Repeat the cut: {again} --stable (or --chatter --frequency HZ)"
         yield f"Or exclude it: {shlex.join(['lobewatch', 'exclude', str(folder), asked.id])} --reason TEXT"
@@ -95,7 +98,8 @@ def _answer_lines(plan: ProductionPlan, folder: Path) -> Iterator[str]:
         yield f"No other cut removes more with at most {100 * MAX_CUT_RISK:g} % chance of chatter"
     elif plan.is_saved:
         step, power = plan.ladder.steps[0], plan.powers_kw[0]
-        place = shlex.join([*observe, "--speed", f"{step.speed_rpm:g}", "--depth", f"{1e3 * step.depth:.4g}"])
+        depth = length_argument(1e3 * step.depth, ".4g")
+        place = shlex.join([*observe, "--speed", f"{step.speed_rpm:g}", "--depth", depth])
         shown = "" if power is None else " --power KW"
         yield f"Enter the result: {place} --stable{shown} (or --chatter --frequency HZ)"
         told = "" if power is None else "The power tells Kt. "

@@ -1,6 +1,6 @@
 """Command `lobewatch observe`: record the result of a test cut by ear, or the power of a cut."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from typer import Option
 
@@ -34,13 +34,13 @@ def observe(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.production import plan_next_cut
-    from lobewatch.machine.folder_updates import make_observed_cut, store_cut
+    from lobewatch.machine.folder_updates import choose_word, make_observed_cut, store_cut
     from lobewatch.machine.settings.requested_cut import find_cut_setting
     from lobewatch.notify.publish_status import publish_on_change
     from lobewatch.show.cuts.production_steps import next_step_json, next_step_lines
     from lobewatch.show.history import cut_json, cut_text, saved_cut_remarks
 
-    word = _choose_word(stable, chatter, power)
+    word = choose_word(stable, chatter, power)
     logbook = Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, word, frequency, date)
@@ -51,12 +51,3 @@ def observe(
         payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]} | next_step_json(plan)
         emit(payload, as_json, f"saved {cut_text(stored)}", *next_step_lines(plan, logbook.folder.path))
     print_remarks(remarks)
-
-
-def _choose_word(stable: bool, chatter: bool, power: float | None) -> Literal["stable", "chatter", "cannot tell"]:
-    """Return the verdict of the options; ValueError for both, or for none without a power."""
-    if stable and chatter:
-        raise ValueError("both of --stable and --chatter. Give one of the two options.")
-    if not (stable or chatter or power is not None):
-        raise ValueError("neither of --stable and --chatter, and no --power. Give one of these options.")
-    return "stable" if stable else "chatter" if chatter else "cannot tell"

@@ -173,11 +173,22 @@ def _next_cut_id(folder: MachineFolder, reading: JournalReading) -> str:
     return f"c{max(numbers, default=0) + 1}"
 
 
+ObservedWord = Literal["stable", "chatter", "cannot tell"]
+"""Result of a cut that a person enters; "cannot tell" for a power only."""
+
+
+def choose_word(is_stable: bool, has_chatter: bool, power_kw: float | None) -> ObservedWord:
+    """Choose the result of an observed cut; ValueError for two results, or for none without a power (kW)."""
+    if is_stable and has_chatter:
+        raise ValueError("both of CutEntry.is_stable and CutEntry.has_chatter. Give one of the two options.")
+    if not (is_stable or has_chatter or power_kw is not None):
+        missing = "neither of CutEntry.is_stable and CutEntry.has_chatter, and no build_power_reading.power_kw"
+        raise ValueError(f"{missing}. Give one of these options.")
+    return "stable" if is_stable else "chatter" if has_chatter else "cannot tell"
+
+
 def make_observed_cut(
-    setting: CutSetting,
-    word: Literal["stable", "chatter", "cannot tell"],
-    frequency: float | None = None,
-    at: datetime | None = None,
+    setting: CutSetting, word: ObservedWord, frequency: float | None = None, at: datetime | None = None
 ) -> CutEntry:
     """Make the entry of a cut that a person has observed; `store_cut` gives it its identity.
 

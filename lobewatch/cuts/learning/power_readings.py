@@ -61,7 +61,7 @@ def find_reading_remarks(entry: CutEntry, machine: Machine, earlier: Sequence[Cu
     usual = median(map(_force_by_power, same)) if same else 1.0
     change, force = _force_by_power(entry) / usual, _force_by_power(entry)
     if max(change, 1 / change) > MAX_PROGRAM_CHANGE:
-        exclude = f"then exclude {entry.id} with lobewatch exclude"
+        exclude = f"then exclude {entry.id} with folder_updates.exclude_entry"
         others = [table.name for table in machine.program if _is_power_of(entry, table, machine, usual)]
         if others:
             text = f"the power is {change:.2g} times that expected here, and fits program {others[0]!r}"

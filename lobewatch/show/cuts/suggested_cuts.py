@@ -183,6 +183,7 @@ def learned_json(learning: LearningResult) -> JsonObject:
         "frequency_learnt": bool(posterior.n_frequencies),
         "effective_sample_size": posterior.effective_size,
         "factors": factors,
+        "drive_gain": posterior.drive_gain and posterior.drive_gain._asdict(),
     }
 
 

@@ -34,6 +34,7 @@ OPTION_NAMES: Mapping[str, str] = {
     "CutEntry.at": "--date",
     "CutEntry.chatter_frequency_hz": "--frequency",
     "CutEntry.has_chatter": "--chatter",
+    "CutEntry.is_stable": "--stable",
     "CutFileRequest.depth_mm": "--depth",
     "CutFileRequest.range_rpm": "--speeds",
     "CutFileRequest.speed_rpm": "--speed",

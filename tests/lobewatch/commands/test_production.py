@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from lobewatch.machine.folder_updates import make_observed_cut, store_cut
+from lobewatch.machine.settings.requested_cut import find_cut_setting
 from tests.lobewatch.commands.invoke import invoke
 
 Shop = Any
@@ -75,8 +77,8 @@ def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing
 
 
 def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name(mill: Shop) -> None:
-    observe(mill, "--depth", "2", "--stable")
-    made = [observe(mill, "--depth", depth, "--chatter") for depth in ("3", "2.6", "2.3")]
-    assert [each["asks"] for each in made] == [None, None, "c1"]
-    assert made[-1]["next_step"] is None
+    for depth, word in ((2.0, "stable"), (3.0, "chatter"), (2.6, "chatter")):
+        store_cut(mill.folder, make_observed_cut(find_cut_setting(mill.folder.machine, "A", None, depth), word))
+    made = observe(mill, "--depth", "2.3", "--chatter")
+    assert (made["asks"], made["next_step"]) == ("c1", None)
     assert answer(mill, "suggest", "--program", "A")["suggested"]["repeats"] == "c1"

@@ -92,13 +92,13 @@ class DampedLoop:
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)
-        traces = (
+        cutting, damping = (
             part[:, 0, 0, np.newaxis] * xx
             + part[:, 1, 1, np.newaxis] * yy
             + (part[:, 0, 1] + part[:, 1, 0])[:, np.newaxis] * xy
             for part in (self.force, self.damping)
         )
-        return _LoopParts(*traces, xx * yy - xy**2)
+        return _LoopParts(cutting, damping, xx * yy - xy**2)
 
     @cached_property
     def _determinants(self) -> tuple[Floats, Floats, Floats]:

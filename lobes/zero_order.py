@@ -99,7 +99,8 @@ def _with_process_damping(lobes: StabilityLobes, cut: Cut, tips: Mapping[int, Ti
         return lobes
 
     def receptances(frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
-        xx, yy, xy = (tips[i].receptance(frequency) if i in tips else 0j * frequency for i in range(3))
+        rigid = np.zeros(frequency.shape, np.complex128)
+        xx, yy, xy = (tips[i].receptance(frequency) if i in tips else rigid for i in range(3))
         return xx, yy, xy
 
     size = TipResponse(common_grid([*tips.values()]), lambda f: np.sum(np.abs(receptances(f)), axis=0) + 0j)

@@ -5,7 +5,7 @@ the loop f = -H (d - w) - B u: (1 + H G + B J) f = H w - (H a + B c) z. H and B:
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -53,8 +53,10 @@ class DampedResponse:
 
     def as_precision(self, kind: Precision) -> Self:
         """Return the response with numbers of another precision."""
-        numbers = self.node_velocity.astype(kind), self.node_mobility.astype(kind)
-        return replace(self, piece=self.piece.as_precision(kind), node_velocity=numbers[0], node_mobility=numbers[1])
+        numbers: dict[str, Any] = {
+            name: getattr(self, name).astype(kind) for name in ("node_velocity", "node_mobility")
+        }
+        return replace(self, piece=self.piece.as_precision(kind), **numbers)
 
     def cutting(self, force: Floats, damping: Floats) -> Floats:
         """Return the maps (k, r, d, m, m) of k pieces with forces -force (d - w) - damping u at their nodes.
@@ -78,7 +80,7 @@ class DampedResponse:
         piece, size = self.piece, held.shape[-1]
         loop = held @ _paired_nodes(piece.node_flexibility) + damped @ _paired_nodes(self.node_mobility)
         loop[..., np.arange(size), np.arange(size)] += 1
-        answer, states = np.linalg.inv(loop), piece.end_state.shape[-1]
+        answer, states = np.asarray(np.linalg.inv(loop)), piece.end_state.shape[-1]
         shown, moving = (part.reshape(-1, 1, size, states) for part in (piece.node_displacement, self.node_velocity))
         return answer, -answer @ (held @ shown + damped @ moving)
 

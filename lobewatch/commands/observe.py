@@ -22,8 +22,7 @@ def observe(
 ) -> None:
     """Store whether a cut sounded stable, its power, or both.
 
-    The result is stored in the journal. lobewatch exclude takes the cut out of all results. The readings of one program
-    and day count once.
+    lobewatch exclude takes the cut out of all results. The powers of one program and day count once.
 
     Examples
     --------
@@ -40,8 +39,7 @@ def observe(
     from lobewatch.show.cuts.production_steps import next_step_json, next_step_lines
     from lobewatch.show.history import cut_json, cut_text, saved_cut_remarks
 
-    word = choose_word(stable, chatter, power)
-    logbook = Logbook.open(machine)
+    word, logbook = choose_word(stable, chatter, power), Logbook.open(machine)
     setting = find_cut_setting(logbook.machine, program, speed, depth, power)
     heard = make_observed_cut(setting, word, frequency, date)
     with publish_on_change(logbook):

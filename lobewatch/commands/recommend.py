@@ -30,9 +30,8 @@ def recommend(
 
     Finds the highest material removal rate that is stable with a margin in speed, depth and frequency. Missing values
     come from the programs of the tool if all these programs agree.
-
-    At most three ordinary cuts follow, each with at most 5 % chance of chatter. Enter each with lobewatch observe or
-    lobewatch listen, and lobewatch names the next one. lobewatch suggest gains more, but its test cuts may chatter.
+    At most three ordinary cuts follow, each with at most 5 % chance of chatter. After each lobewatch observe or listen,
+    lobewatch names the next one. lobewatch suggest gains more, but its test cuts may chatter.
 
     Exit code 1: no stable speed and depth.
 
@@ -60,8 +59,8 @@ def recommend(
     saved = None if answer.setting is None else save
     if saved is not None:
         save_program(logbook.folder, answer.program)
-    ladder = ladder_json(plan, answer.setting)
-    payload = recommendation_json(answer, logbook.remarks) | {"saved": saved, "ladder": ladder}
-    next_lines = [*ladder_lines(plan, logbook.folder.path), *(saved_lines(logbook.folder.path, saved) if saved else ())]
-    emit(payload, as_json, *recommendation_lines(answer, logbook.remarks), *next_lines)
+    payload = recommendation_json(answer, logbook.remarks)
+    payload |= {"saved": saved, "ladder": ladder_json(plan, answer.setting)}
+    texts = [*recommendation_lines(answer, logbook.remarks), *ladder_lines(plan, logbook.folder.path)]
+    emit(payload, as_json, *texts, *(saved_lines(logbook.folder.path, saved) if saved else ()))
     raise Exit(int(answer.setting is None))

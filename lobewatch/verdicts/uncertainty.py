@@ -51,6 +51,10 @@ class FactorRange(NamedTuple):
     """Highest factor."""
 
 
+NOT_DAMPED = np.zeros(1)
+"""No process damping."""
+
+
 class LearnedSamples(NamedTuple):
     """Spindles at speed that explain the test cuts, r of equal weight, around their mean; n modes in x, then y."""
 
@@ -66,8 +70,8 @@ class LearnedSamples(NamedTuple):
     """Kt over its mean, shape (r,)."""
     ratio: Floats
     """Kr/Kt over its mean, shape (r,)."""
-    process_damping: Floats
-    """Process damping coefficients over cutter diameter C / D (Pa), shape (r,); 0 where it is not taught."""
+    process_damping: Floats = NOT_DAMPED
+    """Process damping coefficients over cutter diameter C / D (Pa), shape (r,), or (1,) if all are alike."""
 
     def build_rows(self, median: MillingRows, count: int, without: str) -> MillingRows:
         """Build samples around a median (a row), at its speed; without: a cause that is left out."""
@@ -78,7 +82,8 @@ class LearnedSamples(NamedTuple):
         factors = self.frequency, self.damping_ratio, self.stiffness
         f, zeta, k = (1 + (factor[take] - 1) * spindle for factor in factors)
         rows = scale_fields(rows, frequency=f, damping_ratio=zeta, stiffness=k, tangential=force, radial=force)
-        damping = self.process_damping[take] if is_counted else rows.process_damping
+        damping = np.broadcast_to(self.process_damping, self.tangential.shape)[take]
+        damping = damping if is_counted else rows.process_damping
         phase = rows.phase + self.phase_change[take] * spindle
         return replace(rows, phase=phase, radial=rows.radial * direction, process_damping=damping)
 

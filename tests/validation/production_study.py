@@ -165,11 +165,12 @@ def _at_speed(modes: Modes, drop: float, draw: np.random.Generator) -> Modes:
 
 
 def _tapped(x: Modes, y: Modes, draw: np.random.Generator) -> Assembly:
-    measured = (
-        [Mode(*(np.array(mode) * (1 + np.array(TAP_ERRORS) * draw.standard_normal(3))).tolist()) for mode in modes]
-        for modes in (x, y)
-    )
-    return Assembly("reference", datetime(2026, 1, 1, tzinfo=UTC), "drawn", *measured, ("x", "y"), None, {}, False, ())
+    def measured(modes: Modes) -> list[Mode]:
+        errors = 1 + np.array(TAP_ERRORS) * draw.standard_normal((len(modes), 3))
+        return [Mode(*mode) for mode in (np.array(modes) * errors).tolist()]
+
+    sides = measured(x), measured(y)
+    return Assembly("reference", datetime(2026, 1, 1, tzinfo=UTC), "drawn", *sides, ("x", "y"), None, {}, False, ())
 
 
 def slot_limits(spindle: HiddenSpindle, speeds: Floats) -> tuple[Floats, Floats]:

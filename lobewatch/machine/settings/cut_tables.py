@@ -18,7 +18,7 @@ ValueRange = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
 """Lower and upper limit. msgspec 0.22 misreads the fixed length `tuple[A, B]` in a union with a number."""
 CuttingPressure = Annotated[Positive, Plausible(200, 6000)]
 """Tangential cutting coefficient Kt, or specific cutting force (N/mm2)."""
-ProcessDamping = Annotated[tuple[NotNegative, ...], Meta(min_length=2, max_length=2), Plausible(500, 2e6)]
+ProcessDamping = Annotated[tuple[NotNegative, ...], Meta(min_length=2, max_length=2), Plausible(2e3, 1.9e6)]
 """Lowest and highest process damping coefficient C (N/m)."""
 ToolWear = Literal["new", "used", "worn"]
 """Wear of the cutting edges."""

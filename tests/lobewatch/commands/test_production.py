@@ -77,8 +77,9 @@ def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing
 
 
 def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name(mill: Shop) -> None:
-    for depth, word in ((2.0, "stable"), (3.0, "chatter"), (2.6, "chatter")):
-        store_cut(mill.folder, make_observed_cut(find_cut_setting(mill.folder.machine, "A", None, depth), word))
+    for depth in (2.0, 3.0, 2.6):
+        setting = find_cut_setting(mill.folder.machine, "A", None, depth)
+        store_cut(mill.folder, make_observed_cut(setting, "stable" if depth == 2.0 else "chatter"))
     made = observe(mill, "--depth", "2.3", "--chatter")
     assert (made["asks"], made["next_step"]) == ("c1", None)
     assert answer(mill, "suggest", "--program", "A")["suggested"]["repeats"] == "c1"

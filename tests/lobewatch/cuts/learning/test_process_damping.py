@@ -85,6 +85,7 @@ def test_it_counts_by_its_low_end_where_it_is_stated(shop: Shop) -> None:
     ]
     assert verdict.limit == pytest.approx(limits[1], rel=1e-6)
     assert limits[1] > 1.3 * limits[0]
+    assert verdict.samples is not None
     assert np.all(verdict.samples.rows.process_damping == 1e5 / 0.02)
 
 
@@ -96,6 +97,8 @@ def test_it_is_not_counted_before_cuts_have_taught_it(shop: Shop) -> None:
     at_speed = learn_spindle(table, tool, machine, shop.logbook.cuts)
     assert at_speed.n_cuts == 1
     assert at_speed.process_damping == 0
+    assert at_speed.uncertainty is not None
+    assert at_speed.uncertainty.learned is not None
     assert not np.any(at_speed.uncertainty.learned.process_damping)
 
 

@@ -20,9 +20,7 @@ def observe(
     date: CutDate = None,
     as_json: Json = False,
 ) -> None:
-    """Store whether a cut sounded stable, its power, or both.
-
-    lobewatch exclude takes the cut out of all results. The powers of one program and day count once.
+    """Store whether a cut sounded stable, its power, or both. lobewatch exclude takes it out of all results.
 
     Examples
     --------
@@ -40,8 +38,7 @@ def observe(
     from lobewatch.show.history import cut_json, cut_text, saved_cut_remarks
 
     word, logbook = choose_word(stable, chatter, power), Logbook.open(machine)
-    setting = find_cut_setting(logbook.machine, program, speed, depth, power)
-    heard = make_observed_cut(setting, word, frequency, date)
+    heard = make_observed_cut(find_cut_setting(logbook.machine, program, speed, depth, power), word, frequency, date)
     with publish_on_change(logbook):
         earlier, stored = logbook.cuts, store_cut(logbook.folder, heard)
         plan = plan_next_cut(logbook, stored.program, [*earlier, stored])

@@ -26,7 +26,7 @@ GROUPS = {
     },
     "Test cuts": {
         "listen": "Record a cut with the accelerometer on the housing and detect chatter.",
-        "observe": "Record whether a test cut sounded stable.",
+        "observe": "Record whether a cut sounded stable, or its power.",
         "suggest": "Suggest the next test cut of a program.",
     },
     "Archive": {

@@ -166,12 +166,10 @@ class Uncertainty:
             rows = replace(rows, vector=self.axes.sample(count, seed))
         if self.wear == 1 or without == causes.WEAR.name:
             return rows
-        worn = np.linspace(1, self.wear, count)
+        worn, order = np.linspace(1, self.wear, count), np.arange(count)
         if self.joint is None:
-            worn[np.argsort(rows.tangential, kind="stable")] = worn.copy()
-        else:
-            random.shuffle(worn)
-        return scale_fields(rows, tangential=worn, radial=worn)
+            order[np.argsort(rows.tangential, kind="stable")] = np.arange(count)
+        return scale_fields(rows, tangential=worn[order], radial=worn[order])
 
     def _sample_modes(self, rows: MillingRows, random: np.random.Generator, seed: int, without: str) -> MillingRows:
         phases = np.random.default_rng((seed, 1))

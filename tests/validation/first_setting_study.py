@@ -141,7 +141,7 @@ def chattering(outcomes: Sequence[Outcome]) -> NDArray[np.bool_]:
     """Return which outcomes with a setting chatter in any feed direction; what has not converged counts."""
     judged = milling_simulation.judge([case for outcome in outcomes for case in outcome.cases])
     is_bad = judged.chatters | (judged.doubt >= np.abs(judged.growth))
-    return np.any(is_bad.reshape(-1, len(FEED_ANGLES)), axis=1)
+    return np.asarray(np.any(is_bad.reshape(-1, len(FEED_ANGLES)), axis=1))
 
 
 def _draw_modes(draw: np.random.Generator) -> Modes:

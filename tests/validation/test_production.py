@@ -38,9 +38,9 @@ def test_the_time_domain_agrees_at_nine_tenths_and_eleven_tenths_of_a_limit() ->
         place = int(np.argmax(np.where(spindle.limits < 6e-3, spindle.speeds * spindle.limits, 0.0)))
         speed, limit = float(spindle.speeds[place]), float(spindle.limits[place])
         for share in (0.9, 1.1):
-            cut = TEETH, 1.0, "down", spindle.tangential, spindle.radial, 0.0, speed, share * limit
-            damping = {"process_damping": spindle.process_damping, "diameter": DIAMETER}
-            cases.append(Case(spindle.x, spindle.y, 0.0, *cut, **damping))
+            forces, depth = (spindle.tangential, spindle.radial, 0.0), share * limit
+            damping = spindle.process_damping, DIAMETER
+            cases.append(Case(spindle.x, spindle.y, 0.0, TEETH, 1.0, "down", *forces, speed, depth, *damping))
             wanted.append(share > 1)
     assert milling_simulation.chatters(cases).tolist() == wanted
 

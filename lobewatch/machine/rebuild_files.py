@@ -10,7 +10,7 @@ from typing import Any
 
 from acquisition import DataError, Remark, read_tap
 from acquisition.errors import join_sentences
-from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
+from acquisition.file_io import IrregularFileError, atomic_write, delete, make_folder, read_regular_file, rename
 from acquisition.files.cut_file import read_cut_signal
 from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
@@ -146,7 +146,7 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
-            aside.unlink()
+            delete(aside)
             yield f"{entry.file}: file restored under its own name"
         else:
             yield f"{aside.relative_to(folder).as_posix()}: set aside as a copy of {entry.file}"
@@ -164,7 +164,7 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
             report.append(_set_aside(folder, path))
             continue
         if entry.id != name:
-            path.rename(folder / entry.file)
+            rename(path, folder / entry.file)
         entries.append(entry)
     return entries
 
@@ -226,4 +226,4 @@ def _move_to_damaged(folder: Path, path: Path) -> Path:
     make_folder(folder / DAMAGED_FOLDER_NAME)
     names = chain([path.name], (f"{path.name}.{number}" for number in count(1)))
     asides = (folder / DAMAGED_FOLDER_NAME / name for name in names)
-    return path.replace(next(aside for aside in asides if not aside.exists()))
+    return rename(path, next(aside for aside in asides if not aside.exists()))

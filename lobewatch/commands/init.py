@@ -55,32 +55,49 @@ def init(
       lobewatch init mill-3 --yes --daq COM3 --tool "4 20 30 80" --material 42CrMo4 --program "slot: 8000 2 20"
       lobewatch init trial --example
     """
-    from lobewatch.machine.folder_files import make_machine_text, write_machine_file
+    from lobewatch.machine.folder_files import make_machine_text
+    from lobewatch.machine.setup_questions.machine_file_changes import create_machine_file
 
     asked = {"name": name, "speeds": speeds, "drive": drive, "daq": daq, "hammer": hammer, "fixing": fixing}
     asked |= {"accelerometer": accelerometer, "tool": tool, "material": material, "program": program}
     answers = {key: answer for key, answer in asked.items() if answer is not None}
     asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
     toml = machine / "machine.toml"
+    draft: MachineDraft | None
     if edit:
-        from lobewatch.machine.folder import MachineFolder
-
-        text = MachineFolder(machine).toml_text
+        draft = _change_settings(machine, answers, edit, asks)
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
+        draft = _answer_settings(text, answers, "", asks) if asks or answers else None
+        create_machine_file(machine, draft.text if draft else text)
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
-    if asks or answers or edit:
-        draft = _answer_settings(text, answers, edit, asks)
-        text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
-    else:
+    if draft is None:
         change = "adapt machine.toml to your machine" if example else "fill in machine.toml"
         next_step = f"{change}, then run: {next_step} --port PORT"
-    write_machine_file(machine, text)
+    elif not draft.daq.port:
+        next_step = f"{next_step} --port PORT"
     payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'changed' if edit else 'created'} {toml}"
     emit(payload, as_json, text, f"next: {next_step}")
     if not as_json:
         command = f"lobewatch sensors {shlex.quote(str(machine))} --mass-kg KG"
         notes.print(f"then check the sensors with a known mass (two minutes): {command}", markup=False)
+
+
+def _change_settings(machine: Path, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
+    """Write the answers to machine.toml. Where it has changed meanwhile, ask, or refuse without a terminal."""
+    from lobewatch.machine.folder import MachineFolder
+    from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
+    from lobewatch.show.terminal.setup_dialogue import confirm_overwriting
+
+    seen = MachineFolder(machine).toml_text
+    draft = _answer_settings(seen, answers, edit, asks)
+    change_machine_file(
+        machine,
+        lambda text: draft.repeat_answers(text).text,
+        seen,
+        lambda conflicts: asks and confirm_overwriting(conflicts),
+    )
+    return draft
 
 
 def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":

@@ -21,6 +21,7 @@ from lobewatch.machine.journal.entries import CutEntry, RecordingFile, parse_cut
 from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+from lobewatch.machine.settings.toml import write_toml_text
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
@@ -201,7 +202,7 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
-            atomic_write(toml, text.encode())
+            write_toml_text(toml, text)
             yield f"machine.toml: restored from the copy in {entry.file}"
             return
     raise DataError(f"{toml}: missing, and no tap test has a copy. Restore this file from a backup.")

@@ -89,6 +89,8 @@ class MachineDraft:
     """Present text."""
     detected_daqs: Mapping[str, DetectedDaq]
     """Inspected DAQs by port."""
+    answers: tuple[tuple["SetupQuestion", str], ...] = ()
+    """Questions answered, and their answers."""
 
     def table(self, name: str, number: int | None = None) -> dict[str, Any]:
         """Return the values of a table; empty without one."""
@@ -134,6 +136,21 @@ class MachineDraft:
     def has_no_force_sensor(self) -> bool:
         """True if no hammer measures force."""
         return self.table("tap").get("hammer") == "none"
+
+    def answer(self, question: "SetupQuestion", answer: str) -> "MachineDraft":
+        """Apply an answer. ValueError for an invalid one."""
+        answered = question.apply_answer(self, answer).checked()
+        return replace(answered, answers=(*self.answers, (question, answer)))
+
+    def repeat_answers(self, text: str) -> "MachineDraft":
+        """Return the draft with the same answers on another text. DataError if they do not fit this text."""
+        draft: MachineDraft = replace(self, text=text, answers=())
+        try:
+            for question, answer in self.answers:
+                draft = draft.answer(question, answer)
+        except ValueError as error:
+            raise DataError(f"machine.toml has changed, and your answer no longer fits: {error}") from error
+        return draft
 
     def checked(self) -> Self:
         """Return itself; DataError if the text is no machine file."""

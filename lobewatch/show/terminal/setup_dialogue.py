@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from acquisition.errors import join_sentences
+from lobewatch.machine.settings.toml import KeyConflict
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
 from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
 from lobewatch.show.terminal.output import notes
@@ -42,7 +43,7 @@ def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answe
 
 def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Mapping[str, str]) -> MachineDraft:
     try:
-        return question.apply_answer(draft, answers[question.name]).checked()
+        return draft.answer(question, answers[question.name])
     except ValueError as error:
         raise ValueError(f"--{question.name} {error}") from error
 
@@ -54,19 +55,33 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
     while True:
         current = question.read_current(draft)
         notes.print(f"    [{current}] > " if current else "    > ", end="", markup=False)
-        answer = input().strip() or current
+        typed = input().strip()
+        answer = typed or current
         if not answer:
             _print_notes("    An answer is required")
             continue
         try:
-            answered = question.apply_answer(draft, answer).checked()
+            answered = draft.answer(question, answer)
         except ValueError as error:
             _print_notes(f"    {str(error).removeprefix('machine.toml: ')}")
             continue
         look, kept = answered.daq, "The port is kept. Check the port with lobewatch ports"
         if question is DAQ_QUESTION and (text := join_sentences(look.problem, kept) if look.problem else look.text):
             _print_notes(f"    {text}")
-        return answered
+        is_kept = not typed and answered.text == draft.text
+        return replace(answered, answers=draft.answers) if is_kept else answered
+
+
+def confirm_overwriting(conflicts: Sequence[KeyConflict]) -> bool:
+    """Ask a person about keys that changed during the questions."""
+    _print_notes("\nAnother program or person changed machine.toml meanwhile:")
+    for conflict in conflicts:
+        _print_notes(f"    {conflict}")
+    notes.print("    Write your answer? [y/N] > ", end="", markup=False)
+    try:
+        return input().strip().casefold() in ("y", "yes")
+    except EOFError:
+        return False
 
 
 def _find_daqs(draft: MachineDraft) -> MachineDraft:

@@ -89,7 +89,9 @@ def _change_settings(machine: Path, answers: Mapping[str, str], edit: str, asks:
     from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
     from lobewatch.show.terminal.setup_dialogue import confirm_overwriting
 
-    seen = MachineFolder(machine).toml_text
+    folder = MachineFolder(machine)
+    with folder.locked():  # a running tap test is named before the question
+        seen = folder.toml_text
     draft = _answer_settings(seen, answers, edit, asks)
     change_machine_file(
         machine,

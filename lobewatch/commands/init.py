@@ -2,7 +2,6 @@
 
 import shlex
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -63,12 +62,14 @@ def init(
     answers = {key: answer for key, answer in asked.items() if answer is not None}
     asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
     toml = machine / "machine.toml"
+    if edit or asks or answers:
+        from lobewatch.show.terminal.setup_dialogue import answer_settings, change_settings
     draft: MachineDraft | None
     if edit:
-        draft = _change_settings(machine, answers, edit, asks)
+        draft = change_settings(machine, answers, edit, asks)
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
-        draft = _answer_settings(text, answers, "", asks) if asks or answers else None
+        draft = answer_settings(text, answers, "", asks) if asks or answers else None
         create_machine_file(machine, draft.text if draft else text)
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
     if draft is None:
@@ -81,41 +82,3 @@ def init(
     if not as_json:
         command = f"lobewatch sensors {shlex.quote(str(machine))} --mass-kg KG"
         notes.print(f"then check the sensors with a known mass (two minutes): {command}", markup=False)
-
-
-def _change_settings(machine: Path, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
-    """Write the answers to machine.toml. Where it has changed meanwhile, ask, or refuse without a terminal."""
-    from lobewatch.machine.folder import MachineFolder
-    from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
-    from lobewatch.show.terminal.setup_dialogue import confirm_overwriting
-
-    folder = MachineFolder(machine)
-    with folder.locked():  # a running tap test is named before the question
-        seen = folder.toml_text
-    draft = _answer_settings(seen, answers, edit, asks)
-    change_machine_file(
-        machine,
-        lambda text: draft.repeat_answers(text).text,
-        seen,
-        lambda conflicts: asks and confirm_overwriting(conflicts),
-    )
-    return draft
-
-
-def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
-    """Make the draft from the answers in options and at the terminal."""
-    from lobewatch.machine.setup_questions.draft import MachineDraft
-    from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
-    from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions
-
-    draft = MachineDraft(text, {})
-    chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
-    if edit and not asks and edit not in answers:
-        raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
-    if not asks:
-        return answer_questions(draft, answers)
-    try:
-        return ask_questions(draft, chosen, answers)
-    except (EOFError, KeyboardInterrupt):
-        notes.print("\nno file was written")
-        raise KeyboardInterrupt from None

@@ -2,12 +2,45 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from acquisition.errors import join_sentences
+from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.toml import KeyConflict
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
-from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
+from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
+from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS, find_setup_question
 from lobewatch.show.terminal.output import notes
+
+
+def change_settings(machine: Path, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+    """Write the answers to one question to machine.toml. A key that changed meanwhile is asked about, or refused."""
+    folder = MachineFolder(machine)
+    with folder.locked():  # a running tap test is named before the question
+        seen = folder.toml_text
+    draft = answer_settings(seen, answers, edit, asks)
+    change_machine_file(
+        machine,
+        lambda text: draft.repeat_answers(text).text,
+        seen,
+        lambda conflicts: asks and confirm_overwriting(conflicts),
+    )
+    return draft
+
+
+def answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+    """Make the draft of machine.toml from the answers in options and at the terminal."""
+    draft = MachineDraft(text, {})
+    chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
+    if edit and not asks and edit not in answers:
+        raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
+    if not asks:
+        return answer_questions(draft, answers)
+    try:
+        return ask_questions(draft, chosen, answers)
+    except (EOFError, KeyboardInterrupt):
+        notes.print("\nno file was written")
+        raise KeyboardInterrupt from None
 
 
 def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> MachineDraft:

@@ -144,12 +144,12 @@ def test_a_lock_that_windows_refuses_for_a_moment_is_tried_again(
 ) -> None:
     refusals, real = [5, 32, 33], os.open
 
-    def refuse(path: object, *arguments: int) -> int:
+    def refuse(path: Path, *arguments: int) -> int:
         if str(path).endswith(LOCK_NAME) and refusals:
             error = PermissionError(13, "Access is denied", path)
             error.winerror = refusals.pop()  # type: ignore[attr-defined]
             raise error
-        return real(path, *arguments)  # type: ignore[call-overload, no-any-return]
+        return real(path, *arguments)
 
     monkeypatch.setattr(os, "open", refuse)
     monkeypatch.setattr("acquisition.file_io.time.sleep", lambda _: None)

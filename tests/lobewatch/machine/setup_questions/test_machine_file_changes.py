@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -148,10 +150,9 @@ def test_all_programs_and_answers_of_many_threads_are_in_the_file(tmp_path: Path
     toml.write_text(edit_toml(text, TablePath("drive"), {"power_kw": 1e-3, "torque_nm": 40}), "utf-8")
     before = [table.name for table in MachineFolder(toml.parent).machine.program]
     names = {f"thread {number}" for number in range(6)}
-    work = [lambda name=name: save_program(MachineFolder(toml.parent), program(name)) for name in names]
-    work += [
-        lambda key=key: accept_settings(MachineFolder(toml.parent), [key]) for key in ("sensor_mass_g", "power_kw")
-    ]
+    work: list[Callable[[], object]] = []
+    work += [partial(save_program, MachineFolder(toml.parent), program(name)) for name in names]
+    work += [partial(accept_settings, MachineFolder(toml.parent), [key]) for key in ("sensor_mass_g", "power_kw")]
     threads = [threading.Thread(target=action) for action in work]
     for thread in threads:
         thread.start()

@@ -190,8 +190,8 @@ def _restore_line_ends(text: str, old: str) -> str:
     new_ends = [*ends, "\n"][:1] * len(lines)
     if len(set(ends)) > 1:
         matcher = difflib.SequenceMatcher(None, LINE_END_PATTERN.split(old), lines, autojunk=False)
-        for _, begin, end, place, stop in matcher.get_opcodes():
-            kept = ends[begin:end][: stop - place]
+        for _, begin, end, place, _ in matcher.get_opcodes():
+            kept = ends[begin:end]
             new_ends[place : place + len(kept)] = kept
     return "".join(chain.from_iterable(zip_longest(lines, new_ends[: len(lines) - 1], fillvalue="")))
 

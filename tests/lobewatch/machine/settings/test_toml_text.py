@@ -93,14 +93,21 @@ def test_an_edited_file_keeps_its_bytes_mode_and_link(
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [(b"", b"a\nb"), (b"a", b"a\nb"), (b"a\r\nb\r\nc", b"a\r\nb"), (b"a\n\r\nb", b"a\nb")]
+    ("old", "text", "new"),
+    [
+        (b"", "a\nb", b"a\nb"),
+        (b"a", "a\nb", b"a\nb"),
+        (b"a\r\nb\r\nc", "a\nb", b"a\r\nb"),
+        (b"a\n\r\nb", "a\nb", b"a\nb"),
+        (b"a\r\nx\ny\nb\r\nc\n", "a\nz\nb\nc\n", b"a\r\nz\nb\r\nc\n"),
+    ],
 )
-def test_a_text_that_grows_or_shrinks_has_an_end_on_every_line_but_the_last(
-    old: bytes, new: bytes, tmp_path: Path
+def test_a_text_that_grows_or_shrinks_keeps_the_ends_of_its_lines(
+    old: bytes, text: str, new: bytes, tmp_path: Path
 ) -> None:
     toml = tmp_path / "machine.toml"
     toml.write_bytes(old)
-    write_toml_text(toml, "a\nb")
+    write_toml_text(toml, text)
     assert toml.read_bytes() == new
 
 

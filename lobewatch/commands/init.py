@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import FolderArgument
+from lobewatch.machine.settings.display_units import UnitSystem
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ def init(
     example: Annotated[bool, Option("--example", help="Start from the example spindle with three programs.")] = False,
     yes: Annotated[bool, Option("--yes", help="Ask nothing. Settings without an option stay unchanged.")] = False,
     edit: Annotated[str, Option(help="Ask one question again, named by its option: --edit drive.")] = "",
+    units: Annotated[UnitSystem | None, Option(help="Units of lengths in answers and results.")] = None,
     name: Annotated[Answer, Option(help="Machine name.")] = None,
     speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed (rpm): "1000 18000".')] = None,
     drive: Annotated[Answer, Option(help='Spindle power (kW) and torque (N m): "15 40".')] = None,
@@ -62,14 +64,15 @@ def init(
     answers = {key: answer for key, answer in asked.items() if answer is not None}
     asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
     toml = machine / "machine.toml"
-    if edit or asks or answers:
+    has_answers = asks or bool(answers or units)
+    if edit or has_answers:
         from lobewatch.show.terminal.setup_dialogue import answer_settings, change_settings
     draft: MachineDraft | None
     if edit:
-        draft = change_settings(machine, answers, edit, asks)
+        draft = change_settings(machine, answers, edit, asks, units)
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
-        draft = answer_settings(text, answers, "", asks) if asks or answers else None
+        draft = answer_settings(text, answers, "", asks, units) if has_answers else None
         create_machine_file(machine, draft.text if draft else text)
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
     if draft is None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from acquisition.errors import join_sentences
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.display_units import LENGTH, UnitSystem, shown_units
 from lobewatch.machine.settings.toml import KeyConflict
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
 from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
@@ -13,31 +14,30 @@ from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUES
 from lobewatch.show.terminal.output import notes
 
 
-def change_settings(machine: Path, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+def change_settings(
+    machine: Path, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
+) -> MachineDraft:
     """Write the answers to one question to machine.toml. A key that changed meanwhile is asked about, or refused."""
     folder = MachineFolder(machine)
     with folder.locked():  # a running tap test is named before the question
         seen = folder.toml_text
-    draft = answer_settings(seen, answers, edit, asks)
-    change_machine_file(
-        machine,
-        lambda text: draft.repeat_answers(text).text,
-        seen,
-        lambda conflicts: asks and confirm_overwriting(conflicts),
-    )
+    draft = answer_settings(seen, answers, edit, asks, units)
+    change_machine_file(machine, draft.repeat_edits, seen, lambda conflicts: asks and confirm_overwriting(conflicts))
     return draft
 
 
-def answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> MachineDraft:
+def answer_settings(
+    text: str, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
+) -> MachineDraft:
     """Make the draft of machine.toml from the answers in options and at the terminal."""
     draft = MachineDraft(text, {})
+    draft = draft.change(lambda draft: draft.set("machine", units=units)) if units else draft
     chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
     if edit and not asks and edit not in answers:
         raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
-    if not asks:
-        return answer_questions(draft, answers)
     try:
-        return ask_questions(draft, chosen, answers)
+        with shown_units(draft.table("machine").get("units", "metric")):
+            return ask_questions(draft, chosen, answers) if asks else answer_questions(draft, answers)
     except (EOFError, KeyboardInterrupt):
         notes.print("\nno file was written")
         raise KeyboardInterrupt from None
@@ -83,7 +83,7 @@ def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Map
 
 def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDraft:
     """Ask one question until its answer is valid."""
-    _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}")
+    _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text.format(length=LENGTH.unit)}")
     _print_notes(f"    for example: {question.example}")
     while True:
         current = question.read_current(draft)
@@ -102,7 +102,7 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
         if question is DAQ_QUESTION and (text := join_sentences(look.problem, kept) if look.problem else look.text):
             _print_notes(f"    {text}")
         is_kept = not typed and answered.text == draft.text
-        return replace(answered, answers=draft.answers) if is_kept else answered
+        return replace(answered, edits=draft.edits) if is_kept else answered
 
 
 def confirm_overwriting(conflicts: Sequence[KeyConflict]) -> bool:

@@ -18,6 +18,7 @@ from lobewatch.machine import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.folder_updates import accept_settings, save_program
 from lobewatch.machine.settings.cut_tables import ProgramTable
+from lobewatch.machine.settings.display_units import shown_units
 from lobewatch.machine.settings.toml import TablePath, edit_toml, parse_toml_tables, read_toml_text, write_toml_text
 from lobewatch.machine.setup_questions.draft import MachineDraft
 from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file, create_machine_file
@@ -90,7 +91,7 @@ class Shop:
             return overwrites
 
         try:
-            change_machine_file(self.toml.parent, lambda text: draft.repeat_answers(text).text, seen, may_overwrite)
+            change_machine_file(self.toml.parent, draft.repeat_edits, seen, may_overwrite)
             self.values[table] = wanted
         except DataError as error:
             refusal = str(error)
@@ -178,8 +179,18 @@ def test_an_answer_that_no_longer_fits_is_named_and_not_written(tmp_path: Path) 
     present = edit_toml(seen, TablePath("speed"), {"low_rpm": 1000, "high_rpm": 12000})
     toml.write_text(present, "utf-8")
     with pytest.raises(DataError, match=r"machine\.toml has changed, .*20000"):
-        change_machine_file(toml.parent, lambda text: draft.repeat_answers(text).text, seen, lambda _: True)
+        change_machine_file(toml.parent, draft.repeat_edits, seen, lambda _: True)
     assert toml.read_text("utf-8") == present
+
+
+def test_an_answer_keeps_its_units_if_somebody_changes_the_units_of_the_machine(tmp_path: Path) -> None:
+    toml = make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    seen = read_toml_text(toml)
+    with shown_units("inch"):
+        draft = MachineDraft(seen, {}).answer(find_setup_question("tool"), "4 1 30")
+    with shown_units("metric"):
+        change_machine_file(toml.parent, draft.repeat_edits, seen)
+    assert parse_toml_tables(read_toml_text(toml))["reference_cut"]["tool_diameter_mm"] == pytest.approx(25.4)
 
 
 def test_a_first_program_that_is_another_one_now_is_not_changed_unasked(tmp_path: Path) -> None:
@@ -189,4 +200,4 @@ def test_a_first_program_that_is_another_one_now_is_not_changed_unasked(tmp_path
     first = parse_toml_tables(seen)["program"][0]["name"]
     toml.write_text(seen.replace(json.dumps(first), '"other"'), "utf-8")
     with pytest.raises(DataError, match=r"program 'other' tangential_n_per_mm2"):
-        change_machine_file(toml.parent, lambda text: draft.repeat_answers(text).text, seen)
+        change_machine_file(toml.parent, draft.repeat_edits, seen)

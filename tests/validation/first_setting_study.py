@@ -28,7 +28,7 @@ from lobewatch.verdicts.recommendation import recommend
 from lobewatch.verdicts.verdict import Stability, evaluate_program
 from modal import Mode
 
-LOW, HIGH = 400.0, 20000.0
+LOW, HIGH = 600.0, 20000.0
 """Spindle speeds (rpm)."""
 FILE = f'[machine]\nname = "drawn"\n[speed]\nlow_rpm = {LOW}\nhigh_rpm = {HIGH}\n'
 FAST_FILE = f'{FILE}[[tool]]\nname = "reference"\ncutting_speed_m_min = [20, 800]\n'

@@ -131,7 +131,12 @@ class DashboardServer(WebServerThread):
         self._reports: dict[str, tuple[str, str]] = {}
         self._end = threading.Event()
         self._verifier = threading.Thread(target=self._table.fleet.verify_until, args=(self._end,), daemon=True)
-        pages = {"/": "dashboard.html", "/tap/{machine}/": "screen.html", "/phone/": "phone.html", "/lobes/": "lobes.html"}
+        pages = {
+            "/": "dashboard.html",
+            "/tap/{machine}/": "screen.html",
+            "/phone/": "phone.html",
+            "/lobes/": "lobes.html",
+        }
         add_pages(self.application, pages)
         add_recording_upload(self.application, "/phone/")
         add_stated_lobes(self.application, "/lobes/")

@@ -89,7 +89,9 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
-        exact = json.dumps(plain_json(payload), allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
+        exact = json.dumps(
+            plain_json(payload), allow_nan=False, indent=2, ensure_ascii=False
+        )  # newlines only between lines
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)

@@ -18,7 +18,13 @@ Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 SIZES = ((1280, 657), (820, 1180), (390, 844))
 """Desktop, tablet and phone (px)."""
-STATED = {"modes": ["600 Hz 3% 10 N/um"], "teeth": "4", "material": "6061", "diameter_mm": '1/2"', "speeds": "6000-9000"}
+STATED = {
+    "modes": ["600 Hz 3% 10 N/um"],
+    "teeth": "4",
+    "material": "6061",
+    "diameter_mm": '1/2"',
+    "speeds": "6000-9000",
+}
 SETTING = {"speed_rpm": "8000", "depth_mm": "0.3"}
 
 

@@ -76,7 +76,8 @@ class DampedLoop:
     def limits(self, grid: Floats, tooth_frequency: Floats) -> tuple[Floats, Floats]:
         """Return the lowest limit (m) and its frequency (Hz) at tooth frequencies (r, s) in Hz, each of shape (r, s).
 
-        grid (r, k): rising frequencies (Hz) that resolve modes and regeneration. Inf and nan if there is no limit.
+        grid (r, k): rising frequencies (Hz) that resolve modes and regeneration. Inf and nan if there is no limit. One
+        system may have r tooth frequencies (r, 1) with a grid (1, k).
         """
         parts = self._parts(grid)
         found = [self._lowest_step(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
@@ -125,9 +126,10 @@ class DampedLoop:
         loop = np.stack((half + root, half - root), axis=1)
         row, branch, step = np.nonzero((loop.imag[..., 1:] < 0) != (loop.imag[..., :-1] < 0))
         ends = loop[row, branch, step], loop[row, branch, step + 1]
-        steps = _Steps(grid[row, step], grid[row, step + 1], *ends)
+        at = np.broadcast_to(grid, half.shape)
+        steps = _Steps(at[row, step], at[row, step + 1], *ends)
         order = np.lexsort((steps.interpolate()[1].real, row))
         first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-        lowest = np.zeros((4, len(grid)), np.complex128)
+        lowest = np.zeros((4, len(half)), np.complex128)
         lowest[:, row[first]] = np.array(steps)[:, first]
         return _Steps(lowest[0].real, lowest[1].real, lowest[2], lowest[3])

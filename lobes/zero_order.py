@@ -108,7 +108,7 @@ def _with_process_damping(lobes: StabilityLobes, cut: Cut, tips: Mapping[int, Ti
     teeth = cut.teeth * lobes.speed_rpm / 60
     depth, chatter = np.empty((2, teeth.size))
     for rows, grid in frequency_blocks(size, cut, teeth):
-        depth[rows], chatter[rows] = (part[0] for part in loop.limits(grid[np.newaxis], teeth[np.newaxis, rows]))
+        depth[rows], chatter[rows] = (part[:, 0] for part in loop.limits(grid[np.newaxis], teeth[rows, np.newaxis]))
     kind, crossings = np.where(np.isfinite(depth), "hopf", ""), depth[:, np.newaxis]
     return replace(lobes, depth=depth, chatter_frequency=chatter, kind=kind, crossings=crossings, curves=tuple)
 

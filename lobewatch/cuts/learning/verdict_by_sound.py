@@ -135,7 +135,8 @@ def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:
         return is_near and cut.depth <= depth * (1 + DEPTH_TOLERANCE)
     if min(abs(speed / rpm - 1) for speed in (cut.speed_rpm, cut.commanded_rpm)) > REPEAT_SPEED_TOLERANCE:
         return False
-    is_plain = not program.thin and program.corner_radius_mm is None and (program.wear or machine.doubt.wear) == "new"
+    is_new = (program.wear or machine.doubt.wear) == "new" and program.wear_land_um is None
+    is_plain = not program.thin and program.corner_radius_mm is None and is_new
     return cut.depth >= depth * (1 - DEPTH_TOLERANCE) and (is_plain or cut.program == program.name)
 
 

@@ -85,6 +85,7 @@ def test_it_counts_by_its_low_end_where_it_is_stated(shop: Shop) -> None:
     ]
     assert verdict.limit == pytest.approx(limits[1], rel=1e-6)
     assert limits[1] > 1.3 * limits[0]
+    assert "process-damping" in [remark.code for remark in verdict.remarks]
     assert verdict.samples is not None
     assert np.all(verdict.samples.rows.process_damping == 1e5 / 0.02)
 

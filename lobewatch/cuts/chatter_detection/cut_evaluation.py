@@ -136,12 +136,12 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
 
 
 def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
-    """Compare chatter with what ripple leaves in a stable cut: its side bands, and a mode that rings after each rib."""
-    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None:
+    """Compare chatter with what ripple leaves in a stable cut: its side bands, and modes that ring after each rib."""
+    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None or sound.peaks is None:
         return sound
-    about = sound.spectrum.sample_rate, sound.chatter.frequency, sound.spindle_speed.frequency
-    is_ringing = sound.energy_ratio < 1 and load_ripple.is_ringing(even[sound.axis], *about)
-    if sound.energy_ratio > load_ripple.least_chatter_energy(ripple) and not is_ringing:
+    about = sound.spectrum, sound.peaks.air.frequency, sound.spindle_speed.frequency
+    is_enough = sound.energy_ratio > load_ripple.least_chatter_energy(ripple)
+    if is_enough and not load_ripple.comes_in_pulses(even[sound.axis], *about):
         return sound
     return sound._replace(verdict="cannot tell", reason="faint", chatter=None)
 

@@ -254,58 +254,41 @@ def widen_air(air: Spectrum) -> Spectrum:
     return air._replace(power=scipy.ndimage.maximum_filter1d(air.power, wide))
 
 
-MIN_ENERGY_UNEVEN = 2e-2
-"""Smallest energy of chatter over that of the comb in a cut whose speed ripples, as a rest of that remains; chosen."""
-MAX_LOUDNESS_RIPPLE = 1.0
-"""Largest ripple of the loudness over its mean; more is a part of another depth, not ripple."""
-PULSE_MARGIN = 3.0
-"""Least distance from spindle harmonics and tones of the air of what is searched for pulses (Hz); chosen."""
-PULSE_PIECE_LENGTH = 0.4
-"""Length of the loudest piece that is searched for pulses (s): two ripples of 5 Hz, and less than chatter of 0.5 s."""
-PULSE_WINDOW_EDGE = 0.15
-"""Share of a window at each end that is not searched for pulses, as little of it remains; chosen."""
-MAX_PULSE_EVENNESS = 0.46
-"""Squared mean over mean square of a power that comes in pulses; chatter that ripples by 40 % has 0.5 or more."""
+UNEVEN_MARGIN = 3.0
+"""Least distance from spindle harmonics and tones of the air of what is compared in time (Hz); chosen."""
+UNEVEN_PIECE_LENGTH, UNEVEN_PIECES = 0.2, 8
+"""Length of the loudest piece that is compared in time (s), a ripple of 5 Hz, and starts within a length; chosen."""
+WINDOW_EDGE = 0.15
+"""Share of a window at each end that is not compared in time, as little of it remains; chosen."""
 SILENT_POWER = 1e-9
 """Power that is nothing, over the largest."""
 
 
-def least_chatter_energy(ripple: Ripple | None) -> float:
-    """Return the energy of chatter over that of the comb, below which it may be a rest of ripple.
+def compute_evenness(signal: Floats, spectrum: Spectrum, air: Floats, turn: float) -> float:
+    """Return how even the power of a signal without its spindle harmonics is, from 0 (pulses) to 1 (constant).
 
-    Side bands of a loudness that ripples by m have m^2 / 2 of the energy of their multiple, and a mode amplifies them.
-    """
-    if ripple is None or ripple.loudness > MAX_LOUDNESS_RIPPLE:
-        return 0.0
-    return max(ripple.loudness**2, MIN_ENERGY_UNEVEN if ripple.speed else 0.0)
-
-
-def comes_in_pulses(signal: Floats, spectrum: Spectrum, air: Floats, turn: float) -> bool:
-    """Return whether a signal without its spindle harmonics comes in short pulses, as modes ring after each rib.
-
-    air: frequencies of tones in the air (Hz); turn: of the spindle (Hz). Power is the mean of a turn, and chatter may
-    grow or die down evenly.
+    Squared mean over mean square of its loudest piece. Modes ring in pulses after each rib, chatter lasts or grows.
+    air: frequencies of tones in the air (Hz); turn: of the spindle (Hz). The power is the mean of a turn.
     """
     rate, size = spectrum.sample_rate, signal.size
     taper = scipy.signal.windows.hann(size, sym=False)
     transform = scipy.fft.rfft((signal - np.mean(signal)) * taper)
     every = np.arange(transform.size) * (rate / size)
-    gap = max(PULSE_MARGIN, OWN_SIDEBAND_BINS * rate / size)
+    gap = max(UNEVEN_MARGIN, OWN_SIDEBAND_BINS * rate / size)
     is_other = spectral.fold_frequency(every, turn) > gap
     is_other &= np.interp(every, spectrum.frequency, spectrum.power / spectrum.noise) > spectral.MIN_PEAK_POWER
     for tone in air:
         is_other &= np.abs(every - tone) > gap
     power = scipy.fft.irfft(np.where(is_other, transform, 0.0), size) ** 2
-    inside = slice(round(PULSE_WINDOW_EDGE * size), round((1 - PULSE_WINDOW_EDGE) * size))
+    inside = slice(round(WINDOW_EDGE * size), round((1 - WINDOW_EDGE) * size))
     level = scipy.ndimage.uniform_filter1d(power, max(round(rate / turn), 1))[inside] / taper[inside] ** 2
-    length = min(round(PULSE_PIECE_LENGTH * rate), level.size)
-    pieces = np.lib.stride_tricks.sliding_window_view(level, length)[:: max(length // 2, 1)]
-    loudest = pieces[int(np.argmax(np.sum(pieces, axis=1)))]
-    times, log = np.arange(length), np.log(loudest + SILENT_POWER * np.max(loudest) + np.finfo(np.float64).tiny)
-    even = loudest / np.exp(np.polyval(np.polyfit(times, log, 1), times))
-    return max(_evenness(loudest), _evenness(even)) < MAX_PULSE_EVENNESS
+    length = min(round(UNEVEN_PIECE_LENGTH * rate), level.size)
+    pieces = np.lib.stride_tricks.sliding_window_view(level, length)[:: max(length // UNEVEN_PIECES, 1)]
+    loudest = pieces[int(np.argmax(np.sum(pieces, axis=1)))] / max(np.max(level), np.finfo(np.float64).tiny)
+    times, log = np.arange(length), np.log(np.maximum(loudest, SILENT_POWER))
+    growth = max(float(np.polyfit(times, log, 1)[0]), 0.0)
+    return max(_evenness(loudest), _evenness(loudest * np.exp(-growth * times)))
 
 
 def _evenness(power: Floats) -> float:
-    """Return squared mean over mean square of a power: 1 if it is constant, 1 / n for one of n samples."""
     return float(np.mean(power) ** 2 / max(np.mean(power**2), np.finfo(np.float64).tiny))

@@ -64,12 +64,22 @@ def _pick_striking(
     """Pick short windows with loud chatter, and those not stable that are far louder than the stable windows."""
     stable = [_loudness(axes, sound) for sound in heard if sound.verdict == "stable"]
     least = MIN_STRIKING_LOUDNESS * float(np.median(stable)) if stable else np.inf
-    return [
-        sound
-        for sound in short
-        if (sound.chatter is not None and sound.energy_ratio > MIN_SHORT_ENERGY)
-        or (sound.verdict != "stable" and _loudness(axes, sound) > least)
-    ]
+    usual = float(np.median([sound.peaks.comb.energy for sound in heard if sound.peaks]))
+    picked = []
+    for sound in short:
+        if _is_clear_chatter(sound, usual):
+            picked.append(sound)
+        elif sound.verdict != "stable" and _loudness(axes, sound) > least:
+            picked.append(sound._replace(verdict="cannot tell", reason=sound.reason or "faint", chatter=None))
+    return picked
+
+
+def _is_clear_chatter(sound: CutEvaluation, usual: float) -> bool:
+    """Return whether a short window cuts, and chatters about as loudly as a cut is; usual: energy of its harmonics."""
+    if sound.chatter is None or sound.peaks is None or not len(sound.peaks.comb):
+        return False
+    own = sound.peaks.comb.energy
+    return sound.energy_ratio * own > MIN_SHORT_ENERGY * max(own, usual)
 
 
 def _loudness(axes: Floats, sound: CutEvaluation) -> float:

@@ -18,7 +18,7 @@ MAX_SPEED_SEARCHES = 3
 """Number of windows of a cut in which its speed is searched from the set speed; chosen."""
 MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
-MIN_SHORT_ENERGY = 0.7
+MIN_SHORT_ENERGY = 0.3
 """Least energy of chatter over that of the comb in a short window, which does not resolve ripple; chosen."""
 MIN_STRIKING_LOUDNESS = 3.0
 """Loudness of a short window over that of the stable ones, above which it counts unless it is stable; chosen."""
@@ -39,7 +39,7 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
-    if len(places) > 1 and known.speed:
+    if len(places) > 1 and known.speed and _has_speed_without_chatter(heard):
         about = known._replace(is_begun=True, is_short=True)
         short = [evaluate(place, about) for place in windowing.place_short_windows(parts, rate)]
         heard = sorted([*heard, *_pick_striking(axes, short, heard)], key=_center)
@@ -150,15 +150,21 @@ def _has_grown(
     return level(loudest) > MIN_GROWTH * float(np.median([level(heard[i]) for i in stable]))
 
 
+def _has_speed_without_chatter(heard: Sequence[CutEvaluation]) -> bool:
+    """Return whether most windows of a cut have a speed, and none chatters."""
+    n_known = sum(sound.peaks is not None for sound in heard)
+    return n_known > len(heard) / 2 and all(sound.chatter is None for sound in heard)
+
+
 def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
-    """Return the window that decides: the loudest chatter, a striking one, the last stable one if most of them are."""
+    """Return the window that decides: the loudest chatter, a short one, the last stable one if most of them are."""
     worst = max(heard, key=rank_evidence)
     if worst.chatter is not None:
         return worst
-    stable = [sound for sound in heard if sound.verdict == "stable"]
     short = [sound for sound in heard if 2 * _length(sound) < max(map(_length, heard))]
     if short:
         return max(short, key=rank_evidence)
+    stable = [sound for sound in heard if sound.verdict == "stable"]
     return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
 
 

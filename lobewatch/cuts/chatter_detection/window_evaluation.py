@@ -58,9 +58,7 @@ def _center(sound: CutEvaluation) -> int:
     return sound.parts.cut.start + sound.parts.cut.stop
 
 
-def _pick_striking(
-    axes: Floats, short: Sequence[CutEvaluation], heard: Sequence[CutEvaluation]
-) -> list[CutEvaluation]:
+def _pick_striking(axes: Floats, short: Sequence[CutEvaluation], heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
     """Pick short windows with loud chatter, and those not stable that are far louder than the stable windows."""
     stable = [_loudness(axes, sound) for sound in heard if sound.verdict == "stable"]
     least = MIN_STRIKING_LOUDNESS * float(np.median(stable)) if stable else np.inf

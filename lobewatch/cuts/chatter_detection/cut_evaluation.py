@@ -33,7 +33,7 @@ MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
-MAX_PULSE_EVENNESS = 0.6
+MAX_PULSE_EVENNESS = 0.58
 """Evenness of the power of unexplained peaks below which they are modes that ring after each rib; chosen.
 
 Chatter that ripples by 40 % has more."""

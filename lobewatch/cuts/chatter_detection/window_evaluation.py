@@ -55,7 +55,7 @@ def _with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> C
 
 
 def _center(sound: CutEvaluation) -> int:
-    return sound.parts.cut.start + sound.parts.cut.stop
+    return int(sound.parts.cut.start + sound.parts.cut.stop)
 
 
 def _pick_striking(axes: Floats, short: Sequence[CutEvaluation], heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
@@ -167,4 +167,4 @@ def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
 
 
 def _length(sound: CutEvaluation) -> int:
-    return sound.parts.cut.stop - sound.parts.cut.start
+    return int(sound.parts.cut.stop - sound.parts.cut.start)

@@ -165,6 +165,24 @@ def test_side_bands_of_one_multiple_are_no_ripple() -> None:
     assert not found[2]
 
 
+@pytest.mark.parametrize(("lines", "is_load"), [((-1.5, 1.5), True), ((1.5,), False), ((-9.0, 9.0), False)])
+def test_a_pair_next_to_a_multiple_that_a_corner_cancels_is_the_load(lines: tuple[float, ...], is_load: bool) -> None:
+    time, multiple = np.arange(4 * 6400) / RATE, 1800.0
+    signal = sum(np.cos(2 * np.pi * (multiple + beside) * time) for beside in lines) + np.cos(2 * np.pi * 400 * time)
+    signal = signal + 1e-4 * np.random.default_rng(0).normal(size=time.size)
+    left = SpectralPeaks(multiple + np.array(lines), np.ones(len(lines)), np.full(len(lines), 1e6))
+    comb = SpectralPeaks(np.array([400.0]), np.ones(1), np.full(1, 1e6))
+    found = find_ripple_peaks(left, comb, compute_spectrum(np.asarray(signal), RATE), 100.0)
+    assert list(found) == [is_load] * len(lines)
+
+
+@pytest.mark.parametrize("amplitude", [0.4, 1.0])
+def test_a_cut_that_chatters_loudly_at_its_entry_is_not_stable(amplitude: float) -> None:
+    growing = chatter(0.0, 0.4)
+    heard = listen(recording(6.0, add=lambda t: growing(t) * amplitude * np.exp(t / 0.08)))
+    assert heard.verdict != "stable"
+
+
 @pytest.mark.parametrize(("begin", "end"), [(0.0, 0.5), (5.5, 6.0)])
 def test_half_a_second_of_chatter_at_either_end_of_a_cut_is_told(begin: float, end: float) -> None:
     heard = listen(recording(6.0, add=chatter(begin, end)))

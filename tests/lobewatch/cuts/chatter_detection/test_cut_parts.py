@@ -234,7 +234,7 @@ def test_air_of_another_microphone_position_gets_the_noise_of_the_recording(
     assert np.std(made[0].signal[0, : air.shape[1]]) == pytest.approx(5.0, rel=0.1)
 
 
-def evenness(envelope: Floats) -> float:
+def evenness(envelope: NDArray[np.floating[Any]]) -> float:
     """Evenness of a line with an envelope, shape (n,), in a comb that is far louder."""
     time = np.arange(envelope.size) / RATE
     line = envelope * np.cos(2 * np.pi * 1760 * time) + 50.0 * np.cos(2 * np.pi * 9 * TURN * time)

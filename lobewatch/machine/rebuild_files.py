@@ -10,7 +10,7 @@ from typing import Any
 
 from acquisition import DataError, Remark, read_tap
 from acquisition.errors import join_sentences
-from acquisition.file_io import IrregularFileError, atomic_write, make_folder, read_regular_file
+from acquisition.file_io import IrregularFileError, atomic_write, delete, make_folder, read_regular_file, rename
 from acquisition.files.cut_file import read_cut_signal
 from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
@@ -21,6 +21,7 @@ from lobewatch.machine.journal.entries import CutEntry, RecordingFile, parse_cut
 from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command, make_entry
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+from lobewatch.machine.settings.toml import write_toml_text
 
 DAMAGED_FOLDER_NAME = "damaged"
 """Name of the folder for damaged files."""
@@ -146,7 +147,7 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
-            aside.unlink()
+            delete(aside)
             yield f"{entry.file}: file restored under its own name"
         else:
             yield f"{aside.relative_to(folder).as_posix()}: set aside as a copy of {entry.file}"
@@ -164,7 +165,7 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
             report.append(_set_aside(folder, path))
             continue
         if entry.id != name:
-            path.rename(folder / entry.file)
+            rename(path, folder / entry.file)
         entries.append(entry)
     return entries
 
@@ -201,7 +202,7 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
-            atomic_write(toml, text.encode())
+            write_toml_text(toml, text)
             yield f"machine.toml: restored from the copy in {entry.file}"
             return
     raise DataError(f"{toml}: missing, and no tap test has a copy. Restore this file from a backup.")
@@ -226,4 +227,4 @@ def _move_to_damaged(folder: Path, path: Path) -> Path:
     make_folder(folder / DAMAGED_FOLDER_NAME)
     names = chain([path.name], (f"{path.name}.{number}" for number in count(1)))
     asides = (folder / DAMAGED_FOLDER_NAME / name for name in names)
-    return path.replace(next(aside for aside in asides if not aside.exists()))
+    return rename(path, next(aside for aside in asides if not aside.exists()))

@@ -1,6 +1,7 @@
 """Draft of machine.toml during setup: detected DAQs, questions and parsed answers."""
 
 from collections.abc import Callable, Mapping
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -18,6 +19,7 @@ from acquisition.devices.registry import convert_driver_errors
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.number_text import format_number
 from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
+from lobewatch.machine.settings.unit_text import convert_unit_texts
 
 
 @dataclass(frozen=True)
@@ -89,10 +91,12 @@ class MachineDraft:
     """Present text."""
     detected_daqs: Mapping[str, DetectedDaq]
     """Inspected DAQs by port."""
+    edits: tuple[Callable[["MachineDraft"], "MachineDraft"], ...] = ()
+    """Edits that made the text."""
 
     def table(self, name: str, number: int | None = None) -> dict[str, Any]:
         """Return the values of a table; empty without one."""
-        table: Any = parse_toml_tables(self.text)
+        table: Any = convert_unit_texts(parse_toml_tables(self.text))
         for part in name.split("."):
             table = table.get(part, {})
         if number is None:
@@ -135,6 +139,25 @@ class MachineDraft:
         """True if no hammer measures force."""
         return self.table("tap").get("hammer") == "none"
 
+    def change(self, edit: Callable[["MachineDraft"], "MachineDraft"]) -> "MachineDraft":
+        """Apply an edit, and keep it for `repeat_edits`, with the present units of lengths."""
+        context = copy_context()
+        return replace(edit(self), edits=(*self.edits, lambda draft: context.copy().run(edit, draft)))
+
+    def answer(self, question: "SetupQuestion", answer: str) -> "MachineDraft":
+        """Apply an answer. ValueError for an invalid one."""
+        return self.change(lambda draft: question.apply_answer(draft, answer).checked())
+
+    def repeat_edits(self, text: str) -> str:
+        """Return another text with the same edits. DataError if they do not fit this text."""
+        draft: MachineDraft = replace(self, text=text)
+        try:
+            for edit in self.edits:
+                draft = edit(draft)
+        except ValueError as error:
+            raise DataError(f"machine.toml has changed, and your answer no longer fits: {error}") from error
+        return draft.text
+
     def checked(self) -> Self:
         """Return itself; DataError if the text is no machine file."""
         if not self.missing_sensors:
@@ -149,7 +172,7 @@ class SetupQuestion:
     name: str
     """Name of the question."""
     text: str
-    """Text of the question."""
+    """Text of the question, a format with the unit of lengths: {length}."""
     example: str
     """Example of an answer."""
     read_current: Callable[[MachineDraft], str]
@@ -169,6 +192,6 @@ def is_open_answer(answer: str) -> bool:
     return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
 
 
-def format_answer(*values: float) -> str:
-    """Format numbers as they are typed."""
-    return " ".join(map(format_number, values))
+def format_answer(*values: float | str) -> str:
+    """Format numbers as they are typed; texts stay."""
+    return " ".join(value if isinstance(value, str) else format_number(value) for value in values)

@@ -199,9 +199,11 @@ def _step_all(
     swing = np.zeros((2, count, 2, 2), dtype=complex)
     record = np.empty((step.shape[1], 2, count, 2), dtype=np.float32)
     behind = (np.arange(teeth) * steps) // teeth
-    knocked = [int(max(cut.first, RAMP) / pace) for cut, pace in zip(cuts, even[:, 0, 0], strict=True)]
+    knocked = np.array([int(max(cut.first, RAMP) / pace) for cut, pace in zip(cuts, even[:, 0, 0], strict=True)])
+    is_knock, is_wide = np.isin(np.arange(step.shape[1]), knocked), np.any(wide, axis=0)
     for n in range(step.shape[1]):
-        swing[1, [n == knock for knock in knocked]] += 1j * KNOCK
+        if is_knock[n]:
+            swing[1, knocked == n] += 1j * KNOCK
         at = (n - behind) % steps
         swing *= flight * (1 + pole * (step[:, n, np.newaxis, np.newaxis] - even))
         tip = swing.imag.sum(axis=-1)
@@ -209,8 +211,10 @@ def _step_all(
         chip = rigid + runout + tip @ normal[:, at] - surface[:, :, at]
         np.maximum(chip, 0.0, out=chip)
         surface[:, :, at] += chip - rigid
-        force = np.where(wide[:, n, np.newaxis, np.newaxis], forces[1][..., at], forces[0][..., at])
-        pushed = np.einsum("cae,kce->kca", force, chip) * depth[:, n, np.newaxis]
+        force = forces[0][..., at]
+        if is_wide[n]:
+            force = np.where(wide[:, n, np.newaxis, np.newaxis], forces[1][..., at], force)
+        pushed = (force @ chip[..., np.newaxis])[..., 0] * depth[:, n, np.newaxis]
         swing += (pushed * step[:, n, np.newaxis])[..., np.newaxis] * gain
         record[n] = (pole**2 * swing).imag.sum(axis=-1)
     return np.asarray(record[:, 0], dtype=np.float64), np.asarray(record[:, 1], dtype=np.float64)

@@ -33,6 +33,14 @@ MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
+MAX_PULSE_EVENNESS = 0.58
+"""Evenness of the power of unexplained peaks below which they are modes that ring after each rib; chosen.
+
+Chatter that ripples by 40 % has more."""
+MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
+"""Evenness of steady chatter, and least energy over that of the comb of any other, or where the speed ripples; chosen.
+
+Side bands of ripple, amplified by a mode, have up to a tenth."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
@@ -87,6 +95,7 @@ def evaluate_cut(
     quiet: Spectra = known.air or spectral.compute_spectra(air, sample_rate)
     is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
     followed = known.speed and not is_measured and spindle_speed.follow_speed(spectra, quiet, known.speed)
+    followed = followed or (known.speed if known.is_short else None)
     asked = teeth, commanded_rpm / 60, measured_rpm if is_measured else None
     speed = followed or _find_speed(spectra, quiet, *asked)
     if isinstance(speed, CutEvaluation):
@@ -99,7 +108,7 @@ def evaluate_cut(
     sounds = [_compare_with_ripple(sound, even, ripple) for sound in _compare_axes(sounds)]
     sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
     others = None if sound.peaks is None else sound.peaks.unexplained
-    if is_measured or sound.verdict == "stable" or not others:
+    if is_measured or known.speed or sound.verdict == "stable" or not others:
         return sound
     distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded_rpm / 60, speed, others)
     return sound if np.isnan(distant) else _speed_not_found(spectra[0], distant)
@@ -136,12 +145,13 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
 
 
 def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
-    """Compare chatter with what ripple leaves in a stable cut: its side bands, and a mode that rings after each rib."""
-    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None:
+    """Compare chatter with what ripple leaves in a stable cut: its side bands, and modes that ring after each rib."""
+    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None or sound.peaks is None:
         return sound
-    about = sound.spectrum.sample_rate, sound.chatter.frequency, sound.spindle_speed.frequency
-    is_ringing = sound.energy_ratio < 1 and load_ripple.is_ringing(even[sound.axis], *about)
-    if sound.energy_ratio > load_ripple.least_chatter_energy(ripple) and not is_ringing:
+    about = sound.spectrum, sound.peaks.air.frequency, sound.spindle_speed.frequency
+    evenness = load_ripple.compute_evenness(even[sound.axis], *about)
+    is_even = evenness > MIN_STEADY_EVENNESS and not (ripple and ripple.speed)
+    if evenness > MAX_PULSE_EVENNESS and (is_even or sound.energy_ratio > MIN_UNEVEN_ENERGY):
         return sound
     return sound._replace(verdict="cannot tell", reason="faint", chatter=None)
 

@@ -15,8 +15,8 @@ from lobewatch.machine.journal.entries import CutVerdict, PartVerdict
 
 WINDOW_STEP = MAX_CUT_TIME / 2
 """Time between two windows (s), which overlap by half."""
-END_WINDOW_LENGTH = 1.0
-"""Length of the windows at the beginning and at the end of a long cut (s); chosen."""
+SHORT_WINDOW_LENGTH = 0.5
+"""Length of the windows in which short chatter is searched (s), which overlap by half; chosen."""
 MIN_REST_TIME = 0.25
 """Time at the beginning of a cut before the first whole step that has a window of its own (s); chosen."""
 CHATTER_BAND = 20.0
@@ -42,6 +42,8 @@ class KnownCut(NamedTuple):
     """Lowest frequency of chatter (Hz)."""
     is_begun: bool = False
     """True for the windows of a long cut, in which no mode rings down from the entry for long."""
+    is_short: bool = False
+    """True for a short window, which has the speed of the others where it cannot be followed."""
     shop: tuple[Floats, ...] = ()
     """All air between passes in a shop, whose tones come and go, each of shape (axes, n)."""
 
@@ -80,17 +82,11 @@ def place_windows(parts: CutParts, rate: float) -> list[slice]:
     return [slice(first, first + size), *windows] if has_rest else windows
 
 
-def place_end_windows(parts: CutParts, rate: float) -> tuple[list[slice], list[slice]]:
-    """Place short windows at the beginning and at the end of a cut, whose ends weigh little in the other windows.
-
-    Chatter just before the end looks like an exit, so that a whole window is placed there, too.
-    """
+def place_short_windows(parts: CutParts, rate: float) -> list[slice]:
+    """Place short windows from the beginning to the end of a cut, as short chatter weighs little in the others."""
     first, last = round((parts.begin + CUT_SETTLING_TIME) * rate), round((parts.end - CUT_PIECE_LENGTH) * rate)
-    size, whole = round(END_WINDOW_LENGTH * rate), parts.cut.stop - parts.cut.start
-    late = [slice(last - size, last)]
-    if last - parts.cut.stop > MIN_REST_TIME * rate:
-        late = [slice(last - whole, last), *late]
-    return [slice(first, first + size)], late
+    size = round(SHORT_WINDOW_LENGTH * rate)
+    return [slice(start, start + size) for start in range(first, last - size, size // 2)] + [slice(last - size, last)]
 
 
 def shift_window(window: slice, parts: CutParts, rate: float) -> list[slice]:

@@ -193,7 +193,7 @@ MAX_SIDEBAND_AMPLITUDE = 0.4
 MAX_SIDEBAND_DISTANCE = 200.0
 """Largest distance of a side band of ripple from its multiple (Hz): ribs at 25 Hz have eight."""
 MAX_LOAD_DISTANCE = 4.0
-"""Distance of a peak from a louder multiple (Hz) within which it shows corners, entry and exit; chosen."""
+"""Distance of a peak from a multiple (Hz) within which it may show corners, entry and exit; chosen."""
 MIN_PAIR_RATIO = 0.5
 """Smallest amplitude ratio of two side bands that ripple makes next to a multiple, if no other can be compared; chosen.
 
@@ -209,8 +209,9 @@ OWN_SIDEBAND_BINS = 4.0
 def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> Flags:
     """Return whether each peak is a side band of ripple: most multiples have it, relative to their amplitudes.
 
-    left: peaks that are no multiples of the spindle frequency `turn` (Hz); comb: those that are. A peak fainter than a
-    multiple up to `MAX_LOAD_DISTANCE` away is a slow change of the load. Result of shape (n,).
+    left: peaks that are no multiples of the spindle frequency `turn` (Hz); comb: those that are. A peak up to
+    `MAX_LOAD_DISTANCE` from a multiple that is louder, or that has a like peak on its other side, is a slow change of
+    the load. Result of shape (n,).
     """
     beyond = left.frequency[:, np.newaxis] - comb.frequency
     ratio = left.amplitude[:, np.newaxis] / comb.amplitude
@@ -220,7 +221,11 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     mirrored = np.sqrt(spectrum.max_power_near(comb.frequency[own] - distance, spectral.PEAK_TOLERANCE))
     is_near = np.abs(distance) < MAX_RIPPLE_FREQUENCY
     is_pair = np.isnan(usual) & is_near & (mirrored > MIN_PAIR_RATIO * left.amplitude[peak])
-    is_load = np.any((np.abs(beyond) < MAX_LOAD_DISTANCE) & (ratio < 1), axis=1)
+    nearest = turn * np.round(left.frequency / turn)
+    around = np.stack([nearest, 2 * nearest - left.frequency])
+    louder = np.sqrt(spectrum.max_power_near(around, spectral.PEAK_TOLERANCE)) / [[1.0], [MIN_PAIR_RATIO]]
+    is_load = np.abs(left.frequency - nearest) < MAX_LOAD_DISTANCE
+    is_load &= np.max(louder, axis=0) > left.amplitude
     return np.asarray((np.bincount(peak, is_pair | (usual > least), len(left)) > 0) | is_load)
 
 
@@ -249,37 +254,43 @@ def widen_air(air: Spectrum) -> Spectrum:
     return air._replace(power=scipy.ndimage.maximum_filter1d(air.power, wide))
 
 
-MIN_ENERGY_UNEVEN = 2e-2
-"""Smallest energy of chatter over that of the comb in a cut whose speed ripples, as a rest of that remains; chosen."""
-MAX_LOUDNESS_RIPPLE = 1.0
-"""Largest ripple of the loudness over its mean; more is a part of another depth, not ripple."""
-RINGING_BAND, RINGING_MARGIN = 150.0, 3.0
-"""Half width of the band around a ringing mode, and of the least gap for each spindle harmonic in it (Hz); chosen."""
-RINGING_PIECE_LENGTH = 0.4
-"""Length of the loudest piece that is compared (s): two ripples of 5 Hz, and less than chatter of 0.5 s; chosen."""
-MAX_RINGING_SHARE = 0.42
-"""Squared mean over mean square of the power of a mode that rings after each rib; chatter between ribs has more."""
+UNEVEN_MARGIN = 3.0
+"""Least distance from spindle harmonics and tones of the air of what is compared in time (Hz); chosen."""
+UNEVEN_PIECE_LENGTH, UNEVEN_PIECES = 0.08, 8
+"""Length of the loudest piece that is compared in time (s), and number of starts within a length; chosen.
+
+Modes ring for less after a rib. Chatter that comes and goes with a ripple of 5 Hz lasts longer."""
+WINDOW_EDGE = 0.15
+"""Share of a window at each end that is not compared in time, as little of it remains; chosen."""
+SILENT_POWER = 1e-9
+"""Power that is nothing, over the largest."""
 
 
-def least_chatter_energy(ripple: Ripple | None) -> float:
-    """Return the energy of chatter over that of the comb, below which it may be a rest of ripple.
+def compute_evenness(signal: Floats, spectrum: Spectrum, air: Floats, turn: float) -> float:
+    """Return how even the power of a signal without its spindle harmonics is, from 0 (pulses) to 1 (constant).
 
-    Side bands of a loudness that ripples by m have m^2 / 2 of the energy of their multiple, and a mode amplifies them.
+    Squared mean over mean square of its loudest piece. Modes ring in pulses after each rib, chatter lasts or grows.
+    air: frequencies of tones in the air (Hz); turn: of the spindle (Hz). The power is the mean of a turn.
     """
-    if ripple is None or ripple.loudness > MAX_LOUDNESS_RIPPLE:
-        return 0.0
-    return max(ripple.loudness**2, MIN_ENERGY_UNEVEN if ripple.speed else 0.0)
+    rate, size = spectrum.sample_rate, signal.size
+    taper = scipy.signal.windows.hann(size, sym=False)
+    transform = scipy.fft.rfft((signal - np.mean(signal)) * taper)
+    every = np.arange(transform.size) * (rate / size)
+    gap = max(UNEVEN_MARGIN, OWN_SIDEBAND_BINS * rate / size)
+    is_other = spectral.fold_frequency(every, turn) > gap
+    is_other &= np.interp(every, spectrum.frequency, spectrum.power / spectrum.noise) > spectral.MIN_PEAK_POWER
+    for tone in air:
+        is_other &= np.abs(every - tone) > gap
+    power = scipy.fft.irfft(np.where(is_other, transform, 0.0), size) ** 2
+    inside = slice(round(WINDOW_EDGE * size), round((1 - WINDOW_EDGE) * size))
+    level = scipy.ndimage.uniform_filter1d(power, max(round(rate / turn), 1))[inside] / taper[inside] ** 2
+    length = min(round(UNEVEN_PIECE_LENGTH * rate), level.size)
+    pieces = np.lib.stride_tricks.sliding_window_view(level, length)[:: max(length // UNEVEN_PIECES, 1)]
+    loudest = pieces[int(np.argmax(np.sum(pieces, axis=1)))] / max(np.max(level), np.finfo(np.float64).tiny)
+    times, log = np.arange(length), np.log(np.maximum(loudest, SILENT_POWER))
+    growth = max(float(np.polyfit(times, log, 1)[0]), 0.0)
+    return max(_evenness(loudest), _evenness(loudest * np.exp(-growth * times)))
 
 
-def is_ringing(signal: Floats, rate: float, frequency: float, turn: float) -> bool:
-    """Return whether a mode near a frequency (Hz) rings in short pulses; turn: of the spindle (Hz)."""
-    transform = scipy.fft.rfft((signal - np.mean(signal)) * np.hanning(signal.size))
-    every = np.arange(transform.size) * (rate / signal.size)
-    near = np.abs(every - frequency) < RINGING_BAND
-    gap = max(RINGING_MARGIN, OWN_SIDEBAND_BINS * rate / signal.size)
-    band = np.where(spectral.fold_frequency(every, turn) > gap, transform, 0.0)[near]
-    power = np.abs(scipy.fft.ifft(band, 4 * band.size)) ** 2
-    size = min(round(RINGING_PIECE_LENGTH * rate * power.size / signal.size), power.size)
-    pieces = np.lib.stride_tricks.sliding_window_view(power, size)[:: max(size // 2, 1)]
-    loudest = pieces[int(np.argmax(np.sum(pieces, axis=1)))]
-    return bool(np.mean(loudest) ** 2 < MAX_RINGING_SHARE * np.mean(loudest**2))
+def _evenness(power: Floats) -> float:
+    return float(np.mean(power) ** 2 / max(np.mean(power**2), np.finfo(np.float64).tiny))

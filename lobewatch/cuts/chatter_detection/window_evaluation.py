@@ -18,7 +18,10 @@ MAX_SPEED_SEARCHES = 3
 """Number of windows of a cut in which its speed is searched from the set speed; chosen."""
 MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
-
+MIN_SHORT_ENERGY = 0.3
+"""Least energy of chatter over that of the comb in a short window, which does not resolve ripple; chosen."""
+MIN_STRIKING_LOUDNESS = 3.0
+"""Loudness of a short window over that of the stable ones, above which it counts unless it is stable; chosen."""
 MIN_GROWTH = 3.0
 """Amplitude of chatter over that of the same line in the stable windows, below which they contradict it; chosen."""
 SAME_LINE_DISTANCE = 3.0
@@ -36,11 +39,10 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
-    if len(places) > 1 and known.speed:
-        about = known._replace(is_begun=True)
-        ends = windowing.place_end_windows(parts, rate)
-        early, late = ([evaluate(place, about) for place in windows] for windows in ends)
-        heard = [*_with_chatter(early), *heard, *_with_chatter(late)]
+    if len(places) > 1 and known.speed and _is_partly_stable(heard):
+        about = known._replace(is_begun=True, is_short=True)
+        short = [evaluate(place, about) for place in windowing.place_short_windows(parts, rate)]
+        heard = sorted([*heard, *_pick_striking(axes, short, heard)], key=_center)
     heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
     return _with_usual_speed(_worst_window(heard), heard)._replace(part_verdicts=joined)
@@ -52,8 +54,35 @@ def _with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> C
     return worst if worst.spindle_speed is None else worst._replace(spindle_speed=speeds[len(speeds) // 2])
 
 
-def _with_chatter(heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
-    return [sound for sound in heard if sound.chatter is not None]
+def _center(sound: CutEvaluation) -> int:
+    return int(sound.parts.cut.start + sound.parts.cut.stop)
+
+
+def _pick_striking(axes: Floats, short: Sequence[CutEvaluation], heard: Sequence[CutEvaluation]) -> list[CutEvaluation]:
+    """Pick short windows with loud chatter, and those not stable that are far louder than the stable windows."""
+    stable = [_loudness(axes, sound) for sound in heard if sound.verdict == "stable"]
+    least = MIN_STRIKING_LOUDNESS * float(np.median(stable)) if stable else np.inf
+    usual = float(np.median([sound.peaks.comb.energy for sound in heard if sound.peaks]))
+    picked = []
+    for sound in short:
+        if _is_clear_chatter(sound, usual):
+            picked.append(sound)
+        elif sound.verdict != "stable" and _loudness(axes, sound) > least:
+            picked.append(sound._replace(verdict="cannot tell", reason=sound.reason or "faint", chatter=None))
+    return picked
+
+
+def _is_clear_chatter(sound: CutEvaluation, usual: float) -> bool:
+    """Return whether a short window cuts, and chatters about as loudly as a cut is; usual: energy of its harmonics."""
+    if sound.chatter is None or sound.peaks is None or not len(sound.peaks.comb):
+        return False
+    own = sound.peaks.comb.energy
+    return sound.energy_ratio * own > MIN_SHORT_ENERGY * max(own, usual)
+
+
+def _loudness(axes: Floats, sound: CutEvaluation) -> float:
+    """Return the standard deviation of a window."""
+    return float(np.std(axes[:, sound.parts.cut]))
 
 
 def _summarize(sound: CutEvaluation) -> HeardWindow:
@@ -119,10 +148,24 @@ def _has_grown(
     return level(loudest) > MIN_GROWTH * float(np.median([level(heard[i]) for i in stable]))
 
 
+def _is_partly_stable(heard: Sequence[CutEvaluation]) -> bool:
+    """Return whether most windows of a cut have a speed, some are stable, and none chatters."""
+    n_known = sum(sound.peaks is not None for sound in heard)
+    is_stable = any(sound.verdict == "stable" for sound in heard)
+    return is_stable and n_known > len(heard) / 2 and all(sound.chatter is None for sound in heard)
+
+
 def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:
-    """Return the window that decides: the loudest chatter, else the last stable one if most of them are."""
+    """Return the window that decides: the loudest chatter, a short one, the last stable one if most of them are."""
     worst = max(heard, key=rank_evidence)
     if worst.chatter is not None:
         return worst
+    short = [sound for sound in heard if 2 * _length(sound) < max(map(_length, heard))]
+    if short:
+        return max(short, key=rank_evidence)
     stable = [sound for sound in heard if sound.verdict == "stable"]
     return stable[-1] if len(stable) > len(heard) * MIN_STABLE_SHARE else heard[-1]
+
+
+def _length(sound: CutEvaluation) -> int:
+    return int(sound.parts.cut.stop - sound.parts.cut.start)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from acquisition.errors import join_sentences
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
 from lobewatch.logbook.cut_comparison import CutComparison, find_worst_cut
@@ -100,9 +101,22 @@ def _speed_conflict(comparison: CutComparison) -> Fault:
     return Fault(finding, f"{change} --pulses by {round(max(measured / lines, lines / measured))}, or correct --speed")
 
 
+MAX_SHOWN_ENERGY_RATIO = 10.0
+"""Largest energy outside the spindle harmonics over that in them that is shown as a number; chosen."""
+
+
 def _energy_text(ratio: float) -> str:
     digits = ".2g" if ratio < 1 else ".0f"
-    return f"energy outside the spindle harmonics: {100 * ratio:{digits}} % of the energy in the harmonics"
+    share = f"{100 * ratio:{digits}} % of" if ratio <= MAX_SHOWN_ENERGY_RATIO else "more than 10 times"
+    return f"energy outside the spindle harmonics: {share} the energy in the harmonics"
+
+
+def _evaluated_time(detected: CutEvaluation) -> float:
+    """Return the length of all parts of a cut (s), or of the only window."""
+    parts = detected.part_verdicts
+    if parts:
+        return parts[-1].to_s - parts[0].from_s
+    return math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
 
 
 def cut_verdict_text(comparison: CutComparison) -> str:
@@ -129,10 +143,9 @@ def recorded_cut_texts(comparison: CutComparison) -> list[str]:
     if detected.spindle_speed is not None:
         set_rpm = comparison.setting.speed_rpm
         off = 100 * (comparison.speed_rpm / set_rpm - 1)
-        duration = math.nan if detected.spectrum is None else 1 / detected.spectrum.bin_width
         texts.append(
             f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % from the set {set_rpm:g} rpm), tooth passing "
-            f"{comparison.tooth_passing_frequency:.1f} Hz, {duration:.2f} s evaluated"
+            f"{comparison.tooth_passing_frequency:.1f} Hz, {_evaluated_time(detected):.2f} s evaluated"
         )
     if (measured := detected.measured_rpm) is not None:
         texts.append(f"tachometer: {'no speed during the cut' if math.isnan(measured) else f'{measured:.1f} rpm'}")

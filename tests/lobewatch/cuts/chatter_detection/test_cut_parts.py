@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lobewatch.cuts.chatter_detection import earlier_air
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
-from lobewatch.cuts.chatter_detection.load_ripple import Ripple, find_ripple_peaks, is_ringing, least_chatter_energy
+from lobewatch.cuts.chatter_detection.load_ripple import compute_evenness, find_ripple_peaks
 from lobewatch.cuts.chatter_detection.peak_classification import classify_peaks, find_other_teeth
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum, find_separate_peaks
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
@@ -165,6 +165,24 @@ def test_side_bands_of_one_multiple_are_no_ripple() -> None:
     assert not found[2]
 
 
+@pytest.mark.parametrize(("lines", "is_load"), [((-1.5, 1.5), True), ((1.5,), False), ((-9.0, 9.0), False)])
+def test_a_pair_next_to_a_multiple_that_a_corner_cancels_is_the_load(lines: tuple[float, ...], is_load: bool) -> None:
+    time, multiple = np.arange(4 * 6400) / RATE, 1800.0
+    signal = sum(np.cos(2 * np.pi * (multiple + beside) * time) for beside in lines) + np.cos(2 * np.pi * 400 * time)
+    signal = signal + 1e-4 * np.random.default_rng(0).normal(size=time.size)
+    left = SpectralPeaks(multiple + np.array(lines), np.ones(len(lines)), np.full(len(lines), 1e6))
+    comb = SpectralPeaks(np.array([400.0]), np.ones(1), np.full(1, 1e6))
+    found = find_ripple_peaks(left, comb, compute_spectrum(np.asarray(signal), RATE), 100.0)
+    assert list(found) == [is_load] * len(lines)
+
+
+@pytest.mark.parametrize("amplitude", [0.4, 1.0])
+def test_a_cut_that_chatters_loudly_at_its_entry_is_not_stable(amplitude: float) -> None:
+    growing = chatter(0.0, 0.4)
+    heard = listen(recording(6.0, add=lambda t: growing(t) * amplitude * np.exp(t / 0.08)))
+    assert heard.verdict != "stable"
+
+
 @pytest.mark.parametrize(("begin", "end"), [(0.0, 0.5), (5.5, 6.0)])
 def test_half_a_second_of_chatter_at_either_end_of_a_cut_is_told(begin: float, end: float) -> None:
     heard = listen(recording(6.0, add=chatter(begin, end)))
@@ -216,19 +234,27 @@ def test_air_of_another_microphone_position_gets_the_noise_of_the_recording(
     assert np.std(made[0].signal[0, : air.shape[1]]) == pytest.approx(5.0, rel=0.1)
 
 
-def test_a_mode_that_rings_after_each_rib_is_not_steady_like_chatter() -> None:
-    time, turn = np.arange(round(2 * RATE)) / RATE, TURN
-    steady = np.cos(2 * np.pi * 1760 * time)
-    ringing = np.exp(-np.mod(time, 0.1) / 0.008) * steady
-    assert is_ringing(ringing, RATE, 1760.0, turn)
-    assert not is_ringing(steady, RATE, 1760.0, turn)
+def evenness(envelope: NDArray[np.floating[Any]]) -> float:
+    """Evenness of a line with an envelope, shape (n,), in a comb that is far louder."""
+    time = np.arange(envelope.size) / RATE
+    line = envelope * np.cos(2 * np.pi * 1760 * time) + 50.0 * np.cos(2 * np.pi * 9 * TURN * time)
+    signal = line + 1e-3 * np.random.default_rng(0).normal(size=time.size)
+    return compute_evenness(signal, compute_spectrum(signal, RATE), np.zeros(0), TURN)
 
 
-@pytest.mark.parametrize(("ripple", "least"), [
-    (None, 0.0), (Ripple(8.0, 0.3, 0.0), 0.09), (Ripple(8.0, 0.0, 1e-3), 0.02), (Ripple(0.7, 1.3, 0.0), 0.0),
-])  # fmt: skip
-def test_chatter_has_more_energy_than_the_side_bands_of_ripple(ripple: Ripple | None, least: float) -> None:
-    assert least_chatter_energy(ripple) == pytest.approx(least)
+def test_evenness_is_the_share_of_time_that_a_line_sounds_in() -> None:
+    time = np.arange(round(2 * RATE)) / RATE
+    assert evenness(np.ones(time.size)) == pytest.approx(1.0, abs=0.02)
+    assert evenness(1.0 * (np.mod(time, 0.1) < 0.04)) == pytest.approx(0.5, abs=0.06)
+    swing = 1 + 0.4 * np.sin(2 * np.pi * 12.5 * time)
+    assert evenness(swing) == pytest.approx(np.mean(swing**2) ** 2 / np.mean(swing**4), abs=0.05)
+
+
+def test_chatter_that_grows_is_even_and_a_mode_that_rings_after_each_rib_is_not() -> None:
+    time = np.arange(round(2 * RATE)) / RATE
+    growing: Floats = np.exp(time[: time.size // 4] / 0.06)
+    assert evenness(growing) > 0.9
+    assert evenness(np.asarray(np.exp(-np.mod(time, 0.1) / 0.008))) < 0.3
 
 
 def test_a_sensor_without_a_filter_folds_multiples_back_that_are_no_chatter() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import FolderArgument
+from lobewatch.commands.shared_options import FolderArgument, open_folder
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
@@ -63,9 +63,7 @@ def init(
     asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
     toml = machine / "machine.toml"
     if edit:
-        from lobewatch.machine.folder import MachineFolder
-
-        text = MachineFolder(machine).toml_text
+        text = open_folder(machine).toml_text
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"

@@ -8,13 +8,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, BadParameter, Context, Option
 
 import acquisition
 from lobewatch.machine.folder_files import to_folder_path
 from lobewatch.machine.settings.number_text import format_number, list_readings, read_number, read_numbers
+
+if TYPE_CHECKING:
+    from lobewatch.machine import MachineFolder
 
 
 def find_recording(path: Path | None) -> Path:
@@ -24,6 +27,16 @@ def find_recording(path: Path | None) -> Path:
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder. Name a machine folder or a recorded cut.")
     return path
+
+
+def open_folder(path: Path) -> "MachineFolder":
+    """Open a machine folder, and name the files and entries of other computers in it."""
+    from lobewatch.machine import MachineFolder
+    from lobewatch.show.terminal.output import print_remarks
+
+    folder = MachineFolder(path)
+    print_remarks(folder.sync_remarks)
+    return folder
 
 
 def number(text: str | float) -> float:

@@ -274,6 +274,11 @@ class MachineFolder:
         """
         return self._lock.hold(patience)
 
+    @property
+    def sync_remarks(self) -> list[Remark]:
+        """Remarks on files and entries of other computers, and on lines that this version does not understand."""
+        return list_sync_remarks(self.path, self.journal.read())
+
     @time_step("reading")
     def contents(self) -> FolderContents:
         """Read the committed tap tests and the state of their files."""

@@ -15,8 +15,8 @@ from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
-from lobewatch.machine.journal import read_entries as journal_entries
 from lobewatch.machine.journal import journal
+from lobewatch.machine.journal import read_entries as journal_entries
 from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, DAMAGED_FOLDER_NAME, LOBEWATCH_FILES
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
 from lobewatch.machine.journal.sync_conflicts import list_sync_remarks
@@ -31,6 +31,13 @@ DAMAGE_CODES += ("sync-conflict", "sync-contradiction", "journal-newer", "line-d
 DELETION_ADVICE = "Delete this file or folder if you do not need it"
 ALTERED_TEXT = "file changed or truncated since lobewatch wrote it"
 """Fault of a file with a wrong checksum."""
+
+
+def name_problem(code: str) -> str:
+    """Name the problem of a remark in `DAMAGE_CODES`: "damaged", "conflicting" or "not understood"."""
+    if code.startswith("sync-"):
+        return "conflicting"
+    return "not understood" if code == "journal-newer" else "damaged"
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry
-from lobewatch.machine.journal.read_entries import MaintenanceEvent
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
+from lobewatch.machine.journal.read_entries import MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text

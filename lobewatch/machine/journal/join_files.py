@@ -30,6 +30,7 @@ def join_conflict_files(folder: Path, journal: Journal) -> Iterator[str]:
         if file.kind == "journal":
             yield from _join_journal(folder, journal, file)
         elif file.kind == "settings":
+            yield f"{file.name}: {file.finding}"
             yield _set_conflict_aside(folder, file)
 
 
@@ -54,7 +55,7 @@ def _join_journal(folder: Path, journal: Journal, file: ConflictFile) -> Iterato
 
 def _set_conflict_aside(folder: Path, file: ConflictFile) -> str:
     aside = move_aside(folder, folder / file.name, CONFLICTS_FOLDER_NAME)
-    return f"{file.name}: {file.finding}, moved to {aside.relative_to(folder).as_posix()}"
+    return f"{file.name}: moved to {aside.relative_to(folder).as_posix()}"
 
 
 def _rename_tap(folder: Path, entry: JournalEntry, new_names: set[str]) -> JournalEntry:

@@ -174,10 +174,11 @@ def _resolve_subjects(
     last_new.pop("", None)
     for subject, newest in last_new.items():
         kept, dropped = last_other[subject], last_own.get(subject)
-        if dropped is not None and dropped[0] not in lines and _fact_of(dropped[1]) != _fact_of(kept[1]):
+        if dropped is not None and dropped[0] not in lines:
             kept, dropped = sorted((kept, dropped), key=_time_of, reverse=True)
-            about = name_subject(kept[1])
-            contradictions.append(Contradiction(about, *({**_with_names(one[1], {})} for one in (kept, dropped))))
+            if _fact_of(kept[1]) != _fact_of(dropped[1]):
+                both = (_with_names(entry, {}) for _, entry in (kept, dropped))
+                contradictions.append(Contradiction(name_subject(kept[1]), *both))
         if kept[0] != newest:
             restated[kept[0]] = _with_names(kept[1], {})
     return contradictions, restated
@@ -202,16 +203,20 @@ def name_subject(entry: Entry) -> str:
 
 
 def find_open_contradictions(entries: Iterable[Entry]) -> list[Contradiction]:
-    """Return the contradictions of joined journals that no later line on the same subject has answered.
+    """Return the contradictions of joined journals that no later entry on the same subject has answered.
 
     Parameters
     ----------
     entries
         Understood lines of a journal, oldest first.
     """
-    found = dict[str, Contradiction]()
+    found = dict[str, tuple[str, Contradiction]]()
     for entry in entries:
-        found.pop(find_subject(entry), None)
+        time = str(entry.get("time"))
+        joined_until, _ = found.get(find_subject(entry), ("", None))
+        if JOINED_KEY not in entry or time > joined_until:
+            found.pop(find_subject(entry), None)
         if entry["kind"] == JOIN_LINE_KIND:
-            found |= {find_subject(one.kept): one for one in msgspec.convert(entry, JoinEntry).contradictions}
-    return [*found.values()]
+            for one in msgspec.convert(entry, JoinEntry).contradictions:
+                found[find_subject(one.kept)] = max(time, *(str(side["time"]) for side in (one.kept, one.other))), one
+    return [one for _, one in found.values()]

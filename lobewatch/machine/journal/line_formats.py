@@ -3,6 +3,7 @@
 A line carries the number of its format. Lines of a newer version are kept and named, never guessed and never rewritten.
 """
 
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import datetime
@@ -153,13 +154,13 @@ LINE_KINDS = {
 """Kinds of lines by name; an event with `withdraws` is a withdrawal, a note has no effect."""
 
 
-def _make_tap_line() -> type:
-    """Make the type of a whole line of a tap test, which accepts no other field."""
+def _make_tap_line(*, accepts_others: bool) -> type:
+    """Make the type of a whole line of a tap test; accepts_others: True to accept unknown fields."""
     strict: dict[str, Any] = {"time": ZonedTime, "direction": TapDirection}
     fields = [_field_of(field, strict) for field in msgspec.structs.fields(TapEntry)]
     names = {name for name, *_ in fields}
     fields += [_field_of(field, {}) for field in msgspec.structs.fields(LineFrame) if field.name not in names]
-    return msgspec.defstruct("_TapLine", fields, forbid_unknown_fields=True, kw_only=True, gc=False)
+    return msgspec.defstruct("_TapLine", fields, forbid_unknown_fields=not accepts_others, kw_only=True, gc=False)
 
 
 def _field_of(field: msgspec.structs.FieldInfo, types: Mapping[str, Any]) -> Any:
@@ -167,8 +168,8 @@ def _field_of(field: msgspec.structs.FieldInfo, types: Mapping[str, Any]) -> Any
     return (field.name, kind) if field.required else (field.name, kind, field.default)
 
 
-_TapLine = _make_tap_line()
-_check_tap_lines = msgspec.json.Decoder(list[_TapLine]).decode  # type: ignore[valid-type]
+_TapLine = _make_tap_line(accepts_others=True)
+_check_tap_lines = msgspec.json.Decoder(list[_make_tap_line(accepts_others=False)]).decode  # type: ignore[misc]
 
 
 def _without_empty_conditions(line: Mapping[str, Any]) -> dict[str, Any]:
@@ -219,10 +220,7 @@ def find_line_faults(lines: Sequence[bytes], *, of_taps: bool) -> tuple[LineFaul
 
 
 def _find_line_fault(number: int, line: bytes) -> LineFault | None:
-    try:
-        entry = msgspec.json.decode(line, type=dict[str, Any])
-    except msgspec.MsgspecError as error:
-        return LineFault(number, str(error), 1, is_used=False)
+    entry: dict[str, Any] = json.loads(line)
     written = entry.get(FORMAT_KEY, 1)
     written = written if isinstance(written, int) else JOURNAL_FORMAT + 1
     name = "withdrawal" if entry["kind"] == "event" and "withdraws" in entry else entry["kind"]
@@ -230,6 +228,7 @@ def _find_line_fault(number: int, line: bytes) -> LineFault | None:
     if kind is None:
         return LineFault(number, f"kind {name!r} is unknown", written, is_used=False)
     try:
+        msgspec.json.decode(line)  # accepts no infinite number
         msgspec.convert(entry, LineFrame)
         _refuse_local_times(kind.read(entry))
     except (ValueError, TypeError, LookupError, AttributeError) as error:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -37,6 +40,7 @@ CONFLICT_NAMES: tuple[Callable[[Path], str], ...] = (
 UNSYNCED = (".lock", ".lock.holder", "history.rows", "standing.json")
 CHAIN = SensorChain("DAQ 1", 2.25e-3, 1e-2, 5.0, 5.0)
 SIGNAL = CutSignal(np.arange(3000.0), 51200.0, np.arange(3000, dtype=np.int32), Channel("acceleration", 1.0, 5.0))
+FRF = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49).astype(np.complex128))
 Entry = dict[str, Any]
 
 
@@ -59,7 +63,6 @@ class TwoCopies:
 
     def __init__(self, root: Path) -> None:
         """Make the folder with three tap tests, one of them excluded, on both computers."""
-        make_machine_folder(root / "a" / "m", "surrogate_machine.toml")
         self.paths = root / "a" / "m", root / "b" / "m"
         self.facts: list[Fact] = []
         """Announced facts."""
@@ -68,10 +71,9 @@ class TwoCopies:
         self.texts: list[str] = []
         """Texts that a person has read."""
         self._base: dict[str, bytes] = {}
-        self._count, self._n_taps = 0, 0
-        for _ in range(3):
-            self.write(0, "tap", 0)
-        self.write(0, "exclude", 1)
+        self._count, self._n_taps = 0, 3
+        for path in self.paths:
+            shutil.copytree(_make_first_folder().name, path)
         self.sync(0, 0)
 
     def write(self, side: int, action: str, number: int) -> None:
@@ -91,15 +93,17 @@ class TwoCopies:
 
     def sync(self, kept: int, name: int) -> None:
         """Let the sync program keep the files of one side, and put those of the other next to them."""
-        sides = [_read_files(path) for path in self.paths]
+        sides = [read_files(path) for path in self.paths]
         result: dict[str, bytes] = {}
         for file in sorted({*sides[0], *sides[1]}):
             contents = [side.get(file) for side in sides]
             changed = [content for content in contents if content != self._base.get(file)]
             if len({*contents}) == 2 and len(changed) == 2 and None not in contents:
                 path = Path(file)
-                result[file] = contents[kept]  # type: ignore[assignment]
-                result[str(path.with_name(CONFLICT_NAMES[name](path)))] = contents[1 - kept]  # type: ignore[assignment]
+                beside = path.with_name(CONFLICT_NAMES[name](path))
+                while str(beside) in {**sides[0], **sides[1], **result}:
+                    beside = beside.with_name(f"{beside.stem} 2{beside.suffix}")
+                result[file], result[str(beside)] = contents[kept], contents[1 - kept]  # type: ignore[assignment]
             else:
                 content = changed[0] if changed else contents[0]
                 result |= {} if content is None else {file: content}
@@ -122,10 +126,12 @@ class TwoCopies:
         last = {find_subject(entry): entry for entry in entries if find_subject(entry)}
         newest = {_find_target(entry, entries): compute_fact_mark(entry) for entry in last.values()}
         for fact in self.facts:
-            newer = [other for other in self.facts if other.target == fact.target and fact.mark in other.known - {other.mark}]
+            newer = [
+                other for other in self.facts if other.target == fact.target and fact.mark in other.known - {other.mark}
+            ]
             if fact.target and not newer and newest[fact.target] != fact.mark:
                 is_same = _value_of(present[newest[fact.target]]) == _value_of(fact.entry)
-                lost += [] if is_same or fact.entry["time"][:16] in said else [f"does not count: {fact.entry}"]
+                lost += [] if is_same or _words_of(fact.entry) in said else [f"does not count: {fact.entry}"]
         withdrawn = {entry["withdraws"] for entry in entries if "withdraws" in entry}
         noted = {entry["id"] for entry in entries if entry["kind"] == "event" and "id" in entry}
         lost += [] if {event.id for event in contents.events} == noted - withdrawn else ["events"]
@@ -136,9 +142,8 @@ class TwoCopies:
 
     def _tap(self, folder: MachineFolder, number: int) -> None:
         about = Circumstances("m", START + timedelta(days=self._n_taps), operator=f"no {self._count}")
-        frf = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49).astype(np.complex128))
         name = f"tap_{len(folder.contents().taps)}" if number % 2 else new_tap_id(about)
-        folder.commit(replace(TapTest(new_tap_id(about), about, frf), id=name))
+        folder.commit(replace(TapTest(new_tap_id(about), about, FRF), id=name))
         self._n_taps += 1
 
     def _event(self, folder: MachineFolder, number: int) -> None:
@@ -180,10 +185,25 @@ class TwoCopies:
         with folder.locked():
             folder.journal.append(said.line)
 
-    def _program(self, folder: MachineFolder, number: int) -> None:
+    def _program(self, folder: MachineFolder, _: int) -> None:
         name, first = f"P{self._count}", folder.machine.program[0]
-        updates.save_program(folder, type(first)(**{key: getattr(first, key) for key in first.__struct_fields__} | {"name": name}))
+        updates.save_program(
+            folder, type(first)(**{key: getattr(first, key) for key in first.__struct_fields__} | {"name": name})
+        )
         self.programs.append(name)
+
+
+@cache
+def _make_first_folder() -> TemporaryDirectory[str]:
+    """Make a machine folder with three tap tests, one of them excluded."""
+    place = TemporaryDirectory()
+    make_machine_folder(Path(place.name), "surrogate_machine.toml")
+    folder = MachineFolder(place.name)
+    for day in range(3):
+        about = Circumstances("m", START + timedelta(days=day))
+        folder.commit(TapTest(f"tap_{day}", about, FRF))
+    updates.exclude_entry(folder, "tap_1", "first reason")
+    return place
 
 
 def _choose(folder: MachineFolder, kind: str, number: int) -> str:
@@ -205,13 +225,20 @@ def _value_of(entry: Entry) -> Entry:
     return {key: entry[key] for key in ("kind", "reason", "add", "decision", "note") if key in entry}
 
 
-def _read_files(path: Path) -> Mapping[str, bytes]:
+def _words_of(entry: Entry) -> str:
+    """Return the words that name an entry of its kind."""
+    words = {"exclude": f"{entry.get('reason')}", "include": "included", "modes": f"{entry.get('add')}"}
+    return words.get(entry["kind"]) or str(entry.get("note") or f"hit {entry.get('hit')} {entry.get('decision')}")
+
+
+def read_files(path: Path) -> Mapping[str, bytes]:
+    """Return the synced files of a folder by path."""
     files = [file for file in path.rglob("*") if file.is_file() and file.name not in UNSYNCED] if path.exists() else []
     return {file.relative_to(path).as_posix(): file.read_bytes() for file in files}
 
 
 def _write_files(path: Path, files: Mapping[str, bytes]) -> None:
-    for file in _read_files(path).keys() - files.keys():
+    for file in read_files(path).keys() - files.keys():
         (path / file).unlink()
     for file, content in files.items():
         target = path / file

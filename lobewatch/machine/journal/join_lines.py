@@ -90,8 +90,7 @@ def join_lines(own: Sequence[Entry], other: Sequence[Entry], file: str) -> Joine
     file
         Its name.
     """
-    known = {compute_fact_mark(entry): entry for entry in reversed(own)}
-    others = {compute_fact_mark(entry): entry for entry in other}
+    known, others = _by_mark(own), _by_mark(other)
     mine = [entry for entry in own if compute_fact_mark(entry) not in others]
     new = {mark: entry for mark, entry in others.items() if mark not in known}
     same, renumbered = _match_identities(own, mine, new)
@@ -108,6 +107,11 @@ def join_lines(own: Sequence[Entry], other: Sequence[Entry], file: str) -> Joine
         about = JoinEntry(file, len(new), renumbered, tuple(contradictions))
         joined.append(make_entry(JOIN_LINE_KIND, **msgspec.to_builtins(about)))
     return JoinedLines(joined, len(new), renumbered)
+
+
+def _by_mark(entries: Sequence[Entry]) -> dict[str, Entry]:
+    """Return entries by mark, a repeated one at its last place."""
+    return dict(reversed({compute_fact_mark(entry): entry for entry in reversed(entries)}.items()))
 
 
 def _match_identities(

@@ -20,7 +20,7 @@ from lobewatch.machine import folder_updates as updates
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
-from lobewatch.machine.journal.join_lines import compute_fact_mark, find_subject
+from lobewatch.machine.journal.join_lines import compute_fact_mark, find_open_contradictions, find_subject
 from lobewatch.machine.journal.mass_checks import MassCheckEntry, SensorChain
 from lobewatch.machine.rebuild_files import rebuild_files
 from lobewatch.machine.settings.requested_cut import find_cut_setting
@@ -132,6 +132,9 @@ class TwoCopies:
             if fact.target and not newer and newest[fact.target] != fact.mark:
                 is_same = _value_of(present[newest[fact.target]]) == _value_of(fact.entry)
                 lost += [] if is_same or _words_of(fact.entry) in said else [f"does not count: {fact.entry}"]
+        for one in find_open_contradictions(folder.journal.read().other_entries):
+            is_kept = _value_of(last[find_subject(one.kept)]) == _value_of(one.kept)
+            lost += [] if is_kept and one.kept["time"] >= one.other["time"] else [f"said to be kept: {one}"]
         withdrawn = {entry["withdraws"] for entry in entries if "withdraws" in entry}
         noted = {entry["id"] for entry in entries if entry["kind"] == "event" and "id" in entry}
         lost += [] if {event.id for event in contents.events} == noted - withdrawn else ["events"]

@@ -171,14 +171,15 @@ def _resolve_subjects(
     own: Iterable[Entry], lines: Mapping[str, Entry], new: Mapping[str, Entry]
 ) -> tuple[list[Contradiction], dict[str, Entry]]:
     """Return contradictions, and the lines to append once more so that the counting line of each subject is last."""
-    last_own = {find_subject(entry): (compute_fact_mark(entry), entry) for entry in own}
+    marked = [(compute_fact_mark(entry), entry) for entry in own]
+    unknown_there = {find_subject(entry): (mark, entry) for mark, entry in marked if mark not in lines}
     last_other = {find_subject(entry): (mark, entry) for mark, entry in lines.items()}
     last_new = {find_subject(entry): mark for mark, entry in new.items()}
     contradictions, restated = list[Contradiction](), dict[str, Entry]()
     last_new.pop("", None)
     for subject, newest in last_new.items():
-        kept, dropped = last_other[subject], last_own.get(subject)
-        if dropped is not None and dropped[0] not in lines:
+        kept, dropped = last_other[subject], unknown_there.get(subject)
+        if dropped is not None:
             kept, dropped = sorted((kept, dropped), key=_time_of, reverse=True)
             if _fact_of(kept[1]) != _fact_of(dropped[1]):
                 both = (_with_names(entry, {}) for _, entry in (kept, dropped))

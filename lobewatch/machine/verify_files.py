@@ -25,8 +25,10 @@ from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.rebuild_files import verify_cut_recordings
 from lobewatch.machine.row_file import read_rows
 
-DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
-DAMAGE_CODES += ("sync-conflict", "sync-contradiction", "journal-newer", "line-damaged")
+DAMAGE_CODES = (
+    *("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted"),
+    *("sync-conflict", "sync-contradiction", "journal-newer", "line-damaged"),
+)
 """Codes of remarks on damage, conflicts and incomplete results; all others are information."""
 DELETION_ADVICE = "Delete this file or folder if you do not need it"
 ALTERED_TEXT = "file changed or truncated since lobewatch wrote it"

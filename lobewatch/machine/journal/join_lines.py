@@ -17,7 +17,7 @@ from lobewatch.machine.journal.journal import make_entry
 from lobewatch.machine.journal.line_formats import (
     JOIN_LINE_KIND,
     JOINED_KEY,
-    Contradiction,
+    ConflictingEntries,
     JoinEntry,
     LineFrame,
 )
@@ -141,7 +141,7 @@ def _new_identity(entry: Entry, own: Sequence[Entry], used: Sequence[str]) -> st
 
 def _with_names(entry: Entry, names: Mapping[str, str]) -> dict[str, Any]:
     """Return an entry with other identities, and without the keys that say where the line is."""
-    changed = {key: names[entry[key]] for key in REFERENCE_KEYS if entry.get(key) in names}
+    changed: dict[str, Any] = {key: names[entry[key]] for key in REFERENCE_KEYS if entry.get(key) in names}
     recording = entry.get("recording")
     if isinstance(recording, dict) and recording.get("id") in names:
         changed["recording"] = {**recording, "id": names[recording["id"]]}
@@ -169,13 +169,13 @@ def find_subject(entry: Entry) -> str:
 
 def _resolve_subjects(
     own: Iterable[Entry], lines: Mapping[str, Entry], new: Mapping[str, Entry]
-) -> tuple[list[Contradiction], dict[str, Entry]]:
+) -> tuple[list[ConflictingEntries], dict[str, Entry]]:
     """Return contradictions, and the lines to append once more so that the counting line of each subject is last."""
     marked = [(compute_fact_mark(entry), entry) for entry in own]
     unknown_there = {find_subject(entry): (mark, entry) for mark, entry in marked if mark not in lines}
     last_other = {find_subject(entry): (mark, entry) for mark, entry in lines.items()}
     last_new = {find_subject(entry): mark for mark, entry in new.items()}
-    contradictions, restated = list[Contradiction](), dict[str, Entry]()
+    contradictions, restated = list[ConflictingEntries](), dict[str, Entry]()
     last_new.pop("", None)
     for subject, newest in last_new.items():
         kept, dropped = last_other[subject], unknown_there.get(subject)
@@ -183,7 +183,7 @@ def _resolve_subjects(
             kept, dropped = sorted((kept, dropped), key=_time_of, reverse=True)
             if _fact_of(kept[1]) != _fact_of(dropped[1]):
                 both = (_with_names(entry, {}) for _, entry in (kept, dropped))
-                contradictions.append(Contradiction(name_subject(kept[1]), *both))
+                contradictions.append(ConflictingEntries(name_subject(kept[1]), *both))
         if kept[0] != newest:
             restated[kept[0]] = _with_names(kept[1], {})
     return contradictions, restated
@@ -207,7 +207,7 @@ def name_subject(entry: Entry) -> str:
     )
 
 
-def find_open_contradictions(entries: Iterable[Entry]) -> list[Contradiction]:
+def find_open_contradictions(entries: Iterable[Entry]) -> list[ConflictingEntries]:
     """Return the contradictions of joined journals that no later entry on the same subject has answered.
 
     Parameters
@@ -215,7 +215,7 @@ def find_open_contradictions(entries: Iterable[Entry]) -> list[Contradiction]:
     entries
         Understood lines of a journal, oldest first.
     """
-    found = dict[str, tuple[str, Contradiction]]()
+    found = dict[str, tuple[str, ConflictingEntries]]()
     for entry in entries:
         time = str(entry.get("time"))
         joined_until, _ = found.get(find_subject(entry), ("", None))

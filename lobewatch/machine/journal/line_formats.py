@@ -83,7 +83,7 @@ class _Note(msgspec.Struct):
     text: str
 
 
-class Contradiction(msgspec.Struct, frozen=True):
+class ConflictingEntries(msgspec.Struct, frozen=True):
     """Two entries of two computers on the same subject, of which one counts."""
 
     about: str
@@ -103,7 +103,7 @@ class JoinEntry(msgspec.Struct, frozen=True):
     """Number of lines that were new."""
     renumbered: dict[str, str] = {}
     """New identities by those in the joined journal."""
-    contradictions: tuple[Contradiction, ...] = ()
+    contradictions: tuple[ConflictingEntries, ...] = ()
     """Contradictions between the two journals."""
 
 
@@ -126,8 +126,7 @@ class _LineKind(NamedTuple):
 
 
 def _field_names(kind: type) -> Iterator[str]:
-    fields: Mapping[str, Any] = getattr(kind, "__dataclass_fields__", {})
-    yield from fields or getattr(kind, "__struct_fields__", ())
+    yield from getattr(kind, "__dataclass_fields__", None) or getattr(kind, "__struct_fields__", ())
 
 
 def _kind_of(*types: type) -> _LineKind:
@@ -135,7 +134,7 @@ def _kind_of(*types: type) -> _LineKind:
 
 
 LINE_KINDS = {
-    "tap": _LineKind((TapEntry,), lambda line: _convert(_TapLine)(_without_empty_conditions(line))),
+    "tap": _LineKind((TapEntry,), lambda line: _convert(_TAP_LINE)(_without_empty_conditions(line))),
     CUT_LINE_KIND: _LineKind((CutEntry,), _read_cut),
     MASS_CHECK_KIND: _kind_of(MassCheckEntry),
     "ack": _kind_of(Acknowledgement),
@@ -168,7 +167,7 @@ def _field_of(field: msgspec.structs.FieldInfo, types: Mapping[str, Any]) -> Any
     return (field.name, kind) if field.required else (field.name, kind, field.default)
 
 
-_TapLine = _make_tap_line(accepts_others=True)
+_TAP_LINE: type = _make_tap_line(accepts_others=True)
 _check_tap_lines = msgspec.json.Decoder(list[_make_tap_line(accepts_others=False)]).decode  # type: ignore[misc]
 
 

@@ -77,7 +77,7 @@ def list_sync_remarks(folder: Path, reading: JournalReading) -> list[Remark]:
         Reading of its journal.
     """
     conflicts = [conflict_remark(folder, file.name, file.finding) for file in find_conflict_files(folder, reading)]
-    return [*conflicts, *_list_contradictions(folder, reading), *_list_faults(reading)]
+    return [*conflicts, *_list_contradictions(folder, reading), *_list_faults(folder, reading)]
 
 
 def conflict_remark(folder: Path, name: str, finding: str) -> Remark:
@@ -242,7 +242,7 @@ def _describe(entry: Mapping[str, Any]) -> str:
     return f"{words[entry['kind']]} {str(entry.get('time'))[:16]}"
 
 
-def _list_faults(reading: JournalReading) -> Iterator[Remark]:
+def _list_faults(folder: Path, reading: JournalReading) -> Iterator[Remark]:
     """Yield remarks on lines that this version does not understand."""
     given_up = read_given_up_lines(reading)
     yield from (Remark("line-lost", JOURNAL_NAME, str(fault)) for fault in reading.faults if fault.number in given_up)
@@ -252,7 +252,7 @@ def _list_faults(reading: JournalReading) -> Iterator[Remark]:
             cure = "Update lobewatch on this computer, because the results are incomplete without this line"
             yield Remark("journal-newer", JOURNAL_NAME, str(fault), cure)
         else:
-            cure = "Enter its fact again, then run lobewatch rebuild to give up the line"
+            cure = f"Enter its fact again, then run {format_command('rebuild', folder)} to give up the line"
             yield Remark("line-damaged", JOURNAL_NAME, str(fault), cure)
     if faults[MAX_LISTED:]:
         is_newer = any(fault.is_newer for fault in faults[MAX_LISTED:])

@@ -125,8 +125,8 @@ class _LineKind(NamedTuple):
         return {name for kind in (LineFrame, *self.types) for name in _field_names(kind)}
 
 
-def _field_names(kind: type) -> Iterator[str]:
-    yield from getattr(kind, "__dataclass_fields__", None) or getattr(kind, "__struct_fields__", ())
+def _field_names(kind: Any) -> Iterator[str]:
+    yield from kind.__struct_fields__ if hasattr(kind, "__struct_fields__") else getattr(kind, "__dataclass_fields__", ())
 
 
 def _kind_of(*types: type) -> _LineKind:

@@ -126,7 +126,9 @@ class _LineKind(NamedTuple):
 
 
 def _field_names(kind: Any) -> Iterator[str]:
-    yield from kind.__struct_fields__ if hasattr(kind, "__struct_fields__") else getattr(kind, "__dataclass_fields__", ())
+    yield from (
+        kind.__struct_fields__ if hasattr(kind, "__struct_fields__") else getattr(kind, "__dataclass_fields__", ())
+    )
 
 
 def _kind_of(*types: type) -> _LineKind:

@@ -13,9 +13,11 @@ from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
+from lobes.coefficient_distribution import JointCoefficients, Quantiles, pool_intervals
 from lobes.coefficients import CuttingCoefficients, SpecificForce
 
 
@@ -68,42 +70,107 @@ def listed_materials() -> tuple[CuttingCoefficients, ...]:
     return tuple(_material_coefficients(row) for row in read_table("materials.csv"))
 
 
+class MaterialSources(NamedTuple):
+    """Sources of a listed material."""
+
+    forces: list[SpecificForce]
+    """Specific forces of its VDI 3323 group, its CMC code and its own name."""
+    tests: list[CuttingCoefficients]
+    """Milling tests of its alloy."""
+    ratio: dict[str, str]
+    """Row of force_ratios.csv."""
+
+    @property
+    def tangential(self) -> float:
+        """Mean Kt of the publications at the stated chip thickness (Pa)."""
+        of_tests = [test.tangential for test in self.tests]
+        return float(np.mean([force.tangential(REFERENCE_CHIP_THICKNESS) for force in self.forces] + of_tests))
+
+    @property
+    def tangential_edge(self) -> float:
+        """Mean Kte of the publications (N/m)."""
+        edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in self.forces]
+        return float(np.mean(edges + [test.tangential_edge for test in self.tests]))
+
+
 def _specific_forces(name: str) -> list[SpecificForce]:
     rows = [row for row in read_table("specific_cutting_forces.csv") if row["of"] == name]
     return [SpecificForce(float(row["kc1.1_N_per_mm2"]) * 1e6, float(row["mc"]), row["source"]) for row in rows]
 
 
-def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
+def _material_sources(row: dict[str, str]) -> MaterialSources:
     vdi, cmc = f"VDI {row['vdi_3323_group']}", f"CMC {row['cmc_code']}"
     forces = [force for name in (vdi, cmc, row["material"]) for force in _specific_forces(name)]
     tests = [test for test in milling_tests() if row["alloy"] and test.alloy == row["alloy"]]
     ratios = {each["of"]: each for each in read_table("force_ratios.csv")}
-    ratio = ratios.get(vdi) or ratios[row["iso_group"]]
-    of_tests = [test.tangential for test in tests]
-    tangential = float(np.mean([force.tangential(REFERENCE_CHIP_THICKNESS) for force in forces] + of_tests))
-    edges = [force.tangential_edge(REFERENCE_CHIP_THICKNESS) for force in forces]
-    published = [force.tangential(chip) for force in forces for chip in CHIP_THICKNESS_RANGE] + of_tests
-    limits = [(1 + side * MIN_COEFFICIENT_RANGE) * tangential for side in (-1, 1)]
+    return MaterialSources(forces, tests, ratios.get(vdi) or ratios[row["iso_group"]])
+
+
+def _material_coefficients(row: dict[str, str]) -> CuttingCoefficients:
+    sources, joint = _material_sources(row), _distributions()[row["material"]]
+    ranges = [(float(each.values[0]), float(each.values[-1])) for each in (joint.tangential, joint.ratio)]
     return CuttingCoefficients(
         material=row["material"],
-        tangential=tangential,
-        radial=tangential * float(ratio["middle"]),
-        tangential_edge=float(np.mean(edges + [test.tangential_edge for test in tests])),
-        source="; ".join(_source_texts(forces, tests, ratio["source"])),
+        tangential=sources.tangential,
+        radial=sources.tangential * float(sources.ratio["middle"]),
+        tangential_edge=sources.tangential_edge,
+        source="; ".join(_source_texts(sources, joint.correlation)),
         alloy=row["alloy"],
         iso_group=row["iso_group"],
         vdi_3323_group=row["vdi_3323_group"],
         equivalents=tuple(row["equivalents"].split(";")),
-        tangential_range=(min(*published, *limits), max(*published, *limits)),
-        ratio_range=(float(ratio["low"]), float(ratio["high"])),
-        specific_forces=tuple(forces),
+        tangential_range=ranges[0],
+        ratio_range=ranges[1],
+        specific_forces=tuple(sources.forces),
     )
 
 
-def _source_texts(forces: Sequence[SpecificForce], tests: Sequence[CuttingCoefficients], ratio: str) -> list[str]:
-    """Return one source per number: kc1.1 with mc, tests, Kr/Kt."""
-    of_forces = [f"kc1.1 {force.at_1_mm / 1e6:.0f}, mc {force.exponent:.2f}: {force.source}" for force in forces]
-    return [*of_forces, *(f"Kt {test.tangential / 1e6:.0f}: {test.source}" for test in tests), f"Kr/Kt: {ratio}"]
+def find_joint_coefficients(known: CuttingCoefficients) -> JointCoefficients | None:
+    """Find the joint distribution of Kt (Pa) and Kr/Kt by the sources of a listed material.
+
+    Parameters
+    ----------
+    known : CuttingCoefficients
+        Coefficients.
+
+    Returns
+    -------
+    JointCoefficients or None
+        Distribution; None for other materials, and for coefficients of the user.
+    """
+    return _distributions()[known.material] if known.specific_forces else None
+
+
+@cache
+def _distributions() -> dict[str, JointCoefficients]:
+    """Return the joint distribution of Kt and Kr/Kt of each listed material by its name."""
+    sources = {row["material"]: _material_sources(row) for row in read_table("materials.csv")}
+    return {name: JointCoefficients(_pool_forces(each), _ratio_quantiles(each)) for name, each in sources.items()}
+
+
+def _pool_forces(sources: MaterialSources) -> Quantiles:
+    """Pool Kt (Pa): each publication over the chip thicknesses, each test, and the error of a single source."""
+    thin, thick = CHIP_THICKNESS_RANGE
+    published = [(force.tangential(thick), force.tangential(thin)) for force in sources.forces]
+    tests = [(test.tangential, test.tangential) for test in sources.tests]
+    error = [(1 + side * MIN_COEFFICIENT_RANGE) * sources.tangential for side in (-1, 1)]
+    return pool_intervals([*published, *tests, (error[0], error[1])])
+
+
+def _ratio_quantiles(sources: MaterialSources) -> Quantiles:
+    """Return the quantiles of Kr/Kt: as likely below as above the published one, evenly on either side."""
+    values = [float(sources.ratio[name]) for name in ("low", "middle", "high")]
+    return Quantiles(np.array([0.0, 0.5, 1.0]), np.array(values))
+
+
+def _source_texts(sources: MaterialSources, correlation: float) -> list[str]:
+    """Return one source per number: kc1.1 with mc, tests, Kr/Kt, correlation."""
+    of_forces = [
+        f"kc1.1 {force.at_1_mm / 1e6:.0f}, mc {force.exponent:.2f}: {force.source}" for force in sources.forces
+    ]
+    of_tests = [f"Kt {test.tangential / 1e6:.0f}: {test.source}" for test in sources.tests]
+    joint = f"rank correlation of Kt and Kr/Kt {correlation:g}: four tests of Al 7075 in cutting_coefficients.csv"
+    return [*of_forces, *of_tests, f"Kr/Kt: {sources.ratio['source']}", joint]
 
 
 def all_cutting_coefficients() -> tuple[CuttingCoefficients, ...]:

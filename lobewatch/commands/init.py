@@ -2,14 +2,13 @@
 
 import shlex
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
 from lobewatch.commands.shared_options import FolderArgument, open_folder
-from lobewatch.machine.settings.display_units import UnitSystem, shown_units
+from lobewatch.machine.settings.display_units import UnitSystem
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
@@ -57,48 +56,33 @@ def init(
       lobewatch init mill-3 --yes --daq COM3 --tool "4 20 30 80" --material 42CrMo4 --program "slot: 8000 2 20"
       lobewatch init trial --example
     """
-    from lobewatch.machine.folder_files import make_machine_text, write_machine_file
+    from lobewatch.machine.folder_files import make_machine_text
+    from lobewatch.machine.setup_questions.machine_file_changes import create_machine_file
 
     asked = {"name": name, "speeds": speeds, "drive": drive, "daq": daq, "hammer": hammer, "fixing": fixing}
     asked |= {"accelerometer": accelerometer, "tool": tool, "material": material, "program": program}
     answers = {key: answer for key, answer in asked.items() if answer is not None}
     asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
     toml = machine / "machine.toml"
+    has_answers = asks or bool(answers or units)
+    if edit or has_answers:
+        from lobewatch.show.terminal.setup_dialogue import answer_settings, change_settings
+    draft: MachineDraft | None
     if edit:
-        text = open_folder(machine).toml_text
+        open_folder(machine)
+        draft = change_settings(machine, answers, edit, asks, units)
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
+        draft = answer_settings(text, answers, "", asks, units) if has_answers else None
+        create_machine_file(machine, draft.text if draft else text)
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
-    if asks or answers or edit or units:
-        draft = _answer_settings(text, answers, edit, asks, units)
-        text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
-    else:
+    if draft is None:
         change = "adapt machine.toml to your machine" if example else "fill in machine.toml"
         next_step = f"{change}, then run: {next_step} --port PORT"
-    write_machine_file(machine, text)
+    elif not draft.daq.port:
+        next_step = f"{next_step} --port PORT"
     payload, text = {"machine": str(machine), "machine_toml": str(toml)}, f"{'changed' if edit else 'created'} {toml}"
     emit(payload, as_json, text, f"next: {next_step}")
     if not as_json:
         command = f"lobewatch sensors {shlex.quote(str(machine))} --mass-kg KG"
         notes.print(f"then check the sensors with a known mass (two minutes): {command}", markup=False)
-
-
-def _answer_settings(
-    text: str, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
-) -> "MachineDraft":
-    """Make the draft from the answers in options and at the terminal."""
-    from lobewatch.machine.setup_questions.draft import MachineDraft
-    from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
-    from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions
-
-    draft = MachineDraft(text, {})
-    draft = draft.set("machine", units=units) if units else draft
-    chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
-    if edit and not asks and edit not in answers:
-        raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
-    try:
-        with shown_units(draft.table("machine").get("units", "metric")):
-            return ask_questions(draft, chosen, answers) if asks else answer_questions(draft, answers)
-    except (EOFError, KeyboardInterrupt):
-        notes.print("\nno file was written")
-        raise KeyboardInterrupt from None

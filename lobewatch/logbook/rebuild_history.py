@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from acquisition import DataError
+from acquisition.file_io import delete
 from acquisition.hit_quality.decide_hits import decide_stored_hits
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
@@ -41,7 +42,7 @@ class VerdictRequest(NamedTuple):
 
 def rebuild_history(logbook: Logbook, workers: Workers, progress: RebuildProgress = lambda _done, _of: None) -> int:
     """Rebuild history.rows and return its number of rows. The result does not depend on the workers."""
-    logbook.folder.history_path.unlink(missing_ok=True)
+    delete(logbook.folder.history_path, missing_ok=True)
     toml = logbook.folder.toml_text
     if workers.use_other_processes:
         entries = [place.entry for place in logbook.files.places]

@@ -3,7 +3,6 @@
 import errno
 import hashlib
 import os
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -17,7 +16,7 @@ from typing import Self
 import msgspec
 
 from acquisition import DataError, HitDecision, Remark, TapTest, read_tap, write_tap
-from acquisition.file_io import make_folder, open_regular_file, read_regular_file, sync_folder
+from acquisition.file_io import delete_folder, make_folder, open_regular_file, read_regular_file, rename, sync_folder
 from acquisition.hit_quality.decide_hits import decide_stored_hits
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
@@ -361,7 +360,7 @@ class MachineFolder:
         hit_entries = journal_entries.make_hit_entries(tap.id, changes)
         answers = [make_entry("accept", tap=tap.id, code=code) for code in answered]
         self.journal.append(*hit_entries, entry.line, *answers, reading=reading)
-        shutil.rmtree(self.spool / tap.id, ignore_errors=True)
+        delete_folder(self.spool / tap.id)
         return entry
 
     def commit_files(self, files: Mapping[Path, TapEntry]) -> None:
@@ -374,7 +373,7 @@ class MachineFolder:
         """
         reading = self.refuse_damage()
         for temporary, entry in files.items():
-            temporary.replace(self.path / entry.file)
+            rename(temporary, self.path / entry.file)
         sync_folder(self.path / "taps")
         lines = (
             [*journal_entries.make_hit_entries(entry.id, entry.hit_decisions), entry.line] for entry in files.values()

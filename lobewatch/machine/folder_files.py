@@ -6,13 +6,14 @@ from importlib import resources
 from pathlib import Path
 
 from acquisition.errors import DataError, check_name
-from acquisition.file_io import atomic_write, make_folder
+from acquisition.file_io import check_file_name, make_folder
 from lobewatch.machine.journal.file_names import (
     CONFLICTS_FOLDER_NAME,
     JOURNAL_COPY_NAME,
     JOURNAL_NAME,
     list_foreign_names,
 )
+from lobewatch.machine.settings.toml import write_toml_text
 
 WATCHED_FILES = ("machine.toml", JOURNAL_NAME, JOURNAL_COPY_NAME, "taps", "cuts", CONFLICTS_FOLDER_NAME)
 """Names whose change means a change of the machine data."""
@@ -61,7 +62,7 @@ def make_machine_folder(folder: Path, template: str) -> Path:
     DataError
         If there is a machine.toml already.
     ValueError
-        If the name contains control characters.
+        If the name contains control characters, or Windows cannot store it.
 
     Examples
     --------
@@ -73,24 +74,25 @@ def make_machine_folder(folder: Path, template: str) -> Path:
     >>> machine.machine.name, [program.name for program in machine.program]
     ('mill-3', ['A: slot at 12 600 rpm', 'B: slot at 6 200 rpm', 'C: slot at 16 000 rpm'])
     """
-    return write_machine_file(folder, make_machine_text(folder, template))
+    text, toml = make_machine_text(folder, template), folder / "machine.toml"
+    make_folder(folder)
+    write_toml_text(toml, text)
+    return toml
 
 
 def make_machine_text(folder: Path, template: str) -> str:
     """Return the text of a new machine.toml; DataError if there is one already."""
     name = folder.resolve().name or "machine"  # the root of a disk has no name
     check_name(name, "folder")
-    toml = folder / "machine.toml"
-    if toml.exists():
-        raise DataError(f"{toml}: file already exists. Choose another folder, or edit this file.")
+    check_file_name(folder.resolve())
+    refuse_machine_file(folder)
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
     quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
     return text.replace('"MACHINE_NAME"', quoted)
 
 
-def write_machine_file(folder: Path, text: str) -> Path:
-    """Write the machine.toml of a folder, which is made if necessary."""
-    make_folder(folder)
+def refuse_machine_file(folder: Path) -> None:
+    """Raise DataError if the folder has a machine.toml already."""
     toml = folder / "machine.toml"
-    atomic_write(toml, text.encode())
-    return toml
+    if toml.exists():
+        raise DataError(f"{toml}: file already exists. Choose another folder, or edit this file.")

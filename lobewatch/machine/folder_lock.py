@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -17,7 +18,14 @@ from filelock import lock_descriptor
 
 from acquisition import DataError
 from acquisition.errors import PERMISSION_ERRNOS, join_sentences
-from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, make_folder, read_regular_file
+from acquisition.file_io import (
+    MAX_SETTINGS_FILE_SIZE,
+    atomic_write,
+    delete,
+    make_folder,
+    read_regular_file,
+    retry_while_in_use,
+)
 
 LOCK_NAME, LOCK_HOLDER_NAME = ".lock", ".lock.holder"
 """Names of the locked file, and of the file that tells who holds the lock: some systems cannot read a locked file."""
@@ -25,6 +33,8 @@ LOCK_TIMEOUT = 5.0
 """Time to wait for another program (s), as SQLite in Python."""
 LOCK_POLL_INTERVAL = 0.01
 """Time between two attempts (s)."""
+MIN_LEFTOVER_AGE = 3600.0
+"""Age from which a half-written file belongs to a killed program (s); chosen."""
 
 
 class BusyError(DataError):
@@ -70,9 +80,8 @@ class FolderLock:
             return
         with contextlib.ExitStack() as stack:
             self._acquire(patience, stack)
+            self._remove_leftovers()
             with contextlib.suppress(OSError):  # the lock holds without it
-                for left_over in self._folder.glob(f".{LOCK_HOLDER_NAME}.*.tmp"):  # by a power cut
-                    left_over.unlink()
                 atomic_write(self._holder, msgspec.json.encode(LockHolder.current()), lasting=False)
             self._thread.holds = True
             try:
@@ -80,12 +89,21 @@ class FolderLock:
             finally:
                 self._thread.holds = False
                 with contextlib.suppress(OSError):
-                    self._holder.unlink(missing_ok=True)
+                    delete(self._holder, missing_ok=True)
+
+    def _remove_leftovers(self) -> None:
+        """Remove half-written files of killed programs. Only the owner of the lock writes the name of its holder."""
+        for path in self._folder.glob(f".*.{'[0-9a-f]' * 8}.tmp"):
+            with contextlib.suppress(OSError):  # another program has removed it
+                is_holder = path.name.startswith(f".{LOCK_HOLDER_NAME}.")
+                if is_holder or time.time() - path.stat().st_mtime > MIN_LEFTOVER_AGE:
+                    path.unlink()
 
     def _acquire(self, patience: float, stack: contextlib.ExitStack) -> None:
         """Acquire the lock until the stack is closed; a missing folder, for example of a removed drive, is not made."""
         try:
-            handle = os.open(self._folder / LOCK_NAME, os.O_RDWR | os.O_CREAT, 0o644)
+            path = self._folder / LOCK_NAME
+            handle = retry_while_in_use(partial(os.open, path, os.O_RDWR | os.O_CREAT, 0o644))
             stack.callback(os.close, handle)
             self._wait(handle, patience)
         except (FileNotFoundError, NotADirectoryError) as error:
@@ -98,7 +116,7 @@ class FolderLock:
 
     def _wait(self, handle: int, patience: float) -> None:
         deadline = time.monotonic() + patience
-        while not lock_descriptor(handle, blocking=False):
+        while not retry_while_in_use(partial(lock_descriptor, handle, blocking=False)):
             if time.monotonic() >= deadline:
                 holder: object = "another lobewatch"
                 with contextlib.suppress(OSError, msgspec.MsgspecError):  # it has not written its name yet
@@ -138,7 +156,7 @@ class DiskReserve:
     def release(self) -> bool:
         """Release the space, and tell whether there was any; a file that stays is used by the next test."""
         try:
-            self._file.unlink()
+            delete(self._file)
         except OSError:
             return False
         return True

@@ -13,7 +13,6 @@ from acquisition import HitDecision, check_name
 from acquisition.file_io import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_files import write_machine_file
 from lobewatch.machine.journal import read_entries as lines
 from lobewatch.machine.journal.entries import CUT_LINE_KIND, CutEntry, RecordingFile
 from lobewatch.machine.journal.join_lines import find_open_contradictions, next_identity
@@ -25,6 +24,7 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, pars
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.machine.settings.setting_questions import find_all_questions, find_template_bearings
 from lobewatch.machine.settings.toml import TablePath, edit_toml
+from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
 from modal import ModeEdits
 
 TOOTH_FREQUENCY_TOLERANCE = 0.005
@@ -237,15 +237,18 @@ def save_program(folder: MachineFolder, program: ProgramTable) -> None:
     Name and tool come first, then all values that differ from the defaults. Raises ValueError for a used name,
     DataError if the file cannot be edited.
     """
-    with folder.locked():
-        current = MachineFolder(folder.path)
-        check_program_name(current.machine, program.name)
-        place = TablePath("program", len(current.machine.all_programs))
-        fields = msgspec.structs.fields(program)
-        values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
-        text = edit_toml(current.toml_text, place, {"name": program.name, "tool": program.tool} | values)
-        parse_machine_file(text, str(current.toml))
-        write_machine_file(current.path, text)
+    fields = msgspec.structs.fields(program)
+    values = {field.name: value for field in fields if (value := getattr(program, field.name)) != field.default}
+
+    def add_program(text: str) -> str:
+        machine = parse_machine_file(text, str(folder.toml))
+        check_program_name(machine, program.name)
+        place = TablePath("program", len(machine.all_programs))
+        text = edit_toml(text, place, {"name": program.name, "tool": program.tool} | values)
+        parse_machine_file(text, str(folder.toml))
+        return text
+
+    change_machine_file(folder.path, add_program)
 
 
 def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
@@ -253,8 +256,22 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
 
     Raises ValueError, and writes nothing, if there is no question about a key.
     """
-    template = find_template_bearings(folder.machine)
-    questions = [*find_all_questions(folder.machine), *([template] if template else [])]
+    accepted = list[str]()
+
+    def accept(text: str) -> str:
+        machine = parse_machine_file(text, str(folder.toml))
+        accepted[:] = _find_statements(machine, keys)
+        known = [*machine.machine.accepted, *dict.fromkeys(accepted)]
+        return edit_toml(text, TablePath("machine"), {"accepted": known})
+
+    change_machine_file(folder.path, accept)
+    return accepted
+
+
+def _find_statements(machine: Machine, keys: Sequence[str]) -> list[str]:
+    """Return the statements of the open questions about some keys."""
+    template = find_template_bearings(machine)
+    questions = [*find_all_questions(machine), *([template] if template else [])]
     accepted = list[str]()
     for key in keys:
         statements = [question.statement for question in questions if key in (question.key, question.statement)]
@@ -262,6 +279,4 @@ def accept_settings(folder: MachineFolder, keys: Sequence[str]) -> list[str]:
             listed = ", ".join(question.statement for question in questions) or "none"
             raise ValueError(f"accept_settings.keys {key} answers no open question. Open questions: {listed}.")
         accepted += statements
-    known = [*folder.machine.machine.accepted, *dict.fromkeys(accepted)]
-    write_machine_file(folder.path, edit_toml(folder.toml_text, TablePath("machine"), {"accepted": known}))
     return accepted

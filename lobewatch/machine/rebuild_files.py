@@ -9,7 +9,7 @@ from typing import Any
 
 from acquisition import DataError, Remark, read_tap
 from acquisition.errors import join_sentences
-from acquisition.file_io import IrregularFileError, atomic_write, read_regular_file
+from acquisition.file_io import IrregularFileError, atomic_write, delete, read_regular_file, rename
 from acquisition.files.cut_file import read_cut_signal
 from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
@@ -23,6 +23,7 @@ from lobewatch.machine.journal.journal import Journal, JournalReading, format_co
 from lobewatch.machine.journal.sync_conflicts import is_hdf5_file, read_given_up_lines
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
+from lobewatch.machine.settings.toml import write_toml_text
 
 LOST_ENTRIES_ADVICE = (
     "Enter lost decisions on hits, events, exclusions, accepted questions and cuts judged by ear again "
@@ -170,7 +171,7 @@ def _restore_misplaced(
             if (folder / entry.file).exists():
                 _move_to_damaged(folder, folder / entry.file)
             atomic_write(folder / entry.file, aside.read_bytes())
-            aside.unlink()
+            delete(aside)
             yield f"{entry.file}: file restored under its own name"
         else:
             yield f"{aside.relative_to(folder).as_posix()}: set aside as a copy of {entry.file}"
@@ -189,7 +190,7 @@ def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: l
             report.append(_set_aside(folder, path))
             continue
         if path.name != f"{entry.id}.h5":
-            path.rename(folder / entry.file)
+            rename(path, folder / entry.file)
         entries.append(entry)
     return entries
 
@@ -226,7 +227,7 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
     for entry in sorted(sound, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
-            atomic_write(toml, text.encode())
+            write_toml_text(toml, text)
             yield f"machine.toml: restored from the copy in {entry.file}"
             return
     raise DataError(f"{toml}: missing, and no tap test has a copy. Restore this file from a backup.")

@@ -11,7 +11,7 @@ import msgspec
 
 from acquisition import DataError
 from acquisition.errors import join_sentences
-from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, read_regular_file
+from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, atomic_write, delete, read_regular_file
 from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
 
@@ -151,7 +151,7 @@ def deliver_messages(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]])
                 atomic_write(folder / OUTBOX_FILE, message)
     for folder in (folder for broker in pending.keys() - failures.keys() for folder in pending[broker]):
         with contextlib.suppress(OSError):
-            (folder / OUTBOX_FILE).unlink(missing_ok=True)
+            delete(folder / OUTBOX_FILE, missing_ok=True)
     return failures
 
 

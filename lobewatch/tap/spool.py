@@ -13,7 +13,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
-from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, IrregularFileError, read_regular_file
+from acquisition.file_io import (
+    MAX_SETTINGS_FILE_SIZE,
+    IrregularFileError,
+    delete,
+    read_regular_file,
+    rename,
+    retry_while_in_use,
+)
 from acquisition.files.hdf5_file import has_valid_checksum
 from acquisition.files.tap_file import read_hit_name
 from lobewatch.machine.folder import MachineFolder
@@ -21,7 +28,7 @@ from lobewatch.machine.journal.unverified_tap import has_readable_hits
 
 MAX_RESUME_AGE = timedelta(hours=12)
 """Age up to which an interrupted test is resumed."""
-TEMPORARY_FILE_PATTERNS = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp", ".lock.holder.*.tmp")
+TEMPORARY_FILE_PATTERNS = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
 """Temporary file names of what is written under the lock."""
 SETUP_FILE_NAME = "setup.json"
 """File with the trigger settings of a test."""
@@ -94,14 +101,14 @@ def clean_spool(folder: MachineFolder) -> None:
     Half-written files that programs without the lock may be writing stay.
     """
     for path in [path for names in TEMPORARY_FILE_PATTERNS for path in folder.path.glob(names)]:
-        path.unlink(missing_ok=True)
+        delete(path, missing_ok=True)
     spool = folder.spool
     for path in sorted(spool.iterdir()) if spool.is_dir() else []:
         if path.is_dir():
             if [file.name for file in path.iterdir()] == [SETUP_FILE_NAME]:
-                (path / SETUP_FILE_NAME).unlink()
+                delete(path / SETUP_FILE_NAME)
             with contextlib.suppress(OSError):  # it is not empty
-                path.rmdir()
+                retry_while_in_use(path.rmdir)
 
 
 def _compute_crc(fields: object) -> int:
@@ -130,4 +137,4 @@ def _set_aside(path: Path) -> Path:
     while (aside := path.parent.with_name(f"{name}.damaged")).exists():
         number += 1
         name = f"{path.parent.name}-{path.name}.{number}"
-    return path.replace(aside)
+    return rename(path, aside)

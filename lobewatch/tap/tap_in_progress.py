@@ -1,7 +1,6 @@
 """A tap test in progress: its hits, their mean, set-up and cross FRF."""
 
 import errno
-import shutil
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -25,7 +24,7 @@ from acquisition import (
     write_hit,
 )
 from acquisition.errors import format_os_error, join_sentences
-from acquisition.file_io import make_folder
+from acquisition.file_io import delete_folder, make_folder
 from acquisition.hit_quality.best_hits import choose_best_hits
 from acquisition.hit_quality.decide_hits import add_decisions
 from acquisition.hit_quality.evaluate_hit import evaluate_spectrum
@@ -298,7 +297,7 @@ def _remove_committed(folder: MachineFolder) -> None:
     stored = {entry.id for entry in folder.taps()} if begun else set[str]()
     for path in begun:
         if path.name in stored:
-            shutil.rmtree(path, ignore_errors=True)
+            delete_folder(path)
 
 
 def _find_interrupted(new: TapInProgress, resume: bool) -> TapInProgress | None:

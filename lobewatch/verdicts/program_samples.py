@@ -28,6 +28,8 @@ ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD = 1.0, 0.30
 
 The prior of the learning starts 10 % higher (`ROTATING_FORCE_PRIOR`), since cuts correct it. Nothing corrects the
 chatter risk computed here."""
+LISTED_FORCE_SPREAD = 0.10
+"""Standard deviation of Kt in the cut for a listed material, whose joint distribution holds cuts of others; chosen."""
 FREQUENCY_MARGIN, N_MARGIN_SPEEDS = 0.003, 7
 """Relative frequency margin checked in addition to the speed uncertainty, and number of speeds checked."""
 N_CUT_COMPARISON_SAMPLES, CUT_DIFFERENCE_FACTOR = 24, 3.0
@@ -264,6 +266,11 @@ def draw_samples(case: ProgramCase, worst: WorstLimit) -> ProgramSamples:
     return ProgramSamples(rows, cuts, limits[order], finer, case.uncertainty, drop)
 
 
+def force_spread(uncertainty: Uncertainty) -> float:
+    """Return the relative standard deviation of Kt in the cut beyond the uncertainty of its value."""
+    return ROTATING_FORCE_SPREAD if uncertainty.joint is None else LISTED_FORCE_SPREAD
+
+
 def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) -> ProgramSamples:
     """Vary the samples by plausible differences between a spindle at rest and a cutting one: drop, zeta, K, Kt."""
     rows, random = samples.at_speed().rows, np.random.default_rng(seed)
@@ -272,7 +279,7 @@ def draw_rotating_samples(samples: ProgramSamples, seed: int = ROTATING_SEED) ->
     def factor(median: float, spread: float, normal: Floats) -> Floats:
         return np.asarray(np.maximum(median * (1 + spread * normal), MIN_ROTATING_FACTOR * median)[:, np.newaxis])
 
-    push = factor(ROTATING_FORCE_FACTOR, ROTATING_FORCE_SPREAD, force)[:, 0]
+    push = factor(ROTATING_FORCE_FACTOR, force_spread(samples.uncertainty), force)[:, 0]
     zeta, k = factor(*ROTATING_DAMPING_FACTOR, damping), factor(*ROTATING_STIFFNESS_FACTOR, stiffness)
     changed = scale_fields(rows, damping_ratio=zeta, stiffness=k, tangential=push, radial=push)
     return replace(samples, rows=changed)

@@ -10,6 +10,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from lobes import MillingRows
+from lobes.coefficient_distribution import JointCoefficients
+from lobes.materials import find_joint_coefficients
 from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable, ToolWear, UncertaintyTable
 from lobewatch.tool.assembly import Assembly
@@ -92,12 +94,14 @@ class Uncertainty:
     ratio: FactorRange
     """Range of Kr/Kt, the direction of the force, over the median."""
     wear: float = 1.0
-    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the
-    least is 1."""
+    """Largest factor on both cutting coefficients by edges that are no longer new; the least is 1. Drawn with the
+    largest Kt, and apart from it for a listed material, whose sources are of sharp edges."""
     axes: PrincipalDirections | None = None
     """Principal directions of the modes and their open signs; None if they are known."""
     learned: LearnedSamples | None = None
     """Posterior samples of test cuts, used instead of the half-widths; None if nothing was learned."""
+    joint: JointCoefficients | None = None
+    """Joint distribution of Kt and Kr/Kt over their medians, of a listed material; None: even within the ranges."""
 
     def __post_init__(self) -> None:
         """Reject causes without a record in `UNCERTAINTY_CAUSES`."""
@@ -110,6 +114,14 @@ class Uncertainty:
         across = [causes.CROSS.name] if self.axes is not None and self.axes.are_uncertain else []
         worn = [causes.WEAR.name] if self.wear > 1 else []
         return (*self.modes, *across, causes.SPEED.name, causes.COEFFICIENTS.name, *worn)
+
+    def coefficient_factors(self, even: Floats) -> tuple[Floats, Floats]:
+        """Return factors of Kt and Kr/Kt for independent even probabilities (2, r), shape (r,) each."""
+        if self.joint is not None:
+            return self.joint.at(even)
+        spans = zip((self.tangential, self.ratio), even, strict=True)
+        tangential, ratio = (span.low + (span.high - span.low) * share for span, share in spans)
+        return tangential, ratio
 
     def sample(self, median: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Sample systems within the uncertainty, reproducible by seed.
@@ -143,9 +155,10 @@ class Uncertainty:
             rows = replace(rows, vector=self.axes.sample(count, seed))
         if self.wear == 1 or without == causes.WEAR.name:
             return rows
-        worn = np.empty(count)
-        worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
-        return scale_fields(rows, tangential=worn, radial=worn)
+        worn, order = np.linspace(1, self.wear, count), np.arange(count)
+        if self.joint is None:
+            order[np.argsort(rows.tangential, kind="stable")] = np.arange(count)
+        return scale_fields(rows, tangential=worn[order], radial=worn[order])
 
     def _sample_modes(self, rows: MillingRows, random: np.random.Generator, seed: int, without: str) -> MillingRows:
         phases = np.random.default_rng((seed, 1))
@@ -163,8 +176,7 @@ class Uncertainty:
         return replace(rows, phase=np.clip(rows.phase + turned, -MAX_MODE_PHASE, MAX_MODE_PHASE))
 
     def _sample_coefficients(self, rows: MillingRows, random: np.random.Generator, without: str) -> MillingRows:
-        spans = self.tangential, self.ratio
-        tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, len(rows)) for span in spans)
+        tangential, ratio = self.coefficient_factors(random.uniform(0, 1, (2, len(rows))))
         if without == causes.COEFFICIENTS.name:
             return rows
         push = np.maximum(tangential, MIN_SAMPLE_FACTOR)
@@ -189,10 +201,11 @@ def uncertainty_of(assembly: Assembly, table: CutTable, machine: Machine) -> Unc
         Half-widths by cause, and ranges of the cutting coefficients.
     """
     mixing = np.array([_tap_correlation(mode) for mode in (*(assembly.x or ()), *(assembly.y or ()))])
-    speed, ranges = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
+    speed, (tangential, ratio, joint) = machine.doubt.speed_percent / 100, _coefficient_ranges(table, machine)
     given = table.wear if isinstance(table, ProgramTable) else None
     axes, wear = assembly.principal_directions, WEAR_FACTORS[given or machine.doubt.wear]
-    return Uncertainty(_mode_uncertainty(assembly, machine.doubt), mixing, speed, *ranges, wear, axes)
+    modes = _mode_uncertainty(assembly, machine.doubt)
+    return Uncertainty(modes, mixing, speed, tangential, ratio, wear, axes, joint=joint)
 
 
 def _mode_uncertainty(assembly: Assembly, given: UncertaintyTable) -> dict[str, Floats]:
@@ -240,12 +253,13 @@ def _tap_correlation(mode: Mode) -> Floats:
     return np.asarray((triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, np.newaxis]).T)
 
 
-def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange]:
-    """Return the ranges of Kt and Kr/Kt: published, else by [doubt]."""
-    median = machine.coefficients(table)
-    if median.tangential_range is None or median.ratio_range is None:
+def _coefficient_ranges(table: CutTable, machine: Machine) -> tuple[FactorRange, FactorRange, JointCoefficients | None]:
+    """Return the ranges of Kt and Kr/Kt, published, else by [doubt], and their joint distribution, over the medians."""
+    known = machine.coefficients(table)
+    if known.tangential_range is None or known.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
-        return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share)
-    ratio = median.radial / median.tangential
-    tangential = FactorRange(*(limit / median.tangential for limit in median.tangential_range))
-    return tangential, FactorRange(*(limit / ratio for limit in median.ratio_range))
+        return FactorRange(1 - share, 1 + share), FactorRange(1 - share, 1 + share), None
+    ratio, joint = known.radial / known.tangential, find_joint_coefficients(known)
+    tangential = FactorRange(*(limit / known.tangential for limit in known.tangential_range))
+    ratios = FactorRange(*(limit / ratio for limit in known.ratio_range))
+    return tangential, ratios, joint and joint.over(known.tangential, ratio)

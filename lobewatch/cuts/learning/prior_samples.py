@@ -1,10 +1,10 @@
 """Prior samples of the rotating spindle.
 
 f_n drops by the range of `[speed] drop_percent` (0 to 5 % if nothing is set), for each mode apart, as cuts tell modes
-apart. Standard deviations: zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1 +- 30 %, for each material.
-Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen: plausible, not measured. They are
-joined with the uncertainty of the program. Each number is a function of one that is standard normal, so that samples
-can be moved without leaving the prior out of sight.
+apart. Standard deviations: zeta x 1.1 +- 25 %, K +- 10 %, for x and y apart; Kt x 1.1 +- 30 % (10 % if listed), for
+each material. Kr/Kt may be anything from 0 to 1, more likely what the program is doubted by. Chosen: plausible, not
+measured. They are joined with the uncertainty of the program. Each number is a function of one that is standard
+normal, so that samples can be moved without leaving the prior out of sight.
 """
 
 from dataclasses import dataclass, replace
@@ -14,15 +14,17 @@ import numpy as np
 import scipy
 
 from lobes import MillingRows
+from lobes.coefficient_distribution import Quantiles
 from lobewatch.arrays import Floats, Indices
 from lobewatch.verdicts import program_samples
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
-from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty, scale_fields
+from lobewatch.verdicts.uncertainty import Uncertainty, scale_fields
 
 ROTATING_FORCE_PRIOR = (1.1, program_samples.ROTATING_FORCE_SPREAD)
 """Mean and relative standard deviation of Kt at speed over that of the table; the mean is chosen.
 
-Damping and stiffness are those of the chatter risk of a verdict."""
+Listed materials have the standard deviation of `program_samples.force_spread`. Damping and stiffness are those of the
+chatter risk of a verdict."""
 DROP_SPREAD_SHARE, MIN_DROP_SPREAD = 0.8, 0.01
 """Standard deviation of the drop over half of its range, and at least, so that cuts may contradict it; chosen."""
 WIDE_FREQUENCY_SHARE, WIDE_FREQUENCY_FACTOR = 0.05, 3.0
@@ -88,11 +90,10 @@ class SpindleSamples:
 
     def force_factors(self, material: int) -> Floats:
         """Return the factors of Kt of a material, shape (r,)."""
-        first, rejected = self._material_index(material), self.uncertainty.tangential
-        at_speed, normal = self.normal[:, first : first + 2].T
-        force = rejected.low + (rejected.high - rejected.low) * scipy.special.ndtr(normal)
-        mean, spread = ROTATING_FORCE_PRIOR
-        return np.asarray(mean * np.maximum(1 + spread * at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
+        mean, spread = ROTATING_FORCE_PRIOR[0], program_samples.force_spread(self.uncertainty)
+        at_speed = 1 + spread * self.normal[:, self._material_index(material)]
+        force, _ = self.uncertainty.coefficient_factors(self._coefficient_shares(material))
+        return np.asarray(mean * np.maximum(at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
 
     def build_rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Build spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
@@ -136,9 +137,15 @@ class SpindleSamples:
 
     def _coefficient_factors(self, material: int, tangential: float, radial: float) -> tuple[Floats, Floats]:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""
-        direction = self.normal[:, self._material_index(material) + NUMBERS_PER_MATERIAL - 1]
-        ratio = _force_ratio_factors(scipy.special.ndtr(direction), self.uncertainty.ratio, radial / tangential)
-        return self.force_factors(material), np.maximum(ratio, 0.0)
+        quantiles, shares = _ratio_quantiles(self.uncertainty, radial / tangential), self._coefficient_shares(material)
+        joint = self.uncertainty.joint
+        share = shares[1] if joint is None else joint.shares(shares)[1]
+        return self.force_factors(material), np.maximum(quantiles.at(share), 0.0)
+
+    def _coefficient_shares(self, material: int) -> Floats:
+        """Independent even probabilities of Kt and Kr/Kt of a material, shape (2, r)."""
+        first = self._material_index(material) + 1
+        return np.asarray(scipy.special.ndtr(self.normal[:, first : first + 2]).T)
 
 
 def sample_prior(
@@ -150,17 +157,14 @@ def sample_prior(
     return SpindleSamples(np.random.default_rng((seed, 2)).standard_normal(size), at_rest, uncertainty, drop)
 
 
-def _force_ratio_factors(share: Floats, rejected: FactorRange, median: float) -> Floats:
-    """Return factors of Kr/Kt at probabilities: uniform within its range, or with some probability from 0 to 1.
+def _ratio_quantiles(uncertainty: Uncertainty, median: float) -> Quantiles:
+    """Return the quantiles of the factors of Kr/Kt: published, or with some probability anywhere from 0 to 1.
 
-    Both are even, so that shares are straight lines between their ends; a Kr of 0 stays as uncertain.
+    A Kr of 0 stays as uncertain.
     """
-    if median <= 0:
-        return np.asarray(rejected.low + (rejected.high - rejected.low) * share)
-    ends = np.sort([rejected.low, rejected.high, 0.0, 1 / median])
-    width = max(rejected.high - rejected.low, 1e-9)
-    near, anywhere = np.clip((ends - rejected.low) / width, 0, 1), np.clip(ends * median, 0, 1)
-    return np.asarray(np.interp(share, (1 - OPEN_FORCE_RATIO_SHARE) * near + OPEN_FORCE_RATIO_SHARE * anywhere, ends))
+    low, high = uncertainty.ratio
+    near = Quantiles.even(low, high) if uncertainty.joint is None else uncertainty.joint.ratio
+    return near if median <= 0 else near.mix(Quantiles.even(0.0, 1 / median), OPEN_FORCE_RATIO_SHARE)
 
 
 @cache

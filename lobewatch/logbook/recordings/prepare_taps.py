@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
 
 from acquisition import DataError, Description, Recording, Remark, TapTest
-from acquisition.file_io import make_folder
+from acquisition.file_io import delete, make_folder
 from acquisition.files.tap_file import encode_tap, round_as_stored
 from lobewatch.logbook.recordings.recorded_files import (
     MachineContext,
@@ -218,7 +218,7 @@ def prepare_all_taps(
 def remove_prepared_files(folder: MachineFolder) -> None:
     """Remove prepared tap files that were not stored. Call it under the lock."""
     for path in (folder.path / "taps").glob(".*.h5.ready"):
-        path.unlink()
+        delete(path)
 
 
 def prepared_path(folder: MachineFolder, draft: TapDraft) -> Path:

@@ -8,7 +8,7 @@ import re
 from itertools import chain, count
 from pathlib import Path
 
-from acquisition.file_io import make_folder
+from acquisition.file_io import make_folder, rename
 
 JOURNAL_NAME = "journal.jsonl"
 JOURNAL_COPY_NAME = "journal.copy.jsonl"
@@ -51,4 +51,4 @@ def move_aside(folder: Path, path: Path, aside_name: str) -> Path:
     make_folder(folder / aside_name)
     names = chain([path.name], (f"{path.name}.{number}" for number in count(1)))
     asides = (folder / aside_name / name for name in names)
-    return path.replace(next(aside for aside in asides if not aside.exists()))
+    return rename(path, next(aside for aside in asides if not aside.exists()))

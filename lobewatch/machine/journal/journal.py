@@ -24,7 +24,7 @@ import msgspec
 
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
 from acquisition.errors import join_sentences
-from acquisition.file_io import atomic_write, read_regular_file, sync_folder
+from acquisition.file_io import atomic_write, read_regular_file, rename, sync_folder
 from lobewatch.machine.journal.file_names import JOURNAL_COPY_NAME, JOURNAL_NAME
 from lobewatch.machine.journal.line_formats import (
     BATCH_KEY,
@@ -240,7 +240,7 @@ class Journal:
         if is_broken or journal.chain[:both] == copy.chain[:both]:
             return None
         names = (self.copy_path.with_name(f"{JOURNAL_COPY_NAME}.{number}.other") for number in count(1))
-        other = self.copy_path.rename(next(path for path in names if not path.exists()))
+        other = rename(self.copy_path, next(path for path in names if not path.exists()))
         atomic_write(self.copy_path, journal.chain_bytes)
         return other
 

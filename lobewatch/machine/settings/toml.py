@@ -4,11 +4,13 @@ import contextlib
 import copy
 import difflib
 import json
+import os
 import re
 import tomllib
 import typing
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -16,7 +18,7 @@ from msgspec import Meta, Struct
 
 from acquisition import DataError, check_name
 from acquisition.errors import join_sentences
-from acquisition.file_io import read_regular_file
+from acquisition.file_io import atomic_write, read_regular_file
 from lobewatch.machine.settings.number_text import SEPARATED_NUMBER_PATTERN, format_number, list_readings
 
 Positive = Annotated[float, Meta(gt=0, le=1e12)]
@@ -152,15 +154,46 @@ DOTTED_KEY_PATTERN = re.compile(r"""(?:(?:(?<![\w-])[\w-]++|"[^"\n]*"|'[^'\n]*')
 """Key with too many parts, whose parsing time grows with the square of their number."""
 
 
+LINE_END_PATTERN = re.compile(r"\r\n|\r|\n")
+"""Line ends of Windows, of old Macs and of Unix."""
+
+
 def read_toml_text(path: Path) -> str:
-    """Read the text of a machine file with unified line ends.
+    """Read the text of a machine file with unified line ends and without a byte order mark.
 
     Raises DataError for invalid UTF-8, OSError for a file that is too large or cannot be read.
     """
+    return LINE_END_PATTERN.sub("\n", _read_text(path).removeprefix("\ufeff"))
+
+
+def _read_text(path: Path) -> str:
     try:
-        return read_regular_file(path, MAX_TOML_BYTES).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+        return read_regular_file(path, MAX_TOML_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise DataError(f"{path}: invalid UTF-8 at byte {error.start}. Save the file as UTF-8.") from error
+
+
+def write_toml_text(path: Path, text: str) -> None:
+    """Write the text of a machine file, through a link to its target.
+
+    An existing file keeps its mode, its byte order mark and its line ends. A new line gets the first line end.
+    """
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    old = _read_text(target) if target.exists() else ""
+    mark = "\ufeff" if old.startswith("\ufeff") else ""
+    atomic_write(target, (mark + _restore_line_ends(text, old.removeprefix("\ufeff"))).encode())
+
+
+def _restore_line_ends(text: str, old: str) -> str:
+    """Return a text whose unchanged lines have the line ends of the old text, and the others its first line end."""
+    ends, lines = LINE_END_PATTERN.findall(old), text.split("\n")
+    new_ends = [*ends, "\n"][:1] * len(lines)
+    if len(set(ends)) > 1:
+        matcher = difflib.SequenceMatcher(None, LINE_END_PATTERN.split(old), lines, autojunk=False)
+        for _, begin, end, place, _ in matcher.get_opcodes():
+            kept = ends[begin:end]
+            new_ends[place : place + len(kept)] = kept
+    return "".join(chain.from_iterable(zip_longest(lines, new_ends[: len(lines) - 1], fillvalue="")))
 
 
 def parse_toml_tables(text: str) -> dict[str, Any]:
@@ -175,6 +208,41 @@ def parse_toml_tables(text: str) -> dict[str, Any]:
         raise ValueError(
             f"tables or lists are nested too deeply{line}. machine.toml needs at most four levels."
         ) from error
+
+
+class KeyConflict(NamedTuple):
+    """Key that somebody else changed after a person saw its value."""
+
+    key: str
+    """Place of the key, such as "program 'A' depth_mm"."""
+    present: Any
+    """Value in the file, None without one."""
+    wanted: Any
+    """Value to write, None to remove the key."""
+
+    def __str__(self) -> str:
+        present, wanted = ("nothing" if value is None else repr(value) for value in self[1:])
+        return f"{self.key} is now {present} in the file, and {wanted} in your answer"
+
+
+def find_key_conflicts(seen: str, present: str, wanted: str) -> list[KeyConflict]:
+    """Return the keys that differ in the text that a person has seen, in the present text and in the wanted text."""
+    old, now, new = (dict(_list_values(parse_toml_tables(text))) for text in (seen, present, wanted))
+    keys = [key for key in now | new if now.get(key) not in (old.get(key), new.get(key))]
+    return [KeyConflict(key, now.get(key), new.get(key)) for key in keys]
+
+
+def _list_values(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield all values of tables with their places. Tables of a list are told apart by their name or quantity."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _list_values(value, f"{place}{key} ")
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            names = [str(inner.get("name", inner.get("quantity", ""))) for inner in value]
+            for number, (name, inner) in enumerate(zip(names, value, strict=True)):
+                yield from _list_values(inner, f"{place}{key} {name!r}{' again' * names[:number].count(name)} ")
+        else:
+            yield f"{place}{key}", value
 
 
 TomlValue = str | bool | int | float | list[str] | None

@@ -1,6 +1,7 @@
 """Draft of machine.toml during setup: detected DAQs, questions and parsed answers."""
 
 from collections.abc import Callable, Mapping
+from contextvars import copy_context
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -90,6 +91,8 @@ class MachineDraft:
     """Present text."""
     detected_daqs: Mapping[str, DetectedDaq]
     """Inspected DAQs by port."""
+    edits: tuple[Callable[["MachineDraft"], "MachineDraft"], ...] = ()
+    """Edits that made the text."""
 
     def table(self, name: str, number: int | None = None) -> dict[str, Any]:
         """Return the values of a table; empty without one."""
@@ -135,6 +138,25 @@ class MachineDraft:
     def has_no_force_sensor(self) -> bool:
         """True if no hammer measures force."""
         return self.table("tap").get("hammer") == "none"
+
+    def change(self, edit: Callable[["MachineDraft"], "MachineDraft"]) -> "MachineDraft":
+        """Apply an edit, and keep it for `repeat_edits`, with the present units of lengths."""
+        context = copy_context()
+        return replace(edit(self), edits=(*self.edits, lambda draft: context.copy().run(edit, draft)))
+
+    def answer(self, question: "SetupQuestion", answer: str) -> "MachineDraft":
+        """Apply an answer. ValueError for an invalid one."""
+        return self.change(lambda draft: question.apply_answer(draft, answer).checked())
+
+    def repeat_edits(self, text: str) -> str:
+        """Return another text with the same edits. DataError if they do not fit this text."""
+        draft: MachineDraft = replace(self, text=text)
+        try:
+            for edit in self.edits:
+                draft = edit(draft)
+        except ValueError as error:
+            raise DataError(f"machine.toml has changed, and your answer no longer fits: {error}") from error
+        return draft.text
 
     def checked(self) -> Self:
         """Return itself; DataError if the text is no machine file."""

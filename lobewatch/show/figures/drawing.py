@@ -13,6 +13,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import LogFormatter
 from matplotlib.transforms import Bbox
 
+from acquisition.file_io import check_file_name
 from lobewatch.show.terminal.output import make_printable
 
 
@@ -44,6 +45,7 @@ def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure in the format of its file ending. ValueError for an unsupported ending."""
     if path.suffix.lower() not in (".svg", ".png", ".pdf"):
         raise ValueError(f"{path}: unsupported file type {path.suffix!r}. Use .svg, .png or .pdf.")
+    check_file_name(path)
     _disable_math_text(figure)
     with mpl.rc_context(FIGURE_STYLE):
         figure.savefig(path, dpi=150)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition import atomic_write
 from lobewatch.arrays import Floats
 from lobewatch.measurement.folder_shapes import FolderShapes, MeasuredPoint
 from lobewatch.measurement.point_table import PARTS
@@ -38,7 +39,7 @@ def save_shape_animation(found: FolderShapes, path: Path) -> None:
     svg = draw_shape_animation(found)
     title = f"<title>{_text(f'Mode shapes of {found.folder.name}')}</title>"
     page = f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">{title}</head><body>\n{svg}</body></html>\n'
-    path.write_text(svg if path.suffix.lower() == ".svg" else page, encoding="utf-8")
+    atomic_write(path, (svg if path.suffix.lower() == ".svg" else page).encode())
 
 
 def draw_shape_animation(found: FolderShapes) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquisition import DataError
 from acquisition.errors import join_sentences
-from acquisition.file_io import make_folder, sync_folder
+from acquisition.file_io import check_file_name, delete, make_folder, rename, sync_folder
 from lobewatch.arrays import Floats, Indices
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.machine.folder_lock import FolderLock
@@ -104,14 +104,15 @@ def write_table(tables: Iterable[TapTestTable], path: Path) -> ExportOutcome:
     if write is None:
         finding = f"{path}: unsupported file type {path.suffix!r}"
         raise DataError(join_sentences(finding, f"Use a name with the ending {', '.join(TABLE_WRITERS)}"))
+    check_file_name(path)
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         count = write(tables, temporary)
-        temporary.replace(path)
+        rename(temporary, path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        delete(temporary, missing_ok=True)
     return ExportOutcome(count, {"file": str(path)})
 
 
@@ -208,7 +209,7 @@ def append_months(tables: Iterable[TapTestTable], folder: Path) -> ExportOutcome
         make_folder(folder)
         with FolderLock(folder).hold(EXPORT_LOCK_WAIT):
             for left in folder.glob("month=*/.*.tmp"):  # of an export that was killed
-                left.unlink()
+                delete(left)
             _load_existing(base, folder)
             base.execute(MISSING_QUERY)
             months = base.execute("SELECT DISTINCT month FROM missing ORDER BY month").fetchall()
@@ -247,8 +248,8 @@ def _write_month(base: Any, folder: Path, month: str) -> int:
         count = write_parquet(base, lines, temporary)
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
-        temporary.replace(place / name)
+        rename(temporary, place / name)
     finally:
-        temporary.unlink(missing_ok=True)
+        delete(temporary, missing_ok=True)
     sync_folder(place)
     return count

@@ -3,17 +3,20 @@
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
 from acquisition.errors import join_sentences
 from lobes import Cut, CuttingCoefficients
-from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS
+from lobes.materials import CHIP_THICKNESS_RANGE, REFERENCE_CHIP_THICKNESS, find_joint_coefficients
 from lobewatch.machine.settings.drive_power import CutPower
 from lobewatch.show.terminal.output import JsonObject, new_table, pick
 
 MAX_MATERIALS_IN_FULL = 5
 """Largest number of materials that are shown with their sources."""
+JOINT_PROBABILITIES = np.array([0.05, 0.5, 0.95])
+"""Probabilities of the shown quantiles of Kt and Kr/Kt."""
 
 
 def material_json(material: CuttingCoefficients) -> JsonObject:
@@ -30,12 +33,35 @@ def material_json(material: CuttingCoefficients) -> JsonObject:
         "kr_n_per_mm2": material.radial / 1e6,
         "kr_over_kt": material.radial / material.tangential,
         "kr_over_kt_range": material.ratio_range,
+        "joint": _joint_json(material),
         "kte_n_per_mm": material.tangential_edge / 1e3,
         "kre_n_per_mm": material.radial_edge / 1e3,
         "chip_thickness_mm": REFERENCE_CHIP_THICKNESS * 1e3 if forces else None,
         "specific_forces": forces,
         **pick(material, "note", "source"),
     }
+
+
+def _joint_json(material: CuttingCoefficients) -> JsonObject | None:
+    """Return quantiles and correlation of Kt and Kr/Kt, None without a joint distribution."""
+    joint = find_joint_coefficients(material)
+    if joint is None:
+        return None
+    return {
+        "probabilities": JOINT_PROBABILITIES.tolist(),
+        "kt_n_per_mm2": (joint.tangential.at(JOINT_PROBABILITIES) / 1e6).tolist(),
+        "kr_over_kt": joint.ratio.at(JOINT_PROBABILITIES).tolist(),
+        "rank_correlation": joint.correlation,
+    }
+
+
+def _joint_text(material: CuttingCoefficients) -> Iterator[str]:
+    """Yield the 90 % intervals of Kt and Kr/Kt, if there is a joint distribution."""
+    joint = find_joint_coefficients(material)
+    if joint is not None:
+        (low, _, high), (least, _, most) = (each.at(JOINT_PROBABILITIES) for each in (joint.tangential, joint.ratio))
+        force, ratio = f"Kt {low / 1e6:.0f}..{high / 1e6:.0f} N/mm²", f"Kr/Kt {least:.2f}..{most:.2f}"
+        yield f"{material.material}, 90 % intervals: {force}, {ratio}. Rank correlation {joint.correlation:g}."
 
 
 def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | Table]:
@@ -47,7 +73,9 @@ def material_texts(materials: Sequence[CuttingCoefficients]) -> Iterator[str | T
     if is_short:
         yield "Range of Kr/Kt, Kte, other names and sources: lobewatch materials NAME, or --json"
     else:
-        yield from (f"{one.material}: {join_sentences(one.note, one.source)}" for one in materials)
+        for one in materials:
+            yield f"{one.material}: {join_sentences(one.note, one.source)}"
+            yield from _joint_text(one)
     if any(material.specific_forces for material in materials):
         thin, thick = (f"{chip * 1e3:g}" for chip in CHIP_THICKNESS_RANGE)
         yield (

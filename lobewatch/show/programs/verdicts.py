@@ -51,7 +51,8 @@ def uncertainty_json(uncertainty: Uncertainty) -> JsonObject:
     columns = {cause: (widths * [*units.values()]).T.tolist() for cause, widths in uncertainty.modes.items()}
     modes = {cause: dict(zip(units, values, strict=True)) for cause, values in columns.items()}
     ranges = {"tangential": uncertainty.tangential, "radial_over_tangential": uncertainty.ratio}
-    coefficients = {name: [factor.low - 1, factor.high - 1] for name, factor in ranges.items()}
+    coefficients: JsonObject = {name: [factor.low - 1, factor.high - 1] for name, factor in ranges.items()}
+    coefficients |= {} if uncertainty.joint is None else {"rank_correlation": uncertainty.joint.correlation}
     return modes | {"speed": uncertainty.speed, "coefficients": coefficients}
 
 

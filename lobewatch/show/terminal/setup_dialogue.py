@@ -2,12 +2,45 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from acquisition.errors import join_sentences
-from lobewatch.machine.settings.display_units import LENGTH
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.display_units import LENGTH, UnitSystem, shown_units
+from lobewatch.machine.settings.toml import KeyConflict
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
-from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
+from lobewatch.machine.setup_questions.machine_file_changes import change_machine_file
+from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS, find_setup_question
 from lobewatch.show.terminal.output import notes
+
+
+def change_settings(
+    machine: Path, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
+) -> MachineDraft:
+    """Write the answers to one question to machine.toml. A key that changed meanwhile is asked about, or refused."""
+    folder = MachineFolder(machine)
+    with folder.locked():  # a running tap test is named before the question
+        seen = folder.toml_text
+    draft = answer_settings(seen, answers, edit, asks, units)
+    change_machine_file(machine, draft.repeat_edits, seen, lambda conflicts: asks and confirm_overwriting(conflicts))
+    return draft
+
+
+def answer_settings(
+    text: str, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
+) -> MachineDraft:
+    """Make the draft of machine.toml from the answers in options and at the terminal."""
+    draft = MachineDraft(text, {})
+    draft = draft.change(lambda draft: draft.set("machine", units=units)) if units else draft
+    chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
+    if edit and not asks and edit not in answers:
+        raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
+    try:
+        with shown_units(draft.table("machine").get("units", "metric")):
+            return ask_questions(draft, chosen, answers) if asks else answer_questions(draft, answers)
+    except (EOFError, KeyboardInterrupt):
+        notes.print("\nno file was written")
+        raise KeyboardInterrupt from None
 
 
 def answer_questions(draft: MachineDraft, answers: Mapping[str, str]) -> MachineDraft:
@@ -43,7 +76,7 @@ def ask_questions(draft: MachineDraft, questions: Sequence[SetupQuestion], answe
 
 def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Mapping[str, str]) -> MachineDraft:
     try:
-        return question.apply_answer(draft, answers[question.name]).checked()
+        return draft.answer(question, answers[question.name])
     except ValueError as error:
         raise ValueError(f"--{question.name} {error}") from error
 
@@ -55,19 +88,33 @@ def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDr
     while True:
         current = question.read_current(draft)
         notes.print(f"    [{current}] > " if current else "    > ", end="", markup=False)
-        answer = input().strip() or current
+        typed = input().strip()
+        answer = typed or current
         if not answer:
             _print_notes("    An answer is required")
             continue
         try:
-            answered = question.apply_answer(draft, answer).checked()
+            answered = draft.answer(question, answer)
         except ValueError as error:
             _print_notes(f"    {str(error).removeprefix('machine.toml: ')}")
             continue
         look, kept = answered.daq, "The port is kept. Check the port with lobewatch ports"
         if question is DAQ_QUESTION and (text := join_sentences(look.problem, kept) if look.problem else look.text):
             _print_notes(f"    {text}")
-        return answered
+        is_kept = not typed and answered.text == draft.text
+        return replace(answered, edits=draft.edits) if is_kept else answered
+
+
+def confirm_overwriting(conflicts: Sequence[KeyConflict]) -> bool:
+    """Ask a person about keys that changed during the questions."""
+    _print_notes("\nAnother program or person changed machine.toml meanwhile:")
+    for conflict in conflicts:
+        _print_notes(f"    {conflict}")
+    notes.print("    Write your answer? [y/N] > ", end="", markup=False)
+    try:
+        return input().strip().casefold() in ("y", "yes")
+    except EOFError:
+        return False
 
 
 def _find_daqs(draft: MachineDraft) -> MachineDraft:

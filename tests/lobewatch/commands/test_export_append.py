@@ -174,6 +174,9 @@ def test_a_machine_that_cannot_be_read_keeps_its_lines(mills: Path, tmp_path: Pa
 
 def test_a_folder_of_any_name_and_machines_without_a_tap_test(shop: Shop, tmp_path: Path) -> None:
     fleet = tmp_path / "o'brien [a] *"
+    with pytest.raises(ValueError, match="Windows"):
+        export(shop.path, "--append", fleet)
+    fleet.mkdir()
     assert export(shop.path, "--append", fleet)["tap_tests"] == 0
     shop.tap(0, 1713.0)
     assert [export(shop.path, "--append", fleet)["added"] for _ in range(2)] == [1, 0]

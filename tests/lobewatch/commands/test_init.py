@@ -10,7 +10,9 @@ import pytest
 
 from acquisition import find_driver
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.setup_questions.draft import MachineDraft
 from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS
+from lobewatch.show.terminal.setup_dialogue import answer_questions
 from lobewatch.tap.emulated_spindle import emulate_machine
 from tests.lobewatch.commands.conftest import Run, refused
 from tests.lobewatch.commands.pty_talk import Terminal
@@ -125,6 +127,59 @@ def test_one_question_is_asked_again_and_comments_and_order_stay(run: Run, tmp_p
     assert tables()["drive"] == {}
     assert run("init", "mill-3", "--edit", "tool", "--tool", "4 16 30 hss").code == 0
     assert tables()["tool"] == [{"name": "reference", "tool_material": "HSS"}]
+
+
+PROGRAM = """
+[[program]]
+name = "{name}"
+tool = "reference"
+speed_rpm = 5000
+depth_mm = 1
+teeth = 4
+tool_diameter_mm = 16
+radial_depth_mm = 16
+direction = "down"
+material = "42CrMo4"
+"""
+
+
+def test_programs_written_during_the_question_stay_and_a_changed_key_is_asked_about(run: Run, tmp_path: Path) -> None:
+    run("init", "mill-3", "--yes", *options(ANSWERS))
+    toml = Path("mill-3/machine.toml")
+    with Terminal(tmp_path, "init", "mill-3", "--edit", "drive") as person:
+        person.wait_for("> ")
+        toml.write_text(toml.read_text("utf-8") + PROGRAM.format(name="B") + PROGRAM.format(name="C"), "utf-8")
+        assert run("init", "mill-3", "--edit", "drive", "--drive", "18 40").code == 0
+        person.type("22 60\n")
+        question = person.answer("y")
+        assert "drive power_kw" in question
+        assert "18" in question
+        assert "22" in question
+        assert "torque_nm" not in question
+        assert person.end() == 0
+    assert tables()["drive"] == {"power_kw": 22, "torque_nm": 60}
+    assert [program["name"] for program in tables()["program"]] == ["slot", "B", "C"]
+
+
+def test_where_nobody_can_be_asked_both_values_are_named_and_nothing_is_written(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run("init", "mill-3", "--yes", *options(ANSWERS))
+    toml = Path("mill-3/machine.toml")
+
+    def answer_late(*arguments: Any) -> MachineDraft:
+        toml.write_text(toml.read_text("utf-8").replace("power_kw = 15", "power_kw = 18"), "utf-8")
+        return answer_questions(*arguments)
+
+    monkeypatch.setattr("lobewatch.show.terminal.setup_dialogue.answer_questions", answer_late)
+    refused(run("init", "mill-3", "--edit", "drive", "--drive", "22 40"), "drive power_kw", "18", "22")
+    assert tables()["drive"] == {"power_kw": 18, "torque_nm": 40}
+
+
+@pytest.mark.parametrize("name", ["CON", "a:b", "mill.", "nul/mill"])
+def test_a_folder_that_windows_cannot_store_is_not_made(run: Run, name: str) -> None:
+    refused(run("init", name), "Windows", "Choose a name")
+    assert [*Path().iterdir()] == []
 
 
 def test_a_conversation_knows_the_daq_and_takes_enter(run: Run, trial: MachineFolder, tmp_path: Path) -> None:

@@ -73,3 +73,15 @@ def test_a_name_that_nothing_has_is_reported_with_the_nearest(materials: Materia
     code, out, err = materials("42CrMo5", "--json")
     assert (code, out) == (2, "")
     assert re.search("'42CrMo5'.*'42CrMo4'", err)
+
+
+@pytest.mark.quick
+def test_quantiles_and_correlation_of_a_listed_material_are_shown(materials: Materials) -> None:
+    """Upper 5 % of TiAl6V4 by hand: all of it in the last fifth of the largest of four sources of equal weight."""
+    titanium = json.loads(materials("TiAl6V4", "--json")[1])["materials"][0]["joint"]
+    low, high = (0.78 * 2110 * chip**-0.22 for chip in (0.2, 0.05))
+    assert titanium["probabilities"] == [0.05, 0.5, 0.95]
+    assert titanium["kt_n_per_mm2"][2] == pytest.approx(high - 4 * 0.05 * (high - low))
+    assert titanium["kr_over_kt"] == pytest.approx([0.154, 0.28, 0.532])
+    assert titanium["rank_correlation"] == 0.4
+    assert json.loads(materials("Steel (textbook)", "--json")[1])["materials"][0]["joint"] is None

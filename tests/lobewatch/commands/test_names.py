@@ -6,6 +6,7 @@ import csv
 import gzip
 import io
 import json
+import re
 import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime
@@ -93,13 +94,14 @@ def test_no_name_runs_in_a_spreadsheet(run: Run, folder: MachineFolder) -> None:
     "name",
     ['3/8" mill', "cost $5 to $6", r"C:\mills", "Fräse ø 20, 主轴", "[/bold] mill", "a 'b' \"c\"", "ends in \\"],
 )
-def test_init_keeps_the_name_of_the_folder(run: Run, name: str) -> None:
-    place = name.replace("/", ":")
+def test_init_keeps_the_name_of_the_machine_and_of_a_folder_that_windows_can_store(run: Run, name: str) -> None:
+    place = re.sub(r'[<>:"|?*\\/]', "_", name)
     said = run("init", place)
     assert said.code == 0, said.err
     assert f"{Path(place)}/machine.toml" in said.out
     assert MachineFolder(place).machine.machine.name == place
-    assert json.loads(run("init", f"{place} 2", "--json").out)["machine"] == f"{place} 2"
+    assert json.loads(run("init", f"{place} 2", "--name", name, "--json").out)["machine"] == f"{place} 2"
+    assert MachineFolder(f"{place} 2").machine.machine.name == name
 
 
 @pytest.mark.parametrize("name", [f"mill{CLEAR}", "two\nlines", "tab\tbed", "bell\x07", "csi\x9b2J", "half\udce4"])

@@ -17,7 +17,7 @@ import pytest
 from acquisition import DataError
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
-from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME
+from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME, MIN_LEFTOVER_AGE
 
 HOLD = """
 import sys, time
@@ -127,6 +127,34 @@ def test_held_twice_it_is_held_until_the_outer_end(folder: MachineFolder) -> Non
             MachineFolder(folder.path).locked(patience=0).__enter__()
     with MachineFolder(folder.path).locked(patience=0):
         pass
+
+
+def test_half_written_files_of_killed_programs_are_removed_by_the_next_owner(folder: MachineFolder) -> None:
+    names = ["..lock.holder.0123abcd.tmp", ".machine.toml.0123abcd.tmp", ".report.html.89abcdef.tmp", ".mine.tmp"]
+    for name in names:
+        (folder.path / name).write_bytes(b"half")
+        os.utime(folder.path / name, (time.time() - MIN_LEFTOVER_AGE - 1,) * 2)
+    os.utime(folder.path / names[2])  # a program without the lock is still writing this one
+    with folder.locked():
+        assert {path.name for path in folder.path.glob(".*.tmp")} == {names[2], names[3]}
+
+
+def test_a_lock_that_windows_refuses_for_a_moment_is_tried_again(
+    folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refusals, real = [5, 32, 33], os.open
+
+    def refuse(path: Path, *arguments: int) -> int:
+        if str(path).endswith(LOCK_NAME) and refusals:
+            error = PermissionError(13, "Access is denied", path)
+            error.winerror = refusals.pop()  # type: ignore[attr-defined]
+            raise error
+        return real(path, *arguments)
+
+    monkeypatch.setattr(os, "open", refuse)
+    monkeypatch.setattr("acquisition.file_io.time.sleep", lambda _: None)
+    with folder.locked(patience=0):
+        assert not refusals
 
 
 def test_ctrl_c_ends_the_waiting(folder: MachineFolder) -> None:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
+from scipy.stats import spearmanr
 
-from lobes import Cut, MillingRows, Program
-from lobewatch.verdicts.program_samples import build_median_row
-from lobewatch.verdicts.uncertainty import LearnedSamples, uncertainty_of
+from lobes import Cut, MillingRows, Program, materials_by_name
+from lobes.materials import find_joint_coefficients
+from lobewatch.machine.settings.machine_file import parse_machine_file
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.program_samples import ProgramSamples, build_median_row, draw_rotating_samples
+from lobewatch.verdicts.uncertainty import LearnedSamples, Uncertainty, uncertainty_of
 from lobewatch.verdicts.uncertainty_causes import TEST_CUTS
 from modal import Mode
 from tests.lobewatch.conftest import Shop
@@ -67,3 +72,61 @@ def test_a_prediction_is_doubted_as_machine_toml_says(shop: Shop) -> None:
     percents = [given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent]
     assert widths[:, :3] == pytest.approx(np.tile(np.array(percents) / 100, (2, 1)))
     assert widths[:, 3] == pytest.approx([np.radians(10.0), 0.0])
+
+
+LISTED = (
+    '[machine]\nname = "m"\n[[program]]\nname = "listed"\nteeth = 4\nradial_depth_mm = 6\ntool_diameter_mm = 12\n'
+    'speed_rpm = 9000\ndepth_mm = 1\ndirection = "down"\nmaterial = "42CrMo4"\n'
+)
+STATED = "tangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 600\n"
+X, Y = [Mode(1700.0, 0.03, 3e7)], [Mode(1500.0, 0.02, 2e7)]
+TOOL = Assembly("reference", datetime(2026, 1, 1, tzinfo=UTC), "drawn", X, Y, ("x", "y"), None, {}, False, ())
+MEDIAN = build_median_row(Program(Cut(4, 0.5, "down", 1e9, 3e8), 9000.0, 1e-3), TOOL)
+
+
+def doubt_of_listed(more: str = "") -> Uncertainty:
+    """Return the uncertainty of a program in 42CrMo4 with more keys."""
+    machine = parse_machine_file(LISTED + more)
+    return uncertainty_of(TOOL, machine.program[0], machine)
+
+
+def test_kt_and_kr_of_a_listed_material_follow_its_joint_distribution() -> None:
+    doubt, known = doubt_of_listed(), materials_by_name()["42crmo4"]
+    rows, joint = doubt.sample(MEDIAN, 4000), find_joint_coefficients(known)
+    assert joint is not None
+    force = rows.tangential / MEDIAN.tangential * known.tangential
+    ratio = rows.radial / rows.tangential * MEDIAN.tangential / MEDIAN.radial * known.radial / known.tangential
+    shares = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    assert np.quantile(force, shares) == pytest.approx(joint.tangential.at(shares), rel=0.02)
+    assert np.quantile(ratio, shares) == pytest.approx(joint.ratio.at(shares), rel=0.04)
+    assert spearmanr(force, ratio).statistic == pytest.approx(joint.correlation, abs=0.05)
+
+
+def test_stated_coefficients_stay_even_within_their_percents_and_apart() -> None:
+    doubt = doubt_of_listed(STATED)
+    rows = doubt.sample(MEDIAN, 4000)
+    force, ratio = (
+        rows.tangential / MEDIAN.tangential,
+        rows.radial / rows.tangential * MEDIAN.tangential / MEDIAN.radial,
+    )
+    assert doubt.joint is None
+    assert np.quantile(force, [0, 0.5, 1]) == pytest.approx([0.8, 1.0, 1.2], abs=0.01)
+    assert np.quantile(ratio, [0, 0.5, 1]) == pytest.approx([0.8, 1.0, 1.2], abs=0.01)
+    assert abs(spearmanr(force, ratio).statistic) < 0.05
+
+
+@pytest.mark.parametrize(("stated", "correlation"), [("", 0.0), (STATED, 1.0)])
+def test_wear_of_a_listed_material_is_drawn_apart(stated: str, correlation: float) -> None:
+    doubt = doubt_of_listed('wear = "worn"\n' + stated)
+    sharp, worn = (doubt.sample(MEDIAN, 2000, without=cause).tangential for cause in ("wear", ""))
+    assert np.quantile(worn / sharp, [0, 0.5, 1]) == pytest.approx([1.0, 1.3, 1.6], abs=0.002)
+    assert spearmanr(worn / sharp, sharp).statistic == pytest.approx(correlation, abs=0.06)
+
+
+@pytest.mark.parametrize(("stated", "spread"), [("", 0.1), (STATED, 0.3)])
+def test_the_chance_of_chatter_varies_kt_of_a_listed_material_less(stated: str, spread: float) -> None:
+    doubt = doubt_of_listed(stated)
+    samples = ProgramSamples(doubt.sample(MEDIAN, 4000), (Cut(4, 1.0, "down", 1e9, 3e8),), np.full(1, np.inf), 1, doubt)
+    push = draw_rotating_samples(samples).rows.tangential / samples.rows.tangential
+    assert np.mean(push) == pytest.approx(1.0, abs=0.02)
+    assert np.std(push) == pytest.approx(spread, rel=0.05)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from lobes import build_milling_system, rows_at_speeds
+from lobes import build_milling_system, materials_by_name, rows_at_speeds
+from lobes.materials import find_joint_coefficients
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.verdicts.speed_drop import SpeedDrop
@@ -70,6 +71,24 @@ def test_kt_is_drawn_at_speed_and_as_uncertain() -> None:
     doubted = 0.8 + 0.4 * ndtr(1.0)
     assert ratios["tangential"] == pytest.approx([1.1 * 1.3, 1.1 * doubted, 1.1, 1.1 * 0.1])
     assert ratios["ratio"][:2] == pytest.approx(ratios["ratio"][[3, 3]])
+
+
+def test_a_listed_material_is_drawn_from_its_joint_distribution_and_10_percent_at_speed() -> None:
+    known = materials_by_name()["42crmo4"]
+    joint = find_joint_coefficients(known)
+    assert joint is not None
+    factors = joint.over(known.tangential, 5e8 / 1.4e9)
+    drawn = draws({6: 1.0}, {7: 1.0}, {8: 1.0}, {7: 1.0, 8: -1.0}, {7: 60.0})
+    ratios = replace(drawn, uncertainty=replace(drawn.uncertainty, joint=factors)).ratios()
+    middle, more, most = factors.tangential.at(np.array([0.5, ndtr(1.0), 1.0]))
+    expected = [1.1 * middle, more, middle, more, most]
+    assert ratios["tangential"] == pytest.approx(1.1 * np.array(expected))
+    weight = 2 * np.sin(np.pi * joint.correlation / 6)
+    normal = np.array([0.0, weight, np.sqrt(1 - weight**2), weight - np.sqrt(1 - weight**2)])
+    below = np.interp(ratios["ratio"], factors.ratio.values, factors.ratio.probabilities)
+    mixed = 0.7 * below + 0.3 * np.clip(ratios["ratio"] * 5 / 14, 0, 1)
+    assert mixed[:4] == pytest.approx(ndtr(normal))
+    assert np.all(np.isfinite(ratios["ratio"]))
 
 
 @pytest.mark.parametrize("span", [KR_OVER_KT, FactorRange(-0.2, 0.5), FactorRange(2.0, 4.0), FactorRange(1.0, 1.0)])

@@ -24,6 +24,7 @@ from lobewatch.machine.journal.journal import (
     format_command,
     scan_journal_file,
 )
+from lobewatch.machine.settings.machine_file import read_machine_file
 from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
 
 HEAD_BYTES = 65_536
@@ -149,8 +150,8 @@ def _inspect_journal(folder: Path, name: str, reading: JournalReading) -> Confli
 
 
 def _inspect_settings(folder: Path, name: str) -> ConflictFile | None:
-    machine, other = (_read_settings(folder / file)["machine"].get("name") for file in ("machine.toml", name))
-    if machine != other and "machine" not in Path(name).name.casefold():
+    machine, other = _read_settings(folder / "machine.toml")["machine"].get("name"), read_machine_file(folder / name)
+    if machine != other.machine.name and "machine" not in Path(name).name.casefold():
         return None
     found = list_setting_differences(folder, name)
     named = [*found[:MAX_NAMED_VALUES], *([f"{len(found) - MAX_NAMED_VALUES} more"] * bool(found[MAX_NAMED_VALUES:]))]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typer import Exit, Option
 
-from lobewatch.commands.shared_options import SpindleMachine
+from lobewatch.commands.shared_options import SpindleMachine, open_folder
 from lobewatch.show.terminal.output import Json, emit
 
 
@@ -60,13 +60,12 @@ def calibrate(
         return
     if not frequency or direction is not None:
         raise ValueError("Give --frequency without --direction, or --tool at least twice.")
-    from lobewatch.machine import MachineFolder
     from lobewatch.measurement import calibrate_model
     from lobewatch.show.models import model_calibration_json, model_calibration_texts
 
     _check_counts(len(frequency), frequency_std or [], mode or [])
     calibration = calibrate_model(
-        MachineFolder(machine).machine, frequency, frequency_std or [], mode or [], group or [], damping_ratio
+        open_folder(machine).machine, frequency, frequency_std or [], mode or [], group or [], damping_ratio
     )
     emit(model_calibration_json(calibration), as_json, *model_calibration_texts(calibration))
 
@@ -84,7 +83,7 @@ def _calibrate_from_tools(
     from lobewatch.logbook.joint_calibration import calibrate_joints
     from lobewatch.show.models import tools_json, tools_texts
 
-    calibration = calibrate_joints(Logbook.open(machine), tools, direction, mode)
+    calibration = calibrate_joints(Logbook(open_folder(machine)), tools, direction, mode)
     emit(tools_json(calibration), as_json, *tools_texts(calibration))
     raise Exit(int(calibration.fit.has_misfit))
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from typer import Exit
 
-from lobewatch.commands.shared_options import FolderArgument
+from lobewatch.commands.shared_options import FolderArgument, open_folder
 from lobewatch.show.terminal.output import Json, emit
 
 
@@ -22,10 +22,9 @@ def doctor(
       lobewatch doctor
       lobewatch doctor mill-3 --json
     """
-    from lobewatch.machine.folder import MachineFolder
     from lobewatch.sensors.computer_check import check_computer
     from lobewatch.show.sensors import findings_json, findings_texts
 
-    findings = check_computer(MachineFolder(machine) if machine else None)
+    findings = check_computer(open_folder(machine) if machine else None)
     emit(findings_json(findings), as_json, *findings_texts(findings))
     raise Exit(int(any(finding.state == "hinders" for finding in findings)))

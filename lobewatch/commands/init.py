@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import FolderArgument
+from lobewatch.commands.shared_options import FolderArgument, open_folder
 from lobewatch.machine.settings.display_units import UnitSystem
 from lobewatch.show.terminal.output import Json, emit, notes
 
@@ -69,6 +69,7 @@ def init(
         from lobewatch.show.terminal.setup_dialogue import answer_settings, change_settings
     draft: MachineDraft | None
     if edit:
+        open_folder(machine)
         draft = change_settings(machine, answers, edit, asks, units)
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")

@@ -1,7 +1,6 @@
 """Command `lobewatch modes`: modes of a recorded file."""
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -109,7 +108,7 @@ def modes(
         shared.reject_options(ctx, [*vars(file_options), *FIT_OPTIONS], "does not apply to a stored tap test")
         logbook, choice = Logbook.open(file), _resolve_edits(edits, by_fit)
         measured = [read_tap_modes(logbook, name) for name in beside or ()]
-        with nullcontext() if choice is None and not decisions else publish_on_change(logbook):
+        with publish_on_change(logbook):
             file_modes = read_tap_modes(logbook, tap, choice, decisions)
     elif by_fit or undo_hit or file.is_dir():
         raise _make_tap_error(file, "--by-fit" if by_fit else "--undo-hit" if undo_hit else "")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, BadParameter, Context, Option
 
@@ -18,6 +18,9 @@ from lobewatch.machine.settings.display_units import read_units, reads_inches, s
 from lobewatch.machine.settings.number_text import format_number, list_readings, read_number, read_numbers
 from lobewatch.show.terminal.output import notes
 
+if TYPE_CHECKING:
+    from lobewatch.machine import MachineFolder
+
 
 def find_recording(path: Path | None) -> Path:
     """Return the path of a machine folder or a recording; ValueError if it does not exist."""
@@ -26,6 +29,16 @@ def find_recording(path: Path | None) -> Path:
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder. Name a machine folder or a recorded cut.")
     return path
+
+
+def open_folder(path: Path) -> "MachineFolder":
+    """Open a machine folder, and name the files and entries of other computers in it."""
+    from lobewatch.machine import MachineFolder
+    from lobewatch.show.terminal.output import print_remarks
+
+    folder = MachineFolder(path)
+    print_remarks(folder.sync_remarks)
+    return folder
 
 
 def number(text: str | float) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from lobewatch.commands.shared_options import Machine
+from lobewatch.commands.shared_options import Machine, open_folder
 from lobewatch.show.terminal.output import Json, Listen, Token, WatchToken, notes, print_remarks, show_address
 
 if TYPE_CHECKING:
@@ -104,9 +104,8 @@ def tap(
 def _open_folder(path: Path) -> "MachineFolder":
     """Open a machine folder, and print a note if another folder next to it is a copy."""
     from lobewatch.fleet.copied_folders import find_copies
-    from lobewatch.machine import MachineFolder
 
-    folder = MachineFolder(path)
+    folder = open_folder(path)
     print_remarks(find_copies({path.resolve().name: path}).values())
     return folder
 

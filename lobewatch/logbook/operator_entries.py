@@ -11,7 +11,7 @@ from acquisition.errors import join_sentences
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.recordings.store_recordings import group_by_message
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
-from lobewatch.machine.journal.entries import find_excludable_entry
+from lobewatch.machine.journal.read_entries import find_excludable_entry
 from lobewatch.measurement import FileModes, fit_file_modes
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, fit_tap
 from lobewatch.monitoring.status_rules import Alarm, select_alarms

@@ -20,11 +20,12 @@ from acquisition.file_io import delete_folder, make_folder, open_regular_file, r
 from acquisition.hit_quality.decide_hits import decide_stored_hits
 from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
-from lobewatch.machine.journal import entries as journal_entries
+from lobewatch.machine.journal import read_entries as journal_entries
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.machine.journal.entries import CutEntry, RecordingFile
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, journal_damage_remark, make_entry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
+from lobewatch.machine.journal.sync_conflicts import conflict_remark, list_sync_remarks
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.machine_file import Machine, read_machine_file
@@ -76,7 +77,7 @@ class FolderContents:
 def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContents:
     """Read the contents that the journal and taps/ prove together."""
     committed = journal_entries.read_committed_taps(reading)
-    remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
+    remarks, taps, lost = [*reading.damage, *list_sync_remarks(folder, reading)], list[TapEntry](), list[TapEntry]()
     sizes, given_up, proved = _list_tap_sizes(folder), journal_entries.read_given_up_ids(reading), 0
     for count, entry in enumerate(reversed(_sort_by_time(committed.values()))):
         proved += entry.size
@@ -96,7 +97,7 @@ def read_folder_contents(folder: Path, reading: JournalReading) -> FolderContent
     else:
         cure = f"Run {format_command('verify', folder)} for details"
         text = "not in the journal, so this file is not used"
-        remarks += [unlisted_file_remark(path, text, cure) for path in extra[:MAX_LISTED_FILES]]
+        remarks += [unlisted_file_remark(path, text, cure, committed) for path in extra[:MAX_LISTED_FILES]]
         if extra[MAX_LISTED_FILES:]:
             text = f"{len(extra) - MAX_LISTED_FILES} more files, not in the journal and not used"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
@@ -188,8 +189,10 @@ def _lacks_known_origin(folder: Path, path: Path) -> bool:
     return entry is None or not has_known_origin(folder, entry)
 
 
-def unlisted_file_remark(path: Path, text: str, cure: str) -> Remark:
-    """Return the remark on a file in taps/ without a line."""
+def unlisted_file_remark(path: Path, text: str, cure: str, committed: Iterable[str]) -> Remark:
+    """Return the remark on a file in taps/ without a line; committed: identities of the tap tests with one."""
+    if any(path.name.startswith(tap_id) for tap_id in committed):
+        return conflict_remark(path.parents[1], f"taps/{path.name}", text)
     return Remark("tap-unlisted", f"taps/{path.name}", text, cure)
 
 
@@ -269,6 +272,11 @@ class MachineFolder:
             If the folder cannot be written.
         """
         return self._lock.hold(patience)
+
+    @property
+    def sync_remarks(self) -> list[Remark]:
+        """Remarks on files and entries of other computers, and on lines that this version does not understand."""
+        return list_sync_remarks(self.path, self.journal.read())
 
     @time_step("reading")
     def contents(self) -> FolderContents:

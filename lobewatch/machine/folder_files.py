@@ -7,9 +7,15 @@ from pathlib import Path
 
 from acquisition.errors import DataError, check_name
 from acquisition.file_io import check_file_name, make_folder
+from lobewatch.machine.journal.file_names import (
+    CONFLICTS_FOLDER_NAME,
+    JOURNAL_COPY_NAME,
+    JOURNAL_NAME,
+    list_foreign_names,
+)
 from lobewatch.machine.settings.toml import write_toml_text
 
-WATCHED_FILES = ("machine.toml", "journal.jsonl", "journal.copy.jsonl", "taps")
+WATCHED_FILES = ("machine.toml", JOURNAL_NAME, JOURNAL_COPY_NAME, "taps", "cuts", CONFLICTS_FOLDER_NAME)
 """Names whose change means a change of the machine data."""
 
 
@@ -26,9 +32,9 @@ def format_path(path: Path | str) -> str:
 
 
 def compute_change_mark(folder: Path, file: str = "") -> tuple[int, ...]:
-    """Return a mark that changes with machine.toml, the journal, the names in taps/, and one more file."""
+    """Return a mark that changes with machine.toml, the journal, the names in taps/, foreign files, and one more."""
     stats = []
-    for name in (*WATCHED_FILES, file) if file else WATCHED_FILES:
+    for name in (*WATCHED_FILES, *list_foreign_names(folder), *filter(None, [file])):
         try:
             stats.append(os.stat(f"{folder}/{name}"))  # noqa: PTH116 - of hundreds of machines at every look
         except OSError:

@@ -13,8 +13,9 @@ from acquisition import HitDecision, check_name
 from acquisition.file_io import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.journal import entries as lines
+from lobewatch.machine.journal import read_entries as lines
 from lobewatch.machine.journal.entries import CUT_LINE_KIND, POWER_READING, CutEntry, RecordingFile
+from lobewatch.machine.journal.join_lines import find_open_contradictions, next_identity
 from lobewatch.machine.journal.journal import JournalReading, make_entry
 from lobewatch.machine.journal.mass_checks import MASS_CHECK_KIND, MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -42,20 +43,22 @@ def add_event(
     BusyError if another program writes.
     """
     with folder.locked():
-        now, entries = datetime.now(UTC), folder.journal.read().entries
+        now, reading = datetime.now(UTC), folder.journal.read()
         if not text.strip():
             raise ValueError('the event has no text. Describe the work, such as "bearings replaced".')
         check_name(text, "event")
         time = now if date is None else _to_utc(date)
         if time - now > timedelta(days=1):
             raise ValueError(f"MaintenanceEvent.time {date} is in the future. Give the date of the work.")
-        same = [event.id for event in lines.read_events(entries) if (event.time, event.text) == (time, text)]
+        same = [
+            event.id for event in lines.read_events(reading.other_entries) if (event.time, event.text) == (time, text)
+        ]
         if same:
             raise ValueError(f"event {text!r} of {date} already exists as {same[0]}")
         if new_baseline and date is not None and date.time() == datetime.min.time():
             _refuse_tapped_day(folder.taps(), time)
-        number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
-        event = lines.MaintenanceEvent(f"e{number}", time, text, new_baseline)
+        name = next_identity("event", reading.entries)
+        event = lines.MaintenanceEvent(name, time, text, new_baseline)
         fields = {"id": event.id, "date": event.time.isoformat(), "text": text, "new_baseline": new_baseline}
         folder.journal.append(make_entry("event", now, **fields))
     return event
@@ -79,7 +82,7 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
 def withdraw_event(folder: MachineFolder, event_id: str) -> lines.MaintenanceEvent:
     """Withdraw an event; ValueError for an unknown identity."""
     with folder.locked():
-        events = {event.id: event for event in lines.read_events(folder.journal.read().entries)}
+        events = {event.id: event for event in lines.read_events(folder.journal.read().other_entries)}
         if event_id not in events:
             raise ValueError(f"no event {event_id}. Existing events: {', '.join(events) or 'none'}.")
         folder.journal.append(make_entry("event", withdraws=event_id))
@@ -94,7 +97,7 @@ def exclude_entry(folder: MachineFolder, name: str, reason: str) -> lines.Exclud
     """
     with folder.locked():
         entry = _find_entry(folder, name)
-        if entry.excluded:
+        if entry.excluded and not _is_contested(folder, entry.id):
             raise ValueError(f"{entry.id} is already excluded, for {entry.excluded!r}")
         if not reason.strip():
             raise ValueError(
@@ -109,10 +112,15 @@ def include_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
     """Include an excluded tap test, test cut or mass check again; ValueError if it is not excluded."""
     with folder.locked():
         entry = _find_entry(folder, name)
-        if not entry.excluded:
+        if not entry.excluded and not _is_contested(folder, entry.id):
             raise ValueError(f"{entry.id} is not excluded")
         folder.journal.append(make_entry("include", tap=entry.id))
     return entry
+
+
+def _is_contested(folder: MachineFolder, name: str) -> bool:
+    """Tell whether another computer entered something else on this subject, so that a person may confirm it."""
+    return name in {found.about for found in find_open_contradictions(folder.journal.read().other_entries)}
 
 
 def _find_entry(folder: MachineFolder, name: str) -> lines.ExcludableEntry:
@@ -138,8 +146,7 @@ def store_hit_decisions(folder: MachineFolder, tap_id: str, decisions: Sequence[
 def store_mass_check(folder: MachineFolder, check: MassCheckEntry) -> MassCheckEntry:
     """Write a check with a known mass to the journal, and return it with its identity."""
     with folder.locked():
-        number = sum(line["kind"] == MASS_CHECK_KIND for line in folder.journal.read().other_entries) + 1
-        check = msgspec.structs.replace(check, id=f"m{number}")
+        check = msgspec.structs.replace(check, id=next_identity(MASS_CHECK_KIND, folder.journal.read().entries))
         folder.journal.append(check.line)
     return check
 
@@ -167,10 +174,7 @@ def store_cut(folder: MachineFolder, cut: CutEntry, signal: CutSignal | None = N
 
 
 def _next_cut_id(folder: MachineFolder, reading: JournalReading) -> str:
-    used = [line["id"] for line in reading.other_entries if line["kind"] == CUT_LINE_KIND]
-    used += [path.stem for path in (folder.path / "cuts").glob("c*.h5")]
-    numbers = [int(name[1:]) for name in used if name[1:].isdigit()]
-    return f"c{max(numbers, default=0) + 1}"
+    return next_identity(CUT_LINE_KIND, reading.entries, (path.stem for path in (folder.path / "cuts").glob("c*.h5")))
 
 
 ObservedWord = Literal["stable", "chatter", "cannot tell"]

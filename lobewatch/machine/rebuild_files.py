@@ -4,27 +4,27 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 from acquisition import DataError, Remark, read_tap
 from acquisition.errors import join_sentences
-from acquisition.file_io import IrregularFileError, atomic_write, delete, make_folder, read_regular_file, rename
+from acquisition.file_io import IrregularFileError, atomic_write, delete, read_regular_file, rename
 from acquisition.files.cut_file import read_cut_signal
 from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
-from lobewatch.machine.journal import entries as journal_entries
+from lobewatch.machine.journal import read_entries as journal_entries
 from lobewatch.machine.journal.entries import CutEntry, RecordingFile, parse_cut_line
-from lobewatch.machine.journal.journal import JOURNAL_NAME, Journal, JournalReading, format_command, make_entry
+from lobewatch.machine.journal.file_names import DAMAGED_FOLDER_NAME, JOURNAL_NAME, move_aside
+from lobewatch.machine.journal.join_files import join_conflict_files
+from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, make_entry
+from lobewatch.machine.journal.sync_conflicts import is_hdf5_file, read_given_up_lines
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.settings.toml import write_toml_text
 
-DAMAGED_FOLDER_NAME = "damaged"
-"""Name of the folder for damaged files."""
 LOST_ENTRIES_ADVICE = (
     "Enter lost decisions on hits, events, exclusions, accepted questions and cuts judged by ear again "
 )
@@ -54,7 +54,10 @@ def _repair_cut_recordings(folder: Path, journal: Journal) -> Iterator[str]:
 
     The result of a lost recording is in its journal line and stays valid.
     """
-    for path in _list_unlisted_cuts(folder, journal_entries.read_committed_cuts(journal.read())):
+    cuts = journal_entries.read_committed_cuts(journal.read())
+    if damaged := [recording for recording, _ in _find_damaged_recordings(folder, cuts)]:
+        yield from _restore_misplaced(folder, damaged, _list_h5_files(folder, "cuts"))
+    for path in _list_unlisted_cuts(folder, cuts):
         cut = _read_unlisted_cut(path)
         if cut is None or cut.id in {entered.id for entered in journal_entries.read_committed_cuts(journal.read())}:
             yield _set_aside(folder, path)
@@ -105,22 +108,41 @@ def rebuild_files(path: Path) -> list[str]:
         MachineFolder(path)
     with FolderLock(path).hold(LOCK_TIMEOUT):
         journal = Journal(path)
+        journal.separate_copies()
         reading = journal.read()
-        committed = journal_entries.read_committed_taps(reading)
-        report = [*_restore_misplaced(path, committed)]
+        if reading.damage:
+            journal.rewrite(reading)
+        report = [*join_conflict_files(path, journal)]
+        committed = journal_entries.read_committed_taps(journal.read())
+        report += _restore_misplaced(path, [*committed.values()], _list_h5_files(path, "taps"))
         fresh = _enter_unlisted_taps(path, committed, report)
+        if fresh:
+            journal.append(*(entry.line for entry in fresh))
         if reading.damage or (fresh and not reading.lines):
-            journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
             report.append(f"{JOURNAL_NAME}: rewritten with {len(reading.entries) + len(fresh)} lines")
             report += _report_missing_lines(reading.entries, len(fresh))
-        else:
-            for entry in fresh:
-                journal.append(entry.line)
         report += [f"{entry.file}: entered in the journal" for entry in fresh]
-        report += _record_lost_taps(path, journal)
+        report += [*_give_up_lines(journal), *_record_lost_taps(path, journal)]
         report += _repair_cut_recordings(path, journal)
         report += [*_restore_machine_file(path), *_repair_devices_file(path)]
     return report
+
+
+def _list_h5_files(folder: Path, place: str) -> list[Path]:
+    """List the files in taps/ or cuts/ that may hold a tap test or a recording, under any name."""
+    paths = sorted((folder / place).iterdir()) if (folder / place).is_dir() else []
+    named = (path for path in paths if path.is_file() and not path.name.startswith("."))
+    return [path for path in named if path.suffix == ".h5" or is_hdf5_file(path)]
+
+
+def _give_up_lines(journal: Journal) -> Iterator[str]:
+    """Enter which damaged lines are given up, and report them."""
+    reading = journal.read()
+    given_up = read_given_up_lines(reading)
+    for fault in reading.faults:
+        if not fault.is_newer and fault.number not in given_up:
+            journal.append(make_entry("lost", line=fault.number))
+            yield join_sentences(f"{JOURNAL_NAME}: {fault}", LOST_ENTRIES_ADVICE)
 
 
 def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
@@ -128,7 +150,7 @@ def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) ->
     if not entries:
         yield f"{JOURNAL_NAME}: file and copy are unreadable. {LOST_ENTRIES_ADVICE}"
         return
-    numbers = {entry["number"] for entry in entries if "number" in entry}
+    numbers = {entry["number"] for entry in entries if isinstance(entry.get("number"), int)}
     first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
     missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
     if len(missing) > n_fresh:
@@ -136,10 +158,12 @@ def _report_missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) ->
         yield f"{JOURNAL_NAME}: {lines} damaged in both copies. {LOST_ENTRIES_ADVICE}"
 
 
-def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
-    """Rename swapped tap files back where the right file is damaged, else set them aside."""
-    by_content = {entry.sha256: entry for entry in committed.values()}
-    owners = {path: by_content.get(contents.hash_file(path)) for path in contents.list_tap_files(folder).values()}
+def _restore_misplaced(
+    folder: Path, committed: Sequence[TapEntry] | Sequence[RecordingFile], files: Sequence[Path]
+) -> Iterator[str]:
+    """Rename swapped files back where the right file is damaged, else set them aside."""
+    by_content = {entry.sha256: entry for entry in committed}
+    owners = {path: by_content.get(contents.hash_file(path)) for path in files}
     misplaced = [(path, entry) for path, entry in owners.items() if entry is not None and path != folder / entry.file]
     asides = {_move_to_damaged(folder, path): entry for path, entry in misplaced}
     for aside, entry in asides.items():
@@ -156,15 +180,16 @@ def _restore_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator
 def _enter_unlisted_taps(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
     """Return the entries of sound tap files without a line, renamed if necessary; set all others aside."""
     entries = []
-    for name, path in contents.list_tap_files(folder).items():
-        if name in committed:
+    for path in _list_h5_files(folder, "taps"):
+        name = path.name.removesuffix(".h5")
+        if name in committed and path.suffix == ".h5":
             continue
         entry = read_unverified_tap(path)
-        taken = entry is not None and entry.id != name and (folder / entry.file).exists()
+        taken = entry is not None and path.name != f"{entry.id}.h5" and (folder / entry.file).exists()
         if entry is None or taken or entry.id in committed:
             report.append(_set_aside(folder, path))
             continue
-        if entry.id != name:
+        if path.name != f"{entry.id}.h5":
             rename(path, folder / entry.file)
         entries.append(entry)
     return entries
@@ -223,8 +248,4 @@ def _set_aside(folder: Path, path: Path) -> str:
 
 
 def _move_to_damaged(folder: Path, path: Path) -> Path:
-    """Move a file to the folder for damaged files under an unused name."""
-    make_folder(folder / DAMAGED_FOLDER_NAME)
-    names = chain([path.name], (f"{path.name}.{number}" for number in count(1)))
-    asides = (folder / DAMAGED_FOLDER_NAME / name for name in names)
-    return rename(path, next(aside for aside in asides if not aside.exists()))
+    return move_aside(folder, path, DAMAGED_FOLDER_NAME)

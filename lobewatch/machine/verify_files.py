@@ -15,22 +15,31 @@ from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
-from lobewatch.machine.journal import entries as journal_entries
 from lobewatch.machine.journal import journal
+from lobewatch.machine.journal import read_entries as journal_entries
+from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, DAMAGED_FOLDER_NAME, LOBEWATCH_FILES
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
+from lobewatch.machine.journal.sync_conflicts import list_sync_remarks
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.journal.unverified_tap import read_unverified_tap
 from lobewatch.machine.rebuild_files import verify_cut_recordings
 from lobewatch.machine.row_file import read_rows
 
-DAMAGE_CODES = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
-"""Codes of remarks on damage; all others are information."""
-LOBEWATCH_FILES = {journal.JOURNAL_NAME, journal.JOURNAL_COPY_NAME, LOCK_NAME, LOCK_HOLDER_NAME, "machine.toml"}
-LOBEWATCH_FILES |= {"history.rows", "daq.json", "standing.json", "told.json", "unsent.json", "taps", "cuts", "spool"}
-"""Files and folders in a machine folder that are verified, or made again if they are deleted."""
+DAMAGE_CODES = (
+    *("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted"),
+    *("sync-conflict", "sync-contradiction", "journal-newer", "line-damaged"),
+)
+"""Codes of remarks on damage, conflicts and incomplete results; all others are information."""
 DELETION_ADVICE = "Delete this file or folder if you do not need it"
 ALTERED_TEXT = "file changed or truncated since lobewatch wrote it"
 """Fault of a file with a wrong checksum."""
+
+
+def name_problem(code: str) -> str:
+    """Name the problem of a remark in `DAMAGE_CODES`: "damaged", "conflicting" or "not understood"."""
+    if code.startswith("sync-"):
+        return "conflicting"
+    return "not understood" if code == "journal-newer" else "damaged"
 
 
 @dataclass(frozen=True)
@@ -79,10 +88,12 @@ def verify(path: Path) -> Verification:
     reading = folder.journal.read()
     committed = journal_entries.read_committed_taps(reading)
     faults = {name: fault for name, entry in committed.items() if (fault := contents.find_file_fault(path, entry))}
-    remarks = [*reading.damage, *_verify_taps(path, reading, committed, faults), *verify_cut_recordings(path, reading)]
+    remarks = [*reading.damage, *list_sync_remarks(path, reading)]
+    remarks += [*_verify_taps(path, reading, committed, faults), *verify_cut_recordings(path, reading)]
     remarks += _verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults])
     remarks += [*_verify_history(folder), *_verify_devices(folder)]
-    remarks += [*_verify_spool(path, committed.keys() - faults.keys()), *_verify_names(path)]
+    remarks += [*_verify_spool(path, committed.keys() - faults.keys())]
+    remarks += _verify_names(path, {remark.about for remark in remarks})
     return Verification(tuple(remarks), tuple(entered), len(committed) - len(faults))
 
 
@@ -118,10 +129,13 @@ def _verify_taps(
         yield contents.tap_damage_remark(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
         original = by_content.get(contents.hash_file(path))
-        yield _unlisted_tap_remark(folder, path, original, original is not None and original.id in faults)
+        is_needed = original is not None and original.id in faults
+        yield _unlisted_tap_remark(folder, path, original, is_needed, committed)
 
 
-def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is_needed: bool) -> Remark:
+def _unlisted_tap_remark(
+    folder: Path, path: Path, original: TapEntry | None, is_needed: bool, committed: Collection[str]
+) -> Remark:
     """Return the remark on a tap file without a line; original: committed tap test with the same content."""
     mend, entry = format_command("rebuild", folder), read_unverified_tap(path) if original is None else None
     if original is not None and is_needed:
@@ -139,7 +153,7 @@ def _unlisted_tap_remark(folder: Path, path: Path, original: TapEntry | None, is
     else:
         cure = f"Run {mend} to enter the test in the journal, or remove the file if it belongs to another machine"
         finding = "complete tap file, not in the journal", cure
-    return contents.unlisted_file_remark(path, *finding)
+    return contents.unlisted_file_remark(path, *finding, committed)
 
 
 def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
@@ -183,7 +197,8 @@ def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
         yield Remark("file-damaged", "daq.json", format_error(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
-def _verify_names(folder: Path) -> Iterator[Remark]:
+def _verify_names(folder: Path, named: Collection[str]) -> Iterator[Remark]:
+    """Yield remarks on files that lobewatch does not verify, except for those named already."""
     known = {
         "report.html": (
             "lobewatch keeps no checksum of reports",
@@ -192,13 +207,15 @@ def _verify_names(folder: Path) -> Iterator[Remark]:
     }
     known["history.h5"] = "old cache, or an exported history", DELETION_ADVICE
     for path in sorted(folder.iterdir()):
-        if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
+        if path.name in named:
+            continue
+        if path.suffix in (".tmp", ".torn", ".damaged") or path.name in (DAMAGED_FOLDER_NAME, CONFLICTS_FOLDER_NAME):
             yield Remark("set-aside", path.name, "file left over, or set aside by lobewatch", DELETION_ADVICE)
-        elif path.name not in LOBEWATCH_FILES:
+        elif path.name not in {*LOBEWATCH_FILES, LOCK_NAME, LOCK_HOLDER_NAME}:
             yield Remark("not-verified", path.name, *known.get(path.name, ("not a file of lobewatch",)))
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
-        if path not in files:
+        if path not in files and f"taps/{path.name}" not in named:
             yield Remark("not-verified", f"taps/{path.name}", "not a tap file", "Remove the file from taps/")
 
 

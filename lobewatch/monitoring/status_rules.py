@@ -247,7 +247,8 @@ def _rules_of(*codes: str) -> list[StatusRule]:
 
 STATUS_RULES = (
     *(FREQUENCY_ALARM, FREQUENCY_DECAY, PROGRAM_NOT_STABLE, UNREADABLE, NEVER_TAPPED),
-    *_rules_of("journal-damaged", "tap-damaged", "tap-unreadable", "tap-unlisted"),
+    *_rules_of("journal-damaged", "sync-conflict", "sync-contradiction", "journal-newer", "line-damaged"),
+    *_rules_of("tap-damaged", "tap-unreadable", "tap-unlisted"),
     *_rules_of("file-damaged", "cut-damaged", "cut-unlisted"),
     *(FREQUENCY_WARNING, DOUBTFUL_DECAY),
     *_rules_of("frequency-jump"),

@@ -26,7 +26,7 @@ from lobewatch.machine.settings.notify_table import Broker, parse_broker
 from lobewatch.monitoring.threshold_dates import build_forecast_rows, build_limit_row, find_next_limit
 from lobewatch.notify.mqtt import OUTBOX_FILE, deliver_messages, read_json, send_messages
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
-from lobewatch.show.terminal.output import notes
+from lobewatch.show.terminal.output import notes, print_remarks
 
 TOPIC_REPLACEMENTS = str.maketrans("+#/\0", "____")
 """Replacement of characters that a topic level must not contain."""
@@ -53,7 +53,11 @@ def publish_status(logbook: Logbook) -> None:
 
 @contextmanager
 def publish_on_change(logbook: Logbook) -> Iterator[Logbook]:
-    """Publish the status after work that has changed the machine folder, even if the work fails later."""
+    """Publish the status after work that has changed the machine folder, even if the work fails later.
+
+    Files and entries of other computers in a synced folder are named first.
+    """
+    print_remarks(logbook.folder.sync_remarks)
     before = logbook.folder.change_mark
     try:
         yield logbook

@@ -17,8 +17,9 @@ from lobewatch.history import HistoryRow
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import find_contradicting_cuts
 from lobewatch.machine.journal.alarm_entries import Acknowledgement
-from lobewatch.machine.journal.entries import POWER_READING, CutEntry, MaintenanceEvent
+from lobewatch.machine.journal.entries import POWER_READING, CutEntry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
+from lobewatch.machine.journal.read_entries import MaintenanceEvent
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement.hit_choice import format_decisions

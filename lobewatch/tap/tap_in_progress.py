@@ -33,7 +33,7 @@ from acquisition.tap_test import decide_flags
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
 from lobewatch.machine.folder_updates import store_hit_decisions
-from lobewatch.machine.journal.entries import read_hit_decisions
+from lobewatch.machine.journal.read_entries import read_hit_decisions
 from lobewatch.tap import spool
 from lobewatch.tap.hit_check import add_loose_sensor, add_steady_vibration, average_hits, evaluate_safely, format_peak
 from lobewatch.tap.kept_rate import correct_rate, find_kept_rate

@@ -24,15 +24,17 @@ import msgspec
 
 from acquisition import DataError, Remark, parse_machine_name, sanitize_id_part
 from acquisition.errors import join_sentences
-from acquisition.file_io import atomic_write, read_regular_file, sync_folder
+from acquisition.file_io import atomic_write, read_regular_file, rename, sync_folder
+from lobewatch.machine.journal.file_names import JOURNAL_COPY_NAME, JOURNAL_NAME
+from lobewatch.machine.journal.line_formats import (
+    BATCH_KEY,
+    FORMAT_KEY,
+    JOURNAL_FORMAT,
+    LineFault,
+    find_line_faults,
+)
 from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX
 from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
-
-JOURNAL_NAME = "journal.jsonl"
-JOURNAL_COPY_NAME = "journal.copy.jsonl"
-BATCH_KEY = "batch"
-"""Key of the number of the first line of the same write; missing for a single line."""
-
 
 JournalEntry = dict[str, Any]
 PREVIOUS_DIGEST_KEY = b'"previous": "'
@@ -137,17 +139,38 @@ class JournalReading:
 
     @cached_property
     def entries(self) -> list[JournalEntry]:
-        """Lines as JSON objects."""
-        return _decode_lines(self.lines)
+        """Lines as JSON objects, also those that this version does not understand."""
+        return [json.loads(line) for line in self.lines]
 
     @cached_property
     def other_entries(self) -> list[JournalEntry]:
-        """Lines of other kinds as JSON objects, with tap tests of older versions."""
-        return _decode_lines(line for line in self.lines if not line.startswith(TAP_LINE_PREFIX))
+        """Understood lines of other kinds as JSON objects, with tap tests of older versions."""
+        lines = _leave_out(self.lines, self._other_faults)
+        others = (line for line in lines if not line.startswith(TAP_LINE_PREFIX))
+        return msgspec.json.decode(b"[" + b",".join(others) + b"]", type=list[JournalEntry])
+
+    @property
+    def tap_lines(self) -> list[bytes]:
+        """Understood lines of tap tests that begin with `TAP_LINE_PREFIX`."""
+        return [line for line in _leave_out(self.lines, self._tap_faults) if line.startswith(TAP_LINE_PREFIX)]
+
+    @property
+    def faults(self) -> list[LineFault]:
+        """Lines that this version does not understand, oldest first."""
+        return sorted([*self._tap_faults, *self._other_faults])
+
+    @cached_property
+    def _tap_faults(self) -> tuple[LineFault, ...]:
+        return find_line_faults(self.lines, of_taps=True)
+
+    @cached_property
+    def _other_faults(self) -> tuple[LineFault, ...]:
+        return find_line_faults(self.lines, of_taps=False)
 
 
-def _decode_lines(lines: Iterable[bytes]) -> list[JournalEntry]:
-    return msgspec.json.decode(b"[" + b",".join(lines) + b"]", type=list[JournalEntry])
+def _leave_out(lines: Sequence[bytes], faults: Iterable[LineFault]) -> Sequence[bytes]:
+    unusable = {fault.number for fault in faults if not fault.is_used}
+    return [line for number, line in enumerate(lines, 1) if number not in unusable] if unusable else lines
 
 
 class Journal:
@@ -170,7 +193,7 @@ class Journal:
         damage = [*self._find_journal_damage(journal, copy), *self._find_copy_damage(journal, copy)]
         loose = (*journal.chain, *copy.chain, *journal.unchained_lines, *copy.unchained_lines) if damage else ()
         lines = tuple(dict.fromkeys((*longer, *loose))) if loose else longer
-        foreign = _find_foreign_journal(self.path.parent, lines)
+        foreign = find_foreign_journal(self.path.parent, lines)
         if foreign:
             return JournalReading((), (journal_damage_remark(self.path, foreign),))
         tidy = copy.exists and copy.chain_bytes == journal.chain_bytes and not (damage or journal.torn or copy.torn)
@@ -189,7 +212,8 @@ class Journal:
         first = len(reading.lines) + 1
         batch = {BATCH_KEY: first} if len(entries) > 1 else {}
         last = reading.lines[-1] if reading.lines else b""
-        lines = _encode_lines((entry | batch for entry in entries), first, last)
+        written = {FORMAT_KEY: JOURNAL_FORMAT, **batch}
+        lines = _encode_lines((entry | written for entry in entries), first, last)
         _append_lines(self.path, lines)
         self.line_count = len(reading.lines) + len(entries)
         with contextlib.suppress(OSError):  # it is committed; the copy is brought up at the next line
@@ -203,12 +227,34 @@ class Journal:
                 join_sentences(f"{self.path.parent}: nothing written, because of {findings}", reading.damage[0].cure)
             )
 
-    def rewrite(self, entries: list[JournalEntry]) -> None:
-        """Write both files with these entries in a new chain, and keep the old files."""
+    def separate_copies(self) -> Path | None:
+        """Write the copy again if two computers continued the two files differently, and return the old copy.
+
+        The old copy gets a name of its own, and None is returned if the files belong together.
+        """
+        journal, copy = (
+            scan_journal_file(path, JournalFileState(exists=False)) for path in (self.path, self.copy_path)
+        )
+        both = min(len(journal.chain), len(copy.chain))
+        is_broken = journal.first_broken_line or copy.first_broken_line or not journal.chain_bytes
+        if is_broken or journal.chain[:both] == copy.chain[:both]:
+            return None
+        names = (self.copy_path.with_name(f"{JOURNAL_COPY_NAME}.{number}.other") for number in count(1))
+        other = rename(self.copy_path, next(path for path in names if not path.exists()))
+        atomic_write(self.copy_path, journal.chain_bytes)
+        return other
+
+    def rewrite(self, reading: JournalReading) -> None:
+        """Write both files with the sound lines in a new chain, and keep the old files.
+
+        Raises DataError, and writes nothing, if a newer version of lobewatch wrote one of the lines.
+        """
+        for fault in (fault for fault in reading.faults if fault.is_newer):
+            raise DataError(f"{self.path}: not rewritten, because {fault}. Update lobewatch on this computer.")
         for path in (self.path, self.copy_path):
             if path.exists():
                 _back_up_bytes(path, read_regular_file(path), "damaged")
-        content = b"".join(line + b"\n" for line in _encode_lines(entries))
+        content = b"".join(line + b"\n" for line in _encode_lines(reading.entries))
         atomic_write(self.path, content)
         atomic_write(self.copy_path, content)
 
@@ -249,13 +295,14 @@ class Journal:
             yield journal_damage_remark(self.copy_path, f"last {behind} lines missing")
 
 
-def _find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
+def find_foreign_journal(folder: Path, lines: Sequence[bytes]) -> str:
     """Return the fault of a journal whose tap tests are all missing and of another machine, else "".
 
     Such a folder was mixed up. The search ends at the first existing tap file.
     """
     missing = []
-    for tap_id in (entry["id"] for entry in map(json.loads, lines) if entry["kind"] == "tap"):
+    entries = (entry for entry in map(json.loads, lines) if entry["kind"] == "tap")
+    for tap_id in (entry["id"] for entry in entries if isinstance(entry.get("id"), str)):
         if (folder / "taps" / f"{tap_id}.h5").exists():
             return ""
         missing.append(tap_id)
@@ -278,7 +325,7 @@ def _read_machine_name(folder: Path) -> str:
 
 def _are_one_batch(lines: Sequence[bytes]) -> bool:
     """Tell whether a crash can have kept all of these lines from the copy."""
-    written = {json.loads(line).get(BATCH_KEY, -number) for number, line in enumerate(lines)}
+    written = {str(json.loads(line).get(BATCH_KEY, -number)) for number, line in enumerate(lines)}
     return len(written) < 2
 
 

@@ -145,5 +145,4 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
 
 def decode_tap_entries(lines: Iterable[bytes]) -> list[TapEntry]:
     """Read the entries of lines with `TAP_LINE_PREFIX`, twenty times as fast as each with `TapEntry.from_line`."""
-    tap_lines = (line for line in lines if line.startswith(TAP_LINE_PREFIX))
-    return msgspec.json.decode(b"[" + b",".join(tap_lines) + b"]", type=list[TapEntry])
+    return msgspec.json.decode(b"[" + b",".join(lines) + b"]", type=list[TapEntry])

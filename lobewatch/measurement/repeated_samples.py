@@ -6,6 +6,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from acquisition import Hit, Remark
+from dsm import format_rounded
 from lobewatch.arrays import Flags, Floats
 
 REPEAT_WINDOW = 16
@@ -30,7 +31,7 @@ def repeated_samples_remarks(hits: Sequence[Hit]) -> list[Remark]:
         return []
     rate = hits[0].sample_rate
     text = f"{100 * share:.0f} % of the acceleration samples repeat the sample before"
-    true = f"the sensor has about {rate * (1 - share):.3g} new values per second, but is read {rate:g} times"
+    true = f"the sensor has about {format_rounded(rate * (1 - share), digits=2)} new values per second, but is read {rate:g} times"
     cure = "Read the sensor once per new value (data-ready signal), and correct sample_rate_hz"
     return [Remark("repeated-samples", "", f"{text}, so {true}", cure)]
 

@@ -28,7 +28,7 @@ def test_the_share_of_repeated_samples_gives_the_true_rate(ratio: float) -> None
     (remark,) = repeated_samples_remarks([decay(ratio)] * 3)
     assert remark.code == "repeated-samples"
     said = float(remark.text.split("about ")[1].split(" new")[0])
-    assert said == pytest.approx(ratio * RATE, rel=0.05)
+    assert said == pytest.approx(ratio * RATE, rel=0.08)
 
 
 @given(st.floats(20.0, 1500.0), st.floats(0.001, 5.0), st.integers(0, 99))

@@ -30,8 +30,9 @@ def repeated_samples_remarks(hits: Sequence[Hit]) -> list[Remark]:
     if share < MIN_REPEATED_SHARE:
         return []
     rate = hits[0].sample_rate
+    new = format_rounded(rate * (1 - share), digits=2)
     text = f"{100 * share:.0f} % of the acceleration samples repeat the sample before"
-    true = f"the sensor has about {format_rounded(rate * (1 - share), digits=2)} new values per second, but is read {rate:g} times"
+    true = f"the sensor has about {new} new values per second, but is read {rate:g} times"
     cure = "Read the sensor once per new value (data-ready signal), and correct sample_rate_hz"
     return [Remark("repeated-samples", "", f"{text}, so {true}", cure)]
 

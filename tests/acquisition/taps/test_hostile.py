@@ -89,7 +89,7 @@ class Endless(SimulatedSource):
     """Device that starts again and again."""
 
     def __init__(self) -> None:
-        super().__init__(lambda _, n: np.zeros((2, n)), SENSORS, RATE, 2**62)
+        super().__init__(lambda _, n: np.zeros((2, n)), SENSORS, RATE, 2**62, block=4096)
 
     def stop(self) -> None: ...
 
@@ -155,10 +155,9 @@ def test_a_silent_host_and_one_that_reads_nothing_are_disconnected(
     before = len(sentences)
     with closing(HostileHost(served.port)) as host:
         assert host.is_closed_after(b"")
-    hello = config(b"", MessageType.HELLO)
+    hellos = config(b"", MessageType.HELLO) * 10_000
     with closing(HostileHost(served.port)) as host, pytest.raises(ConnectionError):
-        for _ in range(10_000):
-            host.socket.sendall(hello * 100)
+        host.socket.sendall(hellos * 100)
     assert len(sentences) == before + 2
     assert_next_host_is_served(served.port)
 

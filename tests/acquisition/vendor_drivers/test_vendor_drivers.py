@@ -288,7 +288,7 @@ def test_the_list_of_sound_devices_is_read_again_unless_a_stream_is_open(
         assert log == []
     with audio.open("audio:USB Audio", settings):
         assert log == ["terminate", "initialize"]
-        with pytest.raises(DeviceError, match="0: HDMI|audio:0"):
+        with pytest.raises(DeviceError, match="audio:0"):
             audio.open("audio:0", settings)
     with audio.open("audio:1", settings):
         assert log == ["terminate", "initialize"] * 2

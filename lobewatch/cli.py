@@ -127,6 +127,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # show "?" for characters that the console lacks
     try:
+        from acquisition.credentials import hide_arguments
+
+        hide_arguments()
         app(terminal_width=get_page_width())
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

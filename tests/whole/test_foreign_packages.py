@@ -34,10 +34,10 @@ def install(folder: Path, name: str) -> None:
     (info / "RECORD").write_text(f"{name}/__init__.py,,\n", encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["modal", "dsm"])
-def test_a_foreign_package_is_named_by_every_use(tmp_path: Path, name: str) -> None:
-    install(tmp_path, name)
-    expected = f"{name} (of foreign-{name}, in {tmp_path / name})"
+def test_foreign_packages_are_named_by_every_use(tmp_path: Path) -> None:
+    for name in ("modal", "dsm"):
+        install(tmp_path, name)
+    expected = ", ".join(f"{name} (of foreign-{name}, in {tmp_path / name})" for name in ("modal", "dsm"))
     doctor = run(tmp_path, "-m", "lobewatch", "doctor", "--json")
     (finding,) = json.loads(doctor.stdout)["findings"]
     assert (doctor.returncode, finding["subject"], finding["state"]) == (1, "foreign packages", "hinders")

@@ -23,6 +23,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquisition import Remark, merge_remarks
+from acquisition.credentials import hide_passwords
 from acquisition.errors import CONTROL_CHARACTERS
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
@@ -84,7 +85,9 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
         import msgspec  # only JSON output waits for it
 
         plain = with_option_names_inside(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
-        exact = json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)  # newlines only between lines
+        exact = hide_passwords(
+            json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
+        )  # newlines only between
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
@@ -148,8 +151,9 @@ def count_noun(count: int, noun: str) -> str:
 
 
 def make_printable(text: str, kept: str = "\n\t") -> str:
-    """Replace control characters except those to keep, and name options instead of library fields."""
-    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", with_option_names(text))
+    """Replace control characters except those to keep, hide passwords, and name options instead of library fields."""
+    named = hide_passwords(with_option_names(text))
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", named)
 
 
 def pick(record: Any, *names: str) -> JsonObject:

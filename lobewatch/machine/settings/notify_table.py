@@ -80,7 +80,7 @@ def parse_broker(address: str) -> Broker:
     """Parse mqtt://[user[:password]@]host[:port][/prefix]; ValueError for any other text."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
     allowed = (
-        "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption and %XX for other characters."
+        "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption and %XX for other signs."
     )
     refusal = f"mqtt={hidden!r} is not the address of a broker. {allowed}"
     url = urlsplit(address)

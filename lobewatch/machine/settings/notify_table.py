@@ -79,9 +79,7 @@ class NotifyTable(TomlTable, frozen=True):
 def parse_broker(address: str) -> Broker:
     """Parse mqtt://[user[:password]@]host[:port][/prefix]; ValueError for any other text."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
-    allowed = (
-        "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption and %XX for other signs."
-    )
+    allowed = "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption and %XX for other signs."
     refusal = f"mqtt={hidden!r} is not the address of a broker. {allowed}"
     url = urlsplit(address)
     is_encoded = not set(address) & set("#?\"'<> \t") and "@" not in url.path

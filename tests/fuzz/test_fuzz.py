@@ -35,7 +35,7 @@ def fuzz(target: Target, examples: int, number: int) -> None:
 
     @seed(number)
     @settings(max_examples=examples, database=None, deadline=None, suppress_health_check=list(HealthCheck))
-    @given(target.inputs)
+    @given(target.inputs())
     def run(content: bytes) -> None:
         note(f"{target.name}: {content!r}")
         check(target, content)

@@ -281,10 +281,10 @@ LINE_SEEDS = [
 ]
 TAP_SEEDS = [path.read_bytes() for path in sorted((MACHINE / "taps").iterdir())]
 TARGETS = (
-    Target("machine_toml", partial(edited, TOML_SEEDS), check_machine_toml, 60),
-    Target("journal", journals, check_journal, 40),
-    Target("bridge", streams, check_bridge, 100),
-    Target("lines", partial(edited, LINE_SEEDS), check_lines, 300),
-    Target("tap", partial(edited, TAP_SEEDS), check_tap, 8),
+    Target("machine_toml", partial(edited, TOML_SEEDS), check_machine_toml, 120),
+    Target("journal", journals, check_journal, 70),
+    Target("bridge", streams, check_bridge, 250),
+    Target("lines", partial(edited, LINE_SEEDS), check_lines, 500),
+    Target("tap", partial(edited, TAP_SEEDS), check_tap, 12),
 )
 """All readers."""

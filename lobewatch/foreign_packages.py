@@ -71,7 +71,7 @@ def guard_imports() -> None:
     """
     foreign = _find_foreign_places()
     if foreign:
-        sys.meta_path.insert(0, _ImportGuard)  # type: ignore[arg-type]
+        sys.meta_path.insert(0, _ImportGuard)
     if foreign.keys() & sys.modules.keys():
         refuse_foreign_packages()
 

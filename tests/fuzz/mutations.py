@@ -37,7 +37,7 @@ PIECES = (
     b"../../x",
 )
 """Bytes that broke other programs: limits of numbers, deep nesting, control characters, wrong encodings."""
-VALUES = (
+VALUES: tuple[Any, ...] = (
     None,
     True,
     -1,

@@ -247,7 +247,8 @@ def read_device(device: Device) -> None:
 def check_lines(content: bytes, _folder: Path) -> None:
     """Any bytes of a board are finite scans with a bounded loss, and scans after them are read."""
     forms = [FrameFormat(b"\xaa\xbb"), FrameFormat(b"\xaa\xbb", counter=True), FrameFormat(b"\xaa", checksum=False)]
-    for decoder in (LineDecoder(), *map(SimpleFrameDecoder, forms)):
+    decoders: list[LineDecoder | SimpleFrameDecoder] = [LineDecoder(), *map(SimpleFrameDecoder, forms)]
+    for decoder in decoders:
         counter = ScanCounter()
         for piece in (content[:1000], content[1000:], content):
             for printed in decoder.feed(piece):

@@ -37,7 +37,7 @@ def tree(tmp_path: Path) -> Path:
 
 
 def run(tree: Path, script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, tree / ".ci" / script, *arguments]
+    command = [sys.executable, str(tree / ".ci" / script), *arguments]
     return subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
 
 

@@ -284,6 +284,7 @@ def test_the_list_of_sound_devices_is_read_again_unless_a_stream_is_open(
     monkeypatch.setitem(sys.modules, "sounddevice", library)
     with audio.open("audio:USB Audio", settings):
         library.__dict__.update(_terminate=lambda: log.append("terminate"), _initialize=initialize)
+        assert audio.search is not None
         assert [device.address for device in audio.search()] == ["audio:USB Audio"]
         assert log == []
     with audio.open("audio:USB Audio", settings):

@@ -38,7 +38,7 @@ def test_a_sensor_read_once_per_value_is_not_named(frequency: float, scale: floa
 
 def test_rest_overload_and_short_records_are_not_named() -> None:
     clipped = Hit(np.empty(0), np.clip(decay(1.0).acceleration, -20.0, 20.0), RATE)
-    rest = Hit(np.empty(0), np.random.default_rng(1).integers(0, 2, COUNT) * 0.01, RATE)
+    rest = Hit(np.empty(0), np.random.default_rng(1).integers(0, 2, COUNT).astype(np.float64) * 0.01, RATE)
     constant = Hit(np.empty(0), np.zeros(COUNT), RATE)
     assert repeated_samples_remarks([clipped, rest, constant]) == []
     assert repeated_samples_remarks([]) == []

@@ -50,5 +50,5 @@ def compare_neighbours(signal: Floats) -> Flags:
     is_moving = np.ptp(windows, axis=1) >= MIN_STEPS_IN_WINDOW * step
     first = slice(REPEAT_WINDOW // 2 - 1, REPEAT_WINDOW // 2 - 1 + len(windows))
     values = signal[first]
-    is_equal: Flags = changes[first] == 0
-    return is_equal[is_moving & (values != signal.max()) & (values != signal.min())]
+    counts: Flags = is_moving & (values != signal.max()) & (values != signal.min())
+    return np.equal(changes[first], 0.0)[counts]

@@ -1,4 +1,4 @@
-"""Run all benchmarks against other packages, write docs/performance.md and report slowdowns.
+"""Run all benchmarks against other packages, write docs/studies/performance.md and report slowdowns.
 
     python3 run.py bench [--quick]         (in an environment with the peers; a quarter of an hour)
 
@@ -23,7 +23,7 @@ from race import Race, Result, run
 from threadpoolctl import threadpool_limits
 
 ROOT = Path(__file__).parents[1]
-PAGE, STATED = ROOT / "docs" / "performance.md", Path(__file__).with_name("performance.json")
+PAGE, STATED = ROOT / "docs" / "studies" / "performance.md", Path(__file__).with_name("performance.json")
 """Page, and what it states."""
 BENCHES = {
     "Modes": "bench_modal",
@@ -56,12 +56,12 @@ by that of lobewatch, with its range.
 """
 TAIL = """
 Five measured FRFs of a tool, with noise and 18 modes, take 2.3 times the CPU time of sdypy-EMA: each band is fitted
-several times, and again for its errors. These FRFs are not part of lobewatch ([study](studies/performance-modal.md)).
+several times, and again for its errors. These FRFs are not part of lobewatch ([study](performance-modal.md)).
 
 The other packages get the true frequencies and a suitable mesh, and none of them computes errors. Unless stated
 otherwise, a hit has 2 x 65536 samples. sdypy-EMA has order 60, the semi-discretisation 40 intervals. Commands include
 the start of Python.
-[The studies](studies/README.md) have more figures.
+[The studies](README.md) have more figures.
 """
 
 

@@ -15,6 +15,7 @@ from typer import Option
 import acquisition
 from lobewatch.commands import COMMANDS
 from lobewatch.commands.shared_options import FolderArgument, ReclampingScatter, Seed, WearScenarioName, length, rpm
+from lobewatch.machine.settings.display_units import LENGTH, length_argument
 from lobewatch.show.terminal.output import Json, notes, results
 
 emulate = typer.Typer(help=COMMANDS["emulate"], no_args_is_help=True)
@@ -197,9 +198,10 @@ def _emulate_cut(options: EmulateOptions, program: str, shared: Mapping[str, Any
     emulated = emulate_cut(setting=setting, **shared)
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
     truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
-    stable = "any depth" if limit is None else f"{limit:.3g} mm"
-    text = f"{emulated.speed_rpm:.1f} rpm, stable up to ap {stable}, cut with ap {1e3 * setting.depth:g} mm"
-    words = f" --program {shlex.quote(program)} --speed {setting.speed_rpm:g} --depth {1e3 * setting.depth:g}"
+    stable = "any depth" if limit is None else LENGTH.text(limit, ".3g")
+    text = f"{emulated.speed_rpm:.1f} rpm, stable up to ap {stable}, cut with ap {LENGTH.text(1e3 * setting.depth)}"
+    depth = length_argument(1e3 * setting.depth, "g")
+    words = f" --program {shlex.quote(program)} --speed {setting.speed_rpm:g} --depth {depth}"
     return emulated.device, truth, text, "listen", words
 
 

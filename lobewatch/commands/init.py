@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Option
 
 from lobewatch.commands.shared_options import FolderArgument
+from lobewatch.machine.settings.display_units import UnitSystem, shown_units
 from lobewatch.show.terminal.output import Json, emit, notes
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def init(
     example: Annotated[bool, Option("--example", help="Start from the example spindle with three programs.")] = False,
     yes: Annotated[bool, Option("--yes", help="Ask nothing. Settings without an option stay unchanged.")] = False,
     edit: Annotated[str, Option(help="Ask one question again, named by its option: --edit drive.")] = "",
+    units: Annotated[UnitSystem | None, Option(help="Units of lengths in answers and results.")] = None,
     name: Annotated[Answer, Option(help="Machine name.")] = None,
     speeds: Annotated[Answer, Option(help='Lowest and highest spindle speed (rpm): "1000 18000".')] = None,
     drive: Annotated[Answer, Option(help='Spindle power (kW) and torque (N m): "15 40".')] = None,
@@ -69,8 +71,8 @@ def init(
     else:
         text = make_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
     next_step = f"lobewatch tap {shlex.quote(str(machine))}"
-    if asks or answers or edit:
-        draft = _answer_settings(text, answers, edit, asks)
+    if asks or answers or edit or units:
+        draft = _answer_settings(text, answers, edit, asks, units)
         text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
     else:
         change = "adapt machine.toml to your machine" if example else "fill in machine.toml"
@@ -83,20 +85,22 @@ def init(
         notes.print(f"then check the sensors with a known mass (two minutes): {command}", markup=False)
 
 
-def _answer_settings(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> "MachineDraft":
+def _answer_settings(
+    text: str, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
+) -> "MachineDraft":
     """Make the draft from the answers in options and at the terminal."""
     from lobewatch.machine.setup_questions.draft import MachineDraft
     from lobewatch.machine.setup_questions.questions import SETUP_QUESTIONS, find_setup_question
     from lobewatch.show.terminal.setup_dialogue import answer_questions, ask_questions
 
     draft = MachineDraft(text, {})
+    draft = draft.set("machine", units=units) if units else draft
     chosen = (find_setup_question(edit),) if edit else SETUP_QUESTIONS
     if edit and not asks and edit not in answers:
         raise ValueError(f"--edit {edit} asks at a terminal, and there is none. Give the answer with --{edit} too.")
-    if not asks:
-        return answer_questions(draft, answers)
     try:
-        return ask_questions(draft, chosen, answers)
+        with shown_units(draft.table("machine").get("units", "metric")):
+            return ask_questions(draft, chosen, answers) if asks else answer_questions(draft, answers)
     except (EOFError, KeyboardInterrupt):
         notes.print("\nno file was written")
         raise KeyboardInterrupt from None

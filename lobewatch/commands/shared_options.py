@@ -14,7 +14,9 @@ from typer import Argument, BadParameter, Context, Option
 
 import acquisition
 from lobewatch.machine.folder_files import to_folder_path
+from lobewatch.machine.settings.display_units import read_units, reads_inches, shown_units
 from lobewatch.machine.settings.number_text import format_number, list_readings, read_number, read_numbers
+from lobewatch.show.terminal.output import notes
 
 
 def find_recording(path: Path | None) -> Path:
@@ -58,8 +60,12 @@ def power(text: str | float) -> float:
 
 def _quantity(text: str | float, kind: str) -> float:
     text = str(text).strip()
-    if re.fullmatch(r"(?:\d+[ -])?\d+/\d+", text):
+    is_inch, is_fraction = reads_inches() and kind != "_kw", re.fullmatch(r"(?:\d+[ -])?\d+/\d+", text)
+    if is_fraction and not is_inch:
         raise BadParameter(f"{text!r} has no unit. Write {text}in for inches.")
+    if is_inch and (is_fraction or re.fullmatch(r"[\d.,eE+-]+", text)):
+        text = f"{text}in" if is_fraction else f"{number(text):.12g}in"
+        notes.print(f"read as {text}", markup=False)
     if not re.search(r"\d\D*[^\W\d_\"]|\"", text) or re.fullmatch(r"[\d.]+[eE][+-]?\d+", text):
         return number(text)
     from lobewatch.machine.settings.unit_text import UNITS_BY_KEY_END, read_quantity
@@ -132,7 +138,16 @@ def local_time(text: str) -> datetime:
 
 
 Command = Callable[..., None]
-FolderArgument = functools.partial(Argument, parser=to_folder_path)
+
+
+def _use_units(ctx: Context, folder: Path | None) -> Path | None:
+    """Read and show lengths in the units of the machine from here on."""
+    if folder is not None:
+        ctx.with_resource(shown_units(read_units(folder)))
+    return folder
+
+
+FolderArgument = functools.partial(Argument, parser=to_folder_path, callback=_use_units, is_eager=True)
 WearScenarioName = Literal["steady", "step", "accelerating", "replaced", "none"]
 Machine = Annotated[Path, FolderArgument(help="Machine folder.")]
 TappedMachine = Annotated[Path, FolderArgument(help="Machine folder with at least one tap test.")]

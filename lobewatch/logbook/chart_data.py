@@ -13,6 +13,7 @@ from lobewatch.cuts.learning.program_learning import learn_spindle
 from lobewatch.history.tap_measurements import NotTappedError
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement import spindle_model
 from lobewatch.tool import lobe_chart
@@ -217,7 +218,7 @@ def collect_model_figure(logbook: Logbook, state: spindle_model.ModelState, mode
         points=_calibrated_points(logbook, state.tool),
         whirl=whirl_map(spindle, speeds, min(modes, 2)),
         highest_speed=machine.speed.high_rpm,
-        frf_place="at the tool tip" if position == 0 else f"{position * 1e3:g} mm from the tip",
+        frf_place="at the tool tip" if position == 0 else f"{LENGTH.text(position * 1e3)} from the tip",
         model_frf=spindle_model.compute_model_frf(state),
         measured_frf=_read_newest_frf(logbook, state.tool),
     )

@@ -19,6 +19,7 @@ from lobewatch.logbook.analysis import Analysis, Answer, P, answered_by
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
 from lobewatch.machine.folder_updates import store_hit_decisions, store_mode_edits
 from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.machine.settings.display_units import shown_units
 from lobewatch.machine.verify_files import enter_orphaned_taps
 from lobewatch.measurement.recording_questions import accept_questions, find_clock_questions, find_device_questions
 from lobewatch.measurement.tap_measurement import EDITS_NOT_APPLIED_CODE, Measurement, TapFit, fit_tap
@@ -122,7 +123,8 @@ class Logbook:
         """
         while True:
             try:
-                return question(self.analysis, *arguments, **options)
+                with shown_units(self.machine.machine.units):
+                    return question(self.analysis, *arguments, **options)
             except DamagedTapError as error:
                 self.files.leave_out(error)
                 self._current_analysis = None

@@ -46,7 +46,7 @@ WATCH_ROUTE_PREFIX = "watch-"
 HAS_FULL_ACCESS = web.RequestKey("HAS_FULL_ACCESS", bool)
 """Key of a request: True if it has the full token."""
 RESPONSE_HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",

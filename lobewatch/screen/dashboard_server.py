@@ -22,6 +22,7 @@ from lobewatch.notify.prometheus import PROMETHEUS_CONTENT_TYPE, format_promethe
 from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.access_control import HAS_FULL_ACCESS, PUBLIC_ROUTE_PREFIX, WATCH_ROUTE_PREFIX
 from lobewatch.screen.dashboard_table import DashboardTable
+from lobewatch.screen.lobes_page import add_stated_lobes
 from lobewatch.screen.phone_page import add_recording_upload
 from lobewatch.screen.web_server import ServerOptions, WebServerThread, add_pages, add_session, read_body
 from lobewatch.show.report.page import script_source
@@ -130,9 +131,15 @@ class DashboardServer(WebServerThread):
         self._reports: dict[str, tuple[str, str]] = {}
         self._end = threading.Event()
         self._verifier = threading.Thread(target=self._table.fleet.verify_until, args=(self._end,), daemon=True)
-        pages = {"/": "dashboard.html", "/tap/{machine}/": "screen.html", "/phone/": "phone.html"}
+        pages = {
+            "/": "dashboard.html",
+            "/tap/{machine}/": "screen.html",
+            "/phone/": "phone.html",
+            "/lobes/": "lobes.html",
+        }
         add_pages(self.application, pages)
         add_recording_upload(self.application, "/phone/")
+        add_stated_lobes(self.application, "/lobes/")
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
         router.add_get("/machines", self._list)

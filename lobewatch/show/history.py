@@ -19,6 +19,7 @@ from lobewatch.machine.journal.alarm_entries import Acknowledgement
 from lobewatch.machine.journal.entries import CutEntry, MaintenanceEvent
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
 from lobewatch.machine.journal.tap_entry import TapEntry
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
@@ -33,7 +34,8 @@ def cut_text(cut: CutEntry) -> str:
 def cut_summary_text(cut: CutEntry) -> str:
     """Return name, speed and depth of a test cut, its result, and its power."""
     named = cut.program or "reference cut"
-    words = f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {cut_result_text(cut)}, by {cut.by}"
+    depth = LENGTH.text(1e3 * cut.depth, ".4g")
+    words = f"{named} at {cut.speed_rpm:.6g} rpm, {depth}: {cut_result_text(cut)}, by {cut.by}"
     return words if cut.power is None else f"{words}, {power_text(cut.power, cut.cut)}"
 
 
@@ -118,7 +120,7 @@ MIN_SHORT_NAME = 6
 """Length of the shortest name of a tap test, the end of its identity, such as "x_ecbf" (characters)."""
 CONDITION_FORMATS = {
     "temperature_c": "{:g} °C",
-    "stick_out_mm": "stick-out {:g} mm",
+    "stick_out_mm": "stick-out {}",
     "drawbar_kn": "drawbar {:g} kN",
     "hours": "{:g} h running time",
     "state": "state {}",
@@ -265,4 +267,6 @@ def _note_text(line: Mapping[str, Any]) -> str:
 def condition_texts(conditions: Conditions) -> list[str]:
     """Return a few words for each specified condition of a tap test."""
     given = conditions.specified
+    if "stick_out_mm" in given:
+        given["stick_out_mm"] = LENGTH.text(given["stick_out_mm"])
     return [words.format(given[name]) for name, words in CONDITION_FORMATS.items() if name in given]

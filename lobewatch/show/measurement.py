@@ -7,6 +7,7 @@ from acquisition import Conditions
 from dsm import RemainingPreload
 from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement import Measurement, check_modes_together
 from lobewatch.measurement.recording_questions import RECORDING_QUESTIONS, find_accepted_codes, format_not_asked
 from lobewatch.monitoring.series_history import build_series_history, estimate_preload
@@ -55,7 +56,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> Texts:
     lobes = compute_lobes(assembly, logbook.machine).get(REFERENCE_CUT)
     if lobes is not None:
         low = lobes.minimum
-        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
+        texts.append(f"{REFERENCE_CUT}: lowest limit {LENGTH.text(low.depth * 1e3, '.2f')} at {low.speed_rpm:.0f} rpm")
     asked = [remark for remark in logbook.status().remarks if remark.about == f"tap test {m.tap_id}"]
     further = [remark for remark in assembly.remarks if remark.code not in RECORDING_QUESTIONS]
     return [*texts, *remark_lines(further), *(f"question ({remark.code}): {remark.text}" for remark in asked)]

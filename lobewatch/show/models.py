@@ -7,6 +7,7 @@ import numpy as np
 from acquisition.errors import join_sentences
 from dsm import Calibration, Joint, StiffnessFit, format_rounded, format_with_error
 from lobewatch.logbook.joint_calibration import JointCalibration
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement import ModelCalibration, ModelSummary
 from lobewatch.show.terminal.output import JsonObject, Texts, new_table, pick
 
@@ -113,7 +114,7 @@ def model_texts(model: ModelSummary) -> Texts:
         shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
         table.add_row(str(number), f"{mode.frequency:.2f}", stiffness, *shares)
     return [
-        f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
+        f"{model.state.title}: {spindle.theory}, {LENGTH.text(spindle.length * 1e3, '.1f')}, {spindle.mass:.2f} kg",
         f"bearing stiffness from {model.state.origin}",
         table,
         f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",

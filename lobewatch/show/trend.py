@@ -24,7 +24,8 @@ from lobewatch.show.terminal.status_labels import status_label
 
 FORECAST_ASSUMPTIONS = (
     "Dates assume unchanged use of the machine, without crashes or new faults. "
-    "On public records of 33 engines and one bearing, 18 % of the dates came before the 80 % range and 1 % after it. "
+    "On public records of 33 simulated engines and one measured bearing, 18 % of the dates came before the "
+    "80 % range and 1 % after it. "
     "These records also served to choose the settings."
 )
 """Note below every table of forecast dates."""

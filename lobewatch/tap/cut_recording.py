@@ -20,6 +20,7 @@ from lobewatch.cuts.chatter_detection.cut_search import CutSearch
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, CutSensor, compare_cuts
 from lobewatch.machine import MachineFolder, check_device_rate
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.tap.cut_stream import KEPT_SIGNAL_SECONDS, SignalBuffer
 from lobewatch.tap.device_connection import LEVEL_WINDOW, REPLAY_PREFIX, label_device, open_device
@@ -272,7 +273,9 @@ def acquire_cut(
         cure = "Give the recording of a cut with acquire_cut.file"
         raise ValueError(join_sentences(f"acquire_cut.port {port}: this is a recording of hits", cure))
     show("Move the accelerometer from the tool to the spindle housing. Run the spindle in air.")
-    show(f"Cut: {setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep")
+    show(
+        f"Cut: {setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {LENGTH.text(1e3 * setting.depth)} deep"
+    )
     with open_device(folder.machine.daq, port) as device:
         with folder.locked():
             check_device_rate(folder, device)
@@ -301,7 +304,7 @@ def check_file_options(sensor: str, tacho: str, pulses: int | None, file: Path |
 @contextlib.contextmanager
 def publish_cut_states(logbook: Logbook, setting: CutSetting) -> Iterator[StatePublisher[CutState]]:
     """Publish states from the move of the sensor on. An error raised within becomes the last state."""
-    cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
+    cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {LENGTH.text(1e3 * setting.depth)}"
     reason = "Move the sensor from the tool to the spindle housing. Run the spindle in air."
     publisher = StatePublisher(CutState(0, CutStep.SENSOR, f"{logbook.machine.machine.name}: {cut}", reason=reason))
     try:

@@ -12,6 +12,7 @@ from dsm import format_rounded
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import DiskReserve
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement import Measurement
 from lobewatch.measurement.recording_questions import check_question_codes, find_device_questions, find_open_questions
 from lobewatch.monitoring import SeriesStatus
@@ -254,7 +255,7 @@ def build_outcome(logbook: Logbook, measurement: Measurement, across: CrossTapRe
     texts += [remark.finding if remark.finding[-1] in ".!?" else f"{remark.finding}." for remark in remarks]
     verdicts = logbook.verdicts()
     programs = [
-        ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {cut.depth_mm:g} mm)", verdict.stability.value)
+        ProgramVerdict(f"{cut.name} ({cut.speed_rpm:g} rpm, {LENGTH.text(cut.depth_mm)})", verdict.stability.value)
         for verdict in verdicts
         if (cut := verdict.program)
     ]

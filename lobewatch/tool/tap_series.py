@@ -2,10 +2,11 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -14,9 +15,13 @@ import scipy
 from acquisition import CROSS_TAP, UNKNOWN_CONDITIONS, Conditions, Remark
 from lobewatch.arrays import Floats
 from lobewatch.machine import TapEntry
+from lobewatch.machine.settings.display_units import LENGTH
 
-SERIES_CONDITIONS = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")}
-"""Conditions that begin a new series, with label and format."""
+SERIES_CONDITIONS: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "stick_out_mm": ("stick-out", partial(LENGTH.text, form="g")),
+    "state": ("state", repr),
+}
+"""Conditions that begin a new series, with label and function that formats a value."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,8 @@ def _mounting_change_remark(before: ToolMounting, now: Conditions, earlier: Tool
     """Return the remark on a changed mounting; earlier: former series with that mounting."""
     changed = {name: SERIES_CONDITIONS[name] for name in _differing_conditions(before.conditions, now)}
     change = ", ".join(
-        f"{label} {value.format(getattr(now, name))} after {value.format(getattr(before.conditions, name))}"
-        for name, (label, value) in changed.items()
+        f"{label} {show(getattr(now, name))} after {show(getattr(before.conditions, name))}"
+        for name, (label, show) in changed.items()
     )
     if earlier is None:
         return Remark("new-series", before.first.tool, f"{change} begins a new series, not compared with earlier tests")

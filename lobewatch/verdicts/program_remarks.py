@@ -9,6 +9,7 @@ import numpy as np
 from acquisition import Remark
 from lobes.cut import CHECKED_DEPTH_SHARES
 from lobewatch.machine import Machine, MissingToolData, ProgramTable, ToolLimits, find_tool_limits
+from lobewatch.machine.settings.display_units import CUTTING_SPEED, FEED_PER_TOOTH, LENGTH, Quantity
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.measurement.coverage import describe_uncovered
 from lobewatch.verdicts.monte_carlo import MonteCarloResult
@@ -46,7 +47,7 @@ def tool_limit_remarks(table: ProgramTable, machine: Machine) -> Iterator[Remark
         yield _tool_limit_remark(table, _speed_text(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
-        allowed = f"{_range_text(borne.low, borne.high)} mm"
+        allowed = _range_text(borne.low, borne.high, FEED_PER_TOOTH)
         text = f"feed_per_tooth_mm = {feed:g} is outside {allowed} {_tool_text(table, limits)} ({borne.source})"
         yield _tool_limit_remark(table, text, f"Use {allowed}, or set the feed_per_tooth_mm of the tool maker")
 
@@ -74,8 +75,9 @@ def _speed_text(table: ProgramTable, limits: ToolLimits) -> str:
     speed, borne = math.pi * table.tool_diameter_mm / 1e3 * table.speed_rpm, limits.cutting_speed_m_min
     if borne is None:
         return f"{table.speed_rpm:g} rpm is outside the speed range of the spindle"
-    allowed = f"{_range_text(borne.low, borne.high)} m/min {_tool_text(table, limits)}"
-    return f"{table.speed_rpm:g} rpm gives {_number_text(speed)} m/min, outside {allowed} ({borne.source})"
+    allowed = f"{_range_text(borne.low, borne.high, CUTTING_SPEED)} {_tool_text(table, limits)}"
+    given = f"{_number_text(speed, CUTTING_SPEED)} {CUTTING_SPEED.unit}"
+    return f"{table.speed_rpm:g} rpm gives {given}, outside {allowed} ({borne.source})"
 
 
 def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
@@ -83,15 +85,15 @@ def _tool_text(table: ProgramTable, limits: ToolLimits) -> str:
     tool = "the fastest tool material" if limits.is_guessed else limits.tool.tool_material or "the tool"
     cut = "slotting" if limits.cut == "slot" else "side milling"
     material = f" of {table.material}" if table.material else ""
-    return f"allowed for {tool}, {table.tool_diameter_mm:g} mm, {cut}{material}"
+    return f"allowed for {tool}, {LENGTH.text(table.tool_diameter_mm)}, {cut}{material}"
 
 
-def _range_text(low: float, high: float) -> str:
-    return f"{_number_text(low)} to {_number_text(high)}"
+def _range_text(low: float, high: float, quantity: Quantity) -> str:
+    return f"{_number_text(low, quantity)} to {_number_text(high, quantity)} {quantity.unit}"
 
 
-def _number_text(value: float) -> str:
-    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+def _number_text(value: float, quantity: Quantity) -> str:
+    return quantity.number(value, ".3g" if value < 1000 else ".0f")
 
 
 NARROW_CUT_IMMERSION = 0.5
@@ -134,9 +136,9 @@ def _corner_remark(case: ProgramCase, result: MonteCarloResult) -> Remark:
     limit = min(float(ZeroOrderBatch.of(median.with_cut(way)).limits(speed)[0][0, 0]) for way in fed)
     ratio = limit / result.median.limit
     share = f", {100 * ratio:.0f} % of that on the straight path" if 0 < ratio < 1 else ""
-    corner = f"a corner of {radius:g} mm radius has ae {inside * table.tool_diameter_mm:.2g} mm"
-    limited = f"limit in the corner about {1e3 * limit:.2g} mm{share}"
-    text = f"evaluated at ae {radial:g} mm, but {corner} ({limited})"
+    corner = f"a corner of {LENGTH.text(radius)} radius has ae {LENGTH.text(inside * table.tool_diameter_mm, '.2g')}"
+    limited = f"limit in the corner about {LENGTH.text(1e3 * limit, '.2g')}{share}"
+    text = f"evaluated at ae {LENGTH.text(radial)}, but {corner} ({limited})"
     straight = f"[{radial:g}, {radial:g}] if the path is straight"
     cure = f"Set corner_radius_mm, or radial_depth_mm = [smallest, largest] ({straight})"
     return Remark("one-engagement", table.name, text, cure)

@@ -12,6 +12,7 @@ import numpy as np
 from acquisition import DataError, Remark
 from acquisition.errors import join_sentences
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
+from lobewatch.machine.settings.display_units import CUTTING_SPEED, LENGTH
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, CutRange
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.tool.assembly import Assembly
@@ -193,7 +194,7 @@ def _find_speed_conflict(reach: CutRange) -> tuple[str, ...]:
     if not reach.is_empty:
         return ()
     edge = limits.cutting_speed_m_min
-    edge_text = "" if edge is None else f" ({edge.high:.0f} m/min)"
+    edge_text = "" if edge is None else f" ({CUTTING_SPEED.text(edge.high, '.0f')})"
     is_capped = limits.high_rpm == limits.tool.max_speed_rpm
     why, cures = (" (max_speed_rpm)", MAX_SPEED_REMEDIES) if is_capped else (edge_text, TOOL_SPEED_REMEDIES)
     text = f"the tool limit is {reach.high_rpm:g} rpm{why}, below the lowest spindle speed of {speed.low_rpm:g} rpm"
@@ -237,7 +238,7 @@ def _explain_gap(search: SettingSearch, depth_mm: float | None, set_rpm: float |
     reach = search.cut_range
     if set_rpm is not None and not reach.low_rpm <= set_rpm <= reach.high_rpm:
         return f"{set_rpm:g} rpm is outside {reach.text}", FIXED_SPEED_REMEDIES
-    named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
+    named = "speed and depth" if depth_mm is None else f"speed for {LENGTH.text(depth_mm)}"
     reason = f"no stable {named} in {reach.text}" if set_rpm is None else f"no stable depth at {set_rpm:g} rpm"
     likely = search.likely_depths
     speed = float(likely.speeds[int(np.argmax(likely.depths))])

@@ -10,6 +10,7 @@ from acquisition import Remark
 from lobewatch.cuts.learning.cut_likelihood import CutEntries, CutEvidence, estimate_force_by_power
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, SPEED_STEP_RPM, CutRange, round_down_depth_mm
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.tap_series import interpolate_frequency
@@ -96,9 +97,8 @@ def apply_test_cuts(verdict: Verdict, tool: Assembly, machine: Machine, cuts: Cu
         return verdict
     found = (chattering or stable)[-1]
     word, what = (Stability.NOT_STABLE, "chatter") if chattering else (Stability.DOUBTFUL, "stable")
-    text = (
-        f"verdict based only on cut {found.id} ({what} at {1e3 * found.depth:.4g} mm), because stiffness K is unknown"
-    )
+    place = f"{what} at {LENGTH.text(1e3 * found.depth, '.4g')}"
+    text = f"verdict based only on cut {found.id} ({place}), because stiffness K is unknown"
     remark = Remark("heard-alone", program.name, text, "Tap the tool with an instrumented hammer")
     others = [other for other in verdict.remarks if other.code != NOT_CHECKED_CODE]
     return replace(verdict, stability=word, remarks=(remark, *others))

@@ -14,6 +14,7 @@ from lobewatch.arrays import Floats, Indices
 from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, CutPrediction, predict_cut
 from lobewatch.cuts.learning.prior_samples import SpindleSamples, sample_prior
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.verdicts.speed_drop import DEFAULT_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Uncertainty
 
@@ -304,7 +305,7 @@ def _repeats_of(cut: CutEvidence, posterior: Posterior) -> list[CutEvidence]:
 def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     """Build the remark on a rejected cut."""
     cut = contradicting.cut
-    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    at = f"at {cut.speed_rpm:.6g} rpm, {LENGTH.text(1e3 * cut.depth, '.4g')}"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong according to the other cuts"
     kind, exclude = contradicting.contradiction, "exclude the cut with folder_updates.exclude_entry"

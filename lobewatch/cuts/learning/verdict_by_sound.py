@@ -11,6 +11,7 @@ from lobewatch.cuts.learning.cut_likelihood import REPEAT_SPEED_TOLERANCE
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
 from lobewatch.machine import Machine, ProgramTable, drive_depth_limit
 from lobewatch.machine.journal.entries import CutEntry, geometry_key, list_decisive_cuts, material_key
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.verdicts.uncertainty_causes import NO_TAP_TEST
 from lobewatch.verdicts.verdict import Stability, Verdict
@@ -118,7 +119,7 @@ def make_contradiction_remark(cut: str, summary: str, cure: str = "Exclude the w
 
 
 def _describe(cut: CutEntry) -> str:
-    return f"{'chatter' if cut.has_chatter else 'stable'} at {1e3 * cut.depth:.4g} mm"
+    return f"{'chatter' if cut.has_chatter else 'stable'} at {LENGTH.text(1e3 * cut.depth, '.4g')}"
 
 
 def _decides(cut: CutEntry, program: ProgramTable, machine: Machine) -> bool:

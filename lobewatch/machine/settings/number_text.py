@@ -5,7 +5,7 @@ other numbers of the same answer decide. If both readings remain, the number is 
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 GROUP_SIGNS = "'\u2019\u00a0\u2009\u202f_"
 """Signs that only separate thousands: apostrophes, narrow blanks, and the underscore of TOML and Python."""
@@ -13,6 +13,12 @@ SEPARATED_NUMBER_PATTERN = rf"\d+(?:[.,{GROUP_SIGNS} ]\d+)*"
 """Number with any signs between its digits."""
 NUMBER_TOKEN_PATTERN = re.compile(rf"\d+(?:[.,{GROUP_SIGNS}]\d+)*(?:[eE][+-]?\d+)?")
 """Number with any signs between its digits, except for a blank, which ends it."""
+ANSWER_TOKEN_PATTERN = re.compile(
+    rf"(?:(?P<whole>\d+)-(?=\d+/\d))?(?P<number>{NUMBER_TOKEN_PATTERN.pattern})(?:/(?P<divisor>[1-9]\d*))?"
+    rf"(?:\s*(?P<unit>\"|(?:mm|um|µm|cm|in|inch|inches|mil|thou|ipt|in/tooth|hp|W)(?![^\s,;])))?",
+    re.IGNORECASE,
+)
+"""Number or fraction with a unit that may replace that of the question. A blank separates numbers: `1-1/2in`."""
 DECIMAL_SIGNS = (",.", ",", ".", "")
 """Signs that may be decimal in one answer. The other ones separate thousands."""
 ANSWER_UNITS = {"rpm", "1/min", "mm", "mm/tooth", "deg", "°", "kw", "nm", "n·m", "mv/n", "mv/g", "g", "v", "x"}
@@ -71,21 +77,41 @@ def read_numbers(texts: Sequence[str], limits: Sequence[ValueLimits | None] = ()
 
 
 def parse_numbers(
-    answer: str, names: Sequence[str], least: int | None = None, limits: Sequence[ValueLimits | None] = ()
+    answer: str,
+    names: Sequence[str],
+    least: int | None = None,
+    limits: Sequence[ValueLimits | None] = (),
+    units: Sequence[Mapping[str, float] | None] = (),
 ) -> list[float]:
     """Parse the numbers of an answer, at least `least` or one per name; ValueError names them.
 
-    limits: plausible range of each number, which tells a decimal sign from a separator of thousands.
+    limits: plausible range of each number, which tells a decimal sign from a separator of thousands. units: factor of
+    each unit of a number, "" without one; missing ones at the end are None, for a number without other units.
     """
-    words = NUMBER_TOKEN_PATTERN.sub(" ", answer)
+    words = ANSWER_TOKEN_PATTERN.sub(" ", answer)
     strange = [word for word in re.split(r"[\s,;]+", words) if word and word.casefold() not in ANSWER_UNITS]
     if strange:
         raise ValueError(f"{answer!r}: {strange[0]!r} is neither a number nor a unit. Enter {', '.join(names)}.")
-    numbers = NUMBER_TOKEN_PATTERN.findall(answer)
+    numbers = list(ANSWER_TOKEN_PATTERN.finditer(answer))
     if not (len(names) if least is None else least) <= len(numbers) <= len(names):
         count = "1 number" if len(numbers) == 1 else f"{len(numbers)} numbers"
         raise ValueError(f"{answer!r} has {count}. Enter {', '.join(names)}, with spaces only between them.")
-    return read_numbers(numbers, limits)
+    factors = [_unit_factor(*pair) for pair in zip(numbers, [*units, *[None] * len(numbers)], strict=False)]
+    scaled = [limit and (limit[0] / f, limit[1] / f) for limit, f in zip(limits, factors, strict=False)]
+    values = read_numbers([number["number"] for number in numbers], scaled)
+    wholes = [int(number["whole"] or 0) * int(number["divisor"] or 1) for number in numbers]
+    return [float(f"{(n + w) * f:.12g}") for n, w, f in zip(values, wholes, factors, strict=True)]
+
+
+def _unit_factor(token: re.Match[str], units: Mapping[str, float] | None) -> float:
+    """Return the factor that converts a number of an answer; ValueError for a unit of another quantity."""
+    factors = {name.casefold(): factor for name, factor in (units or {"": 1.0, "mm": 1.0}).items()}
+    if (unit := (token["unit"] or "").casefold()) not in factors:
+        allowed = ", ".join(name for name in units or () if name)
+        raise ValueError(f"{token[0]!r} has another unit. " + (f"Use {allowed}." if allowed else "Leave out the unit."))
+    if token["divisor"] and not unit and factors[unit] == 1:
+        raise ValueError(f"{token[0]!r} has no unit. Write {token[0]}in for inches.")
+    return factors[unit] / int(token["divisor"] or 1)
 
 
 def require_one_reading(text: str) -> None:

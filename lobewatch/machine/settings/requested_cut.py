@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from lobes import Cut
 from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, PowerReading, build_power_reading
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine
 from lobewatch.machine.settings.tool_limits import PROGRAM_KEYS_BY_TOOL_FIELD, find_common_values, find_tool_properties
@@ -128,7 +129,7 @@ def build_requested_program(machine: Machine, values: Mapping[str, Any]) -> Prog
     """
     complete = _complete_values(machine, values)
     _reject_missing(machine, complete, REQUIRED_CUT_KEYS)
-    table = ProgramTable(name=f"{complete['speed_rpm']:g} rpm, {complete['depth_mm']:g} mm", **complete)
+    table = ProgramTable(name=f"{complete['speed_rpm']:g} rpm, {LENGTH.text(complete['depth_mm'])}", **complete)
     machine.coefficients(table)
     return table
 
@@ -160,14 +161,15 @@ def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> Op
     diameter, radial = complete["tool_diameter_mm"], values.get("radial_depth_mm")
     direction = values.get("direction") or reference.get("direction")
     engagement = {"radial_depth_mm": radial or diameter, "direction": direction or "down"}
-    name = f"{complete['tool']}, " + (f"{radial:g} of {diameter:g} mm" if radial else f"slot of {diameter:g} mm")
+    width = f"{LENGTH.number(radial, 'g')} of" if radial else "slot of"
+    name = f"{complete['tool']}, {width} {LENGTH.text(diameter)}"
     engagement |= {"speed_rpm": machine.speed.high_rpm, "depth_mm": DEPTH_STEP_MM}
     table = ProgramTable(name=name, **complete | engagement)
     machine.coefficients(table)
     deepest, depth = table.deepest_mm, values.get("depth_mm")
     if depth is not None and depth > deepest:
         of = "the flutes" if table.flute_length_mm else "one diameter, the limit without flute_length_mm"
-        raise ValueError(f"ProgramTable.depth_mm {depth:g} is deeper than {of}. Give up to {deepest:g} mm.")
+        raise ValueError(f"ProgramTable.depth_mm {depth:g} is deeper than {of}. Give up to {LENGTH.text(deepest)}.")
     return OpenCut(table, direction is None, bool(reference))
 
 

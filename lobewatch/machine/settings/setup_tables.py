@@ -11,6 +11,7 @@ import acquisition
 from acquisition import Channel, DeviceSettings, SensorInput, TapDirection
 from acquisition.channel import ChannelQuantity
 from acquisition.text_boards.decoders import FrameFormat, OutputFormat
+from lobewatch.machine.settings.display_units import UnitSystem
 from lobewatch.machine.settings.toml import NotNegative, Plausible, Positive, TomlTable
 
 SensorMounting = Literal["stud", "glue", "wax", "magnet", "hand"]
@@ -54,6 +55,8 @@ class MachineTable(TomlTable, frozen=True):
 
     name: Annotated[str, Meta(min_length=1)]
     """Name of the machine."""
+    units: UnitSystem = "metric"
+    """Units of lengths without a unit in options, and of texts for people."""
     tap_interval_days: Annotated[Positive, Plausible(0.5, 400)] | None = None
     """Agreed interval of tap tests (days); None: nobody has set one."""
     accepted: tuple[str, ...] = ()

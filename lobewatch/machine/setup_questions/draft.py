@@ -18,6 +18,7 @@ from acquisition.devices.registry import convert_driver_errors
 from lobewatch.machine.settings.machine_file import parse_machine_file
 from lobewatch.machine.settings.number_text import format_number
 from lobewatch.machine.settings.toml import TablePath, TomlValue, edit_toml, parse_toml_tables
+from lobewatch.machine.settings.unit_text import convert_unit_texts
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class MachineDraft:
 
     def table(self, name: str, number: int | None = None) -> dict[str, Any]:
         """Return the values of a table; empty without one."""
-        table: Any = parse_toml_tables(self.text)
+        table: Any = convert_unit_texts(parse_toml_tables(self.text))
         for part in name.split("."):
             table = table.get(part, {})
         if number is None:
@@ -149,7 +150,7 @@ class SetupQuestion:
     name: str
     """Name of the question."""
     text: str
-    """Text of the question."""
+    """Text of the question, a format with the unit of lengths: {length}."""
     example: str
     """Example of an answer."""
     read_current: Callable[[MachineDraft], str]
@@ -169,6 +170,6 @@ def is_open_answer(answer: str) -> bool:
     return answer.strip().casefold() in (OPEN_ANSWER, "none", "no", "not known", "unknown")
 
 
-def format_answer(*values: float) -> str:
-    """Format numbers as they are typed."""
-    return " ".join(map(format_number, values))
+def format_answer(*values: float | str) -> str:
+    """Format numbers as they are typed; texts stay."""
+    return " ".join(value if isinstance(value, str) else format_number(value) for value in values)

@@ -7,6 +7,7 @@ from typing import Any, get_args
 from acquisition import DeviceSettings, find_driver, list_driver_names
 from lobes import TOOL_MATERIALS, ToolMaterial
 from lobewatch.machine.settings.cut_tables import CutTable, DriveTable
+from lobewatch.machine.settings.display_units import LENGTH, length_argument, length_units
 from lobewatch.machine.settings.number_text import ValueLimits, parse_numbers
 from lobewatch.machine.settings.setting_questions import (
     DEPTH_RATIO_RANGE,
@@ -16,6 +17,7 @@ from lobewatch.machine.settings.setting_questions import (
 from lobewatch.machine.settings.setup_tables import ChannelTable, DaqTable, SensorMounting, SpeedTable, TapTable
 from lobewatch.machine.settings.speed_range import parse_speed_range
 from lobewatch.machine.settings.toml import TomlTable, TomlValue, find_plausible_ranges
+from lobewatch.machine.settings.unit_text import POWER_UNITS
 from lobewatch.machine.setup_questions import draft as setup
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion
 
@@ -162,7 +164,7 @@ def _set_drive(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft.set("drive", power_kw=None, torque_nm=None) if draft.table("drive") else draft
     names, limits = ("power in kW", "torque in N m"), _limits(DriveTable, "power_kw", "torque_nm")
-    power, torque = parse_numbers(answer, names, limits=limits)
+    power, torque = parse_numbers(answer, names, None, limits, [{"": 1.0} | POWER_UNITS])
     return draft.set("drive", power_kw=power, torque_nm=torque)
 
 
@@ -173,18 +175,21 @@ _TOOL_MATERIALS_TEXT = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]
 
 def _current_tool(draft: MachineDraft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
-    values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
+    diameter = length_argument(cut.get("tool_diameter_mm", 20), ".10g")
+    values = [cut.get("teeth", 4), diameter, cut.get("helix_deg", 30)]
     made_of = draft.table("tool", draft.find_number("tool", "name", draft.table("tap")["tool"])).get("tool_material")
-    numbers = setup.format_answer(*values, *([stick_out] if stick_out else []))
+    numbers = setup.format_answer(*values, *([length_argument(stick_out, ".10g")] if stick_out else []))
     return f"{numbers} {made_of}" if made_of else numbers
 
 
 def _set_tool(draft: MachineDraft, answer: str) -> MachineDraft:
-    length = f"stick-out in mm (optional) and tool material (optional: {_TOOL_MATERIALS_TEXT})"
+    length = f"stick-out in {LENGTH.unit} (optional) and tool material (optional: {_TOOL_MATERIALS_TEXT})"
     numbers, made_of = _split_tool_answer(answer)
-    names = ("flutes", "diameter in mm", "helix in deg", length)
+    names = ("flutes", f"diameter in {LENGTH.unit}", "helix in deg", length)
     limits = [*_limits(CutTable, "teeth", "tool_diameter_mm", "helix_deg"), *_limits(TapTable, "stick_out_mm")]
-    teeth, diameter, helix, *stick_out = parse_numbers(numbers, names, 3, limits)
+    teeth, diameter, helix, *stick_out = parse_numbers(
+        numbers, names, 3, limits, (None, length_units(), None, length_units())
+    )
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} is not a number of flutes. Begin with a whole number.")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
@@ -235,8 +240,9 @@ def _current_program(draft: MachineDraft) -> str:
     program = draft.table("program", 0)
     if not program:
         return setup.OPEN_ANSWER
-    keys = ("speed_rpm", "depth_mm", "radial_depth_mm", "feed_per_tooth_mm")
-    return f"{program['name']}: {setup.format_answer(*(program[key] for key in keys if key in program))}"
+    keys = ("depth_mm", "radial_depth_mm", "feed_per_tooth_mm")
+    lengths = [length_argument(program[key], ".10g") for key in keys if key in program]
+    return f"{program['name']}: {setup.format_answer(program['speed_rpm'], *lengths)}"
 
 
 def _program_limits(draft: MachineDraft, diameter: float) -> list[ValueLimits | None]:
@@ -250,10 +256,11 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
     if setup.is_open_answer(answer):
         return draft
     name, colon, numbers = answer.rpartition(":")
-    names = ("speed in rpm", "axial depth in mm", "radial depth in mm", "feed per tooth in mm (optional)")
+    names = ("speed in rpm", *(f"{what} in {LENGTH.unit}" for what in ("axial depth", "radial depth")))
+    names = (*names, f"feed per tooth in {LENGTH.unit} (optional)")
     cut = draft.table("reference_cut")
     limits = _program_limits(draft, cut["tool_diameter_mm"])
-    speed, depth, radial, *feed = parse_numbers(numbers, names, 3, limits)
+    speed, depth, radial, *feed = parse_numbers(numbers, names, 3, limits, (None, *[length_units()] * 3))
     shared: dict[str, Any] = {key: cut[key] for key in cut if key not in ("radial_depth_mm", "feed_per_tooth_mm")}
     name = name.strip() if colon else "first cut"
     setting: dict[str, TomlValue] = {"speed_rpm": speed, "depth_mm": depth, "radial_depth_mm": radial}
@@ -262,14 +269,15 @@ def _set_program(draft: MachineDraft, answer: str) -> MachineDraft:
 
 
 _TOOL_TEXT = (
-    f"Flutes, diameter (mm), helix (deg), stick-out (mm) and material ({_TOOL_MATERIALS_TEXT}) of the tapped tool"
+    "Flutes, diameter ({length}), helix (deg), stick-out ({length}) and material "
+    f"({_TOOL_MATERIALS_TEXT}) of the tapped tool"
 )
 _MATERIAL_TEXT = "Workpiece material (lobes.materials_by_name lists all), or Kt and Kr (N/mm2)"
 _MATERIAL_EXAMPLE = "42CrMo4, 1.7225, AA 6061, 700 250"
-_PROGRAM_TEXT = "Speed (rpm), axial depth ap, radial depth ae and feed per tooth (mm) of the first program"
+_PROGRAM_TEXT = "Speed (rpm), axial depth ap, radial depth ae and feed per tooth ({length}) of the first program"
 _SENSOR_TEXT = "DAQ input, sensitivity from the calibration sheet (mV/{}), range (V)"
 _DRIVE_TEXT = "Power (kW) and torque (N m) of the spindle motor"
-_EXAMPLE_TOOL = "4 20 30 80 coated carbide"
+_EXAMPLE_TOOL = "4 20mm 30 80mm coated carbide, 4 1/2in 30 3in carbide"
 SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     SetupQuestion("name", "Name of the machine", "mill-3", _current_name, _set_name),
     SetupQuestion("speeds", "Lowest and highest spindle speed (rpm)", "1000 18000", _current_speeds, _set_speeds),
@@ -282,7 +290,13 @@ SETUP_QUESTIONS: tuple[SetupQuestion, ...] = (
     SetupQuestion("fixing", _FIXING_TEXT, "4.5 wax", _current_mounting, _set_mounting),
     SetupQuestion("tool", _TOOL_TEXT, _EXAMPLE_TOOL, _current_tool, _set_tool),
     SetupQuestion("material", _MATERIAL_TEXT, _MATERIAL_EXAMPLE, _current_material, _set_material),
-    SetupQuestion("program", _PROGRAM_TEXT, "slot: 8000 2 20 0.1", _current_program, _set_program),
+    SetupQuestion(
+        "program",
+        _PROGRAM_TEXT,
+        "slot: 8000 2mm 20mm 0.1mm, slot: 8000 0.08in 3/4in 0.004in",
+        _current_program,
+        _set_program,
+    ),
 )
 """All questions, in their order."""
 

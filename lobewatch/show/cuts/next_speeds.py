@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from lobewatch.cuts.learning.next_speed import NextSpeed, NextSpeeds
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.requested_cut import CutSetting
 from lobewatch.show.cuts.suggested_cuts import observe_text
 from lobewatch.show.programs.advice import format_rpm
@@ -51,9 +52,11 @@ def next_speeds_texts(found: NextSpeeds) -> Texts:
     texts: Texts = [*_contradiction_lines(found), *filter(None, [sentence])]
     if not found.speeds:
         return texts
-    table = new_table("speed (rpm)", "depth (mm)", "stable depth / here", "pocket (rpm)", "waves per flute")
+    table = new_table("speed (rpm)", f"depth ({LENGTH.unit})", "stable depth / here", "pocket (rpm)", "waves per flute")
     for speed in found.speeds:
-        depth = f"{1e3 * speed.depth:.4g}" if math.isfinite(speed.depth) else "as before"
+        depth = (
+            LENGTH.number(LENGTH.round_down(1e3 * speed.depth), ".4g") if math.isfinite(speed.depth) else "as before"
+        )
         first, last = (format_rpm(round(edge)) for edge in speed.window_rpm)
         row = format_rpm(speed.speed_rpm), depth, _gain_text(speed.relative_depth), f"{first}..{last}", f"{speed.lobe}"
         table.add_row(*row)
@@ -75,7 +78,7 @@ def untapped_texts(setting: CutSetting, found: NextSpeeds, folder: Path) -> Text
     ]
     following = _next_cut(setting, found)
     if following is not None:
-        texts.append(observe_text(folder, str(setting.program), following[0], f"{1e3 * following[1]:.4g}"))
+        texts.append(observe_text(folder, str(setting.program), following[0], 1e3 * following[1]))
     return texts
 
 

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from lobewatch.cuts.chatter_detection.cut_evaluation import group_peaks
 from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.show.cuts.recorded_cuts import cut_verdict_label
 from lobewatch.show.figures.drawing import Paint, new_axes, save_figure
 from lobewatch.tap.cut_recording import MAX_CURVE_FREQUENCY
@@ -35,7 +36,7 @@ def save_cut_spectrum(comparisons: Sequence[CutComparison], path: Path) -> None:
 def _draw_spectrum(axis: Axes, comparison: CutComparison) -> None:
     spectrum = comparison.detected.spectrum
     setting = comparison.setting
-    depth = f", {1e3 * setting.depth:.3g} mm" if math.isfinite(setting.depth) else ""
+    depth = f", {LENGTH.text(1e3 * setting.depth, '.3g')}" if math.isfinite(setting.depth) else ""
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm{depth}"
     axis.set_title(f"{named}: {cut_verdict_label(comparison)}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")

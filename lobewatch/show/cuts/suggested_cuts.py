@@ -14,6 +14,7 @@ from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
 from lobewatch.cuts.learning.suggestion import Suggestion
 from lobewatch.machine import ProgramTable
+from lobewatch.machine.settings.display_units import LENGTH, length_argument
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import chance_text, factor_text
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, pick, remark_lines
@@ -22,6 +23,10 @@ from lobewatch.verdicts.speed_pockets import MAX_POCKET_GAIN, SpeedPocket
 
 def _round_to_mm(depth: float) -> float:
     return round(1e3 * depth, 4)
+
+
+def _depth_text(depth: float) -> str:
+    return LENGTH.text(_round_to_mm(depth))
 
 
 def _known_mm(depth: float) -> float | None:
@@ -79,19 +84,20 @@ def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first
     if following is not None:
         speed, depth = following
         number = f"test cut {len(depths[0].cuts) + 1} of at most {MAX_POCKET_CUTS} in the nearest pocket"
-        yield f"{table.name}: {format_rpm(speed)} rpm, {_round_to_mm(depth):g} mm ({number})"
-        yield observe_text(folder, table.name, speed, f"{_round_to_mm(depth):g}")
+        yield f"{table.name}: {format_rpm(speed)} rpm, {_depth_text(depth)} ({number})"
+        yield observe_text(folder, table.name, speed, _round_to_mm(depth))
     stable = [tried for tried in depths if tried.stable_depth]
     for tried in stable:
-        chatter = f", chatter at {_round_to_mm(tried.chatter_depth):g} mm" if math.isfinite(tried.chatter_depth) else ""
-        place = f"{_round_to_mm(tried.stable_depth):g} mm at {format_rpm(tried.speed_rpm)} rpm"
+        chatter = f", chatter at {_depth_text(tried.chatter_depth)}" if math.isfinite(tried.chatter_depth) else ""
+        place = f"{_depth_text(tried.stable_depth)} at {format_rpm(tried.speed_rpm)} rpm"
         yield f"Recommended after {count_noun(len(tried.cuts), 'cut')}: {place}, stable{chatter}"
     if not stable:
         yield "No recommended depth yet: no test cut in a pocket was stable"
 
 
-def observe_text(folder: Path, program: str, speed: float, depth: str) -> str:
+def observe_text(folder: Path, program: str, speed: float, depth_mm: float) -> str:
     """Return the command that enters the result of a test cut."""
+    depth = length_argument(depth_mm, ".4g")
     observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
     return f"Enter the result: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
 
@@ -130,18 +136,17 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     if cut is None:
         yield f"{program.name}: {_no_suggestion_text(next_cut)}"
     else:
-        depth = f"{1e3 * cut.depth:.4g}"
         number = f"test cut {n_made + 1} of {n_made + next_cut.cuts_left}"
-        yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {depth} mm ({number})"
+        yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {LENGTH.text(1e3 * cut.depth, '.4g')} ({number})"
         risk = chance_text(cut.chatter_probability)
         yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, learning)}"
-        yield observe_text(folder, program.name, cut.speed_rpm, depth)
+        yield observe_text(folder, program.name, cut.speed_rpm, 1e3 * cut.depth)
         if program.feed_per_tooth_mm is not None:
             yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."
     best = _best_stable_cut(learning)
     if best is not None:
         gain = f", expected gain of the next test cut {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
-        yield f"Best stable test cut: {1e3 * best[1]:.4g} mm at {format_rpm(best[0])} rpm{gain}"
+        yield f"Best stable test cut: {LENGTH.text(1e3 * best[1], '.4g')} at {format_rpm(best[0])} rpm{gain}"
     yield "A test cut may chatter. For safe settings run lobewatch check."
 
 

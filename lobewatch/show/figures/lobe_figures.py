@@ -25,6 +25,7 @@ from lobewatch.history.history import compute_row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.entries import CutEntry, geometry_key
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.show.figures.drawing import LabelPlacer, Paint, lay_out, new_axes, save_figure
 from lobewatch.show.terminal.output import count_noun
 from lobewatch.tool import LobeChart, LobeMethod, compute_lobe_chart, speed_grid
@@ -47,7 +48,7 @@ LARGE_FIGURE_SIZE, SMALL_FIGURE_SIZE = (8.0, 4.6), (6.4, 4.4)
 """Size of a separate diagram, and of the one in the report (inches)."""
 MAP_LEVELS = 12
 """Number of levels of a map."""
-DEPTH_SCALE_LABEL = "limiting depth ap (mm), brightest: top value or more"
+DEPTH_SCALE_LABEL = "limiting depth ap ({}), brightest: top value or more"
 MAX_DAYS_WITH_TIME = 10.0
 """Longest range that is labelled with times, not only with dates (days)."""
 TEST_CUT_MARKS = {False: ("test cut, stable", Paint.GOOD, "o"), True: ("test cut, chatter", Paint.ALARM, "x")}
@@ -91,22 +92,24 @@ def plot_lobes(diagram: LobeDiagram, title: str = "", *, is_small: bool = False)
     figure, (axes,) = new_axes(1, SMALL_FIGURE_SIZE if is_small else LARGE_FIGURE_SIZE)
     speed_rpm, band = diagram.now.speed_rpm, diagram.band
     *earlier, (label, now) = diagram.depths.items()
-    finite = now[np.isfinite(now)] * 1e3
-    wanted = [verdict.program.depth_mm for verdict in diagram.verdicts]
-    wanted += [pocket.depth_mm for pocket in diagram.pockets] + [1e3 * cut.depth for cut in diagram.heard]
-    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
+    scale = 1e3 * LENGTH.scale
+    finite = now[np.isfinite(now)] * scale
+    wanted = [LENGTH.scale * verdict.program.depth_mm for verdict in diagram.verdicts]
+    wanted += [LENGTH.scale * pocket.depth_mm for pocket in diagram.pockets]
+    wanted += [scale * cut.depth for cut in diagram.heard]
+    top = max([5 * float(finite.min()) if finite.size else LENGTH.scale, *(1.3 * depth for depth in wanted)])
     edges = (now, now) if band is None else (band.low, band.high)
-    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in edges)
+    low, high = (np.minimum(edge * scale, 2 * top) for edge in edges)
     axes.fill_between(speed_rpm, high, 2 * top, color=Paint.NEWEST, alpha=0.10, lw=0)
     if band is not None:
         axes.fill_between(speed_rpm, low, high, color=Paint.NEWEST, alpha=0.35, lw=0, label=BAND_LABEL)
-    axes.plot(speed_rpm, now * 1e3, color=Paint.NEWEST, lw=1.6, label=label)
+    axes.plot(speed_rpm, now * scale, color=Paint.NEWEST, lw=1.6, label=label)
     for first, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=Paint.FIRST, ls="--", lw=1.2, label=f"{first}, first tap tests")
+        axes.plot(speed_rpm, depth * scale, color=Paint.FIRST, ls="--", lw=1.2, label=f"{first}, first tap tests")
     if diagram.learned is not None:
         _draw_learned(axes, diagram.learned, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth ap (mm)")
+    axes.set(xlabel="spindle speed (rpm)", ylabel=f"limiting depth ap ({LENGTH.unit})")
     _draw_marks(axes, diagram)
     figure.legend(loc="outside lower center", ncols=1 if is_small else 2, frameon=False, fontsize=9)
     lay_out(figure)
@@ -120,8 +123,8 @@ def plot_waterfall(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, 
     top = _map_limit(depth)
     rows, columns = _cell_edges(date2num(times), 30.0), _cell_edges(speed_rpm, 1.0)
     style: dict[str, Any] = {"cmap": DEPTH_COLORMAP, "vmin": 0, "vmax": top, "rasterized": True}
-    mesh = axes.pcolormesh(columns, rows, np.minimum(depth * 1e3, top), **style)
-    figure.colorbar(mesh, ax=axes, label=DEPTH_SCALE_LABEL)
+    mesh = axes.pcolormesh(columns, rows, np.minimum(depth * (1e3 * LENGTH.scale), top), **style)
+    figure.colorbar(mesh, ax=axes, label=DEPTH_SCALE_LABEL.format(LENGTH.unit))
     axes.yaxis.set_major_locator(AutoDateLocator())
     axes.yaxis.set_major_formatter(DateFormatter("%Y-%m-%d" if np.ptp(rows) > MAX_DAYS_WITH_TIME else "%Y-%m-%d %H:%M"))
     axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="date", xlim=(speed_rpm[0], speed_rpm[-1]))
@@ -137,18 +140,21 @@ def plot_radial_map(lobes: RadialLobes, diameter: float, present: float, title: 
     """
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     depths = np.asarray(MaxNLocator(MAP_LEVELS).tick_values(0, _map_limit(lobes.depth)))[1:]
-    radial, softness = lobes.immersion * diameter * 1e3, 1e-3 / lobes.depth
+    scale = 1e3 * LENGTH.scale
+    radial, softness = lobes.immersion * diameter * scale, 1 / (scale * lobes.depth)
     levels = 1 / depths[::-1]
     colours = colormaps[DEPTH_COLORMAP](np.linspace(1, 0, levels.size + 1))
     mesh = axes.contourf(lobes.speed_rpm, radial, softness, levels=levels, colors=colours, extend="both")
     axes.contour(lobes.speed_rpm, radial, softness, levels=levels, colors="black", linewidths=0.3)
-    axes.axhline(present * diameter * 1e3, color=Paint.ALARM, ls="--", lw=2, clip_on=False)
-    bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=DEPTH_SCALE_LABEL)
+    axes.axhline(present * diameter * scale, color=Paint.ALARM, ls="--", lw=2, clip_on=False)
+    bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=DEPTH_SCALE_LABEL.format(LENGTH.unit))
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
     if lobes.remarks:
         figure.supxlabel(fill(join_sentences(*map(str, lobes.remarks)), 120), fontsize=8)
-    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth ae (mm), dashed: ae of the cut")
+    axes.set(
+        title=title, xlabel="spindle speed (rpm)", ylabel=f"radial depth ae ({LENGTH.unit}), dashed: ae of the cut"
+    )
     axes.grid(visible=False)
     return figure
 
@@ -161,18 +167,19 @@ def _cell_edges(middles: Floats, alone: float) -> Floats:
 
 
 def _map_limit(depth: Floats) -> float:
-    """Return the largest depth (mm) of a map of depths (m)."""
-    finite = depth[np.isfinite(depth)] * 1e3
-    return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
+    """Return the largest depth (shown unit) of a map of depths (m)."""
+    finite = depth[np.isfinite(depth)] * (1e3 * LENGTH.scale)
+    return min(6 * float(finite.min()), float(finite.max())) if finite.size else LENGTH.scale
 
 
 def _draw_learned(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
-    """Draw the line and the band of the rotating spindle, clipped at the deepest depth (mm)."""
+    """Draw the line and the band of the rotating spindle, clipped at the deepest depth (shown unit)."""
+    scale = 1e3 * LENGTH.scale
     label = f"at speed, learned from {count_noun(learnt.n_cuts, 'test cut')}"
     left = "uncertainty band (98 %) after test cuts"
-    low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
+    low, high = (np.minimum(edge * scale, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNED_PURPLE, alpha=0.25, lw=0, label=left)
-    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
+    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * scale, color=LEARNED_PURPLE, ls="-.", lw=1.6, label=label)
 
 
 def _draw_marks(axes: Axes, diagram: LobeDiagram) -> None:
@@ -180,36 +187,36 @@ def _draw_marks(axes: Axes, diagram: LobeDiagram) -> None:
     for chatters, (name, colour, mark) in TEST_CUT_MARKS.items():
         marked = [cut for cut in diagram.heard if cut.has_chatter == chatters]
         if marked:
-            places = [cut.speed_rpm for cut in marked], [1e3 * cut.depth for cut in marked]
+            places = [cut.speed_rpm for cut in marked], [1e3 * LENGTH.scale * cut.depth for cut in marked]
             axes.plot(*places, mark, color=colour, mfc="none", ms=TEST_CUT_MARK_SIZE, mew=2.2, zorder=4, label=name)
     style: dict[str, Any] = {"fc": "white", "ec": POCKET_GREEN, "lw": 1.2, "hatch": "////"}
     for i, pocket in enumerate(diagram.pockets):
-        (low, high), depth = pocket.window_rpm, pocket.depth_mm
+        (low, high), depth = pocket.window_rpm, LENGTH.scale * pocket.depth_mm
         axes.add_patch(
             Rectangle((low, 0), high - low, depth, label="" if i else "recommended speeds and depths", **style)
         )
     for program in diagram.verdicts:
         paint, symbol = VERDICT_MARKS[program.stability]
-        place = program.program.speed_rpm, program.program.depth_mm
+        place = program.program.speed_rpm, LENGTH.scale * program.program.depth_mm
         axes.plot(*place, symbol, color=paint, ms=PROGRAM_MARK_SIZE, mec="white")
 
 
 def _label_marks(axes: Axes, diagram: LobeDiagram, *, is_small: bool) -> None:
     """Label test cuts with their chatter frequency, pockets and programs; is_small: only names of programs."""
-    labels = LabelPlacer(axes, may_lack=is_small)
+    labels, scale = LabelPlacer(axes, may_lack=is_small), LENGTH.scale
     for cut in diagram.heard:
-        labels.reserve_mark((cut.speed_rpm, 1e3 * cut.depth), TEST_CUT_MARK_SIZE)
+        labels.reserve_mark((cut.speed_rpm, 1e3 * scale * cut.depth), TEST_CUT_MARK_SIZE)
     for cut in diagram.heard:
         if cut.chatter_frequency_hz is not None:
-            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), Paint.ALARM)
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * scale * cut.depth), Paint.ALARM)
     for pocket in diagram.pockets:
-        labels.reserve_area((pocket.window_rpm[0], 0.0), (pocket.window_rpm[1], pocket.depth_mm))
-    places = [(program.program.speed_rpm, program.program.depth_mm) for program in diagram.verdicts]
+        labels.reserve_area((pocket.window_rpm[0], 0.0), (pocket.window_rpm[1], scale * pocket.depth_mm))
+    places = [(program.program.speed_rpm, scale * program.program.depth_mm) for program in diagram.verdicts]
     for place in places:
         labels.reserve_mark(place, PROGRAM_MARK_SIZE)
     for pocket in () if is_small else diagram.pockets:
-        text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
-        labels.add(text, (pocket.speed_rpm, pocket.depth_mm), POCKET_GREEN, ("above", "right", "left"))
+        text = f"{pocket.speed_rpm:.0f} rpm\n{LENGTH.text(pocket.depth_mm, '.2f')}"
+        labels.add(text, (pocket.speed_rpm, scale * pocket.depth_mm), POCKET_GREEN, ("above", "right", "left"))
     for program, place in zip(diagram.verdicts, places, strict=True):
         name = program.program.name
         labels.add(name if is_small else f"{name}\n{program.stability}", place)

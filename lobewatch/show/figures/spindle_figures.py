@@ -14,6 +14,7 @@ from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap, format_with_error
 from lobewatch.arrays import Complexes, Floats
 from lobewatch.logbook import ModelFigureData
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.show.figures.drawing import FIGURE_STYLE, Paint
 from lobewatch.show.figures.response_drawing import compute_phase, mark_unexplained, set_coherence_axis, set_phase_axis
 from modal import (
@@ -227,31 +228,34 @@ def plot_model(picture: ModelFigureData) -> Figure:
 
 def draw_shaft(axes: Axes, spindle: Spindle) -> None:
     """Draw the shaft to scale, the tool tip at the left, with triangles for bearings and dashed lines for joints."""
-    start = 0.0
+    start, scale = 0.0, 1e3 * LENGTH.scale
     for segment in spindle.segments:
         _draw_segment(axes, segment, start)
         start += segment.length
     for bearing in spindle.bearings:
-        z, radius = bearing.position * 1e3, _radius_at(spindle, bearing.position) * 1e3 + 5
+        z, radius = bearing.position * scale, (_radius_at(spindle, bearing.position) + 5e-3) * scale
         for y, marker in ((-radius, "^"), (radius, "v")):
             axes.plot(z, y, marker, color=Paint.NEWEST, ms=7, mec="white", mew=0.5)
     for mass in spindle.masses:
-        axes.plot(mass.position * 1e3, 0, "o", color=Paint.ALARM, ms=9, mec="white")
+        axes.plot(mass.position * scale, 0, "o", color=Paint.ALARM, ms=9, mec="white")
     for joint in spindle.joints:
-        axes.axvline(joint.position * 1e3, color=Paint.ALARM, ls="--", lw=1)
+        axes.axvline(joint.position * scale, color=Paint.ALARM, ls="--", lw=1)
     axes.axhline(0, color="black", lw=0.6, ls=(0, (12, 3, 2, 3)))
-    axes.set(xlabel="distance from the tool tip (mm)", ylabel="radius (mm)", title="shaft, to scale")
-    axes.set_xlim(-0.02 * start * 1e3, 1.02 * start * 1e3)
+    axes.set(
+        xlabel=f"distance from the tool tip ({LENGTH.unit})", ylabel=f"radius ({LENGTH.unit})", title="shaft, to scale"
+    )
+    axes.set_xlim(-0.02 * start * scale, 1.02 * start * scale)
     axes.set_aspect("equal", adjustable="datalim", anchor="C")
     axes.grid(visible=False)
 
 
 def _draw_segment(axes: Axes, segment: Segment, start: float) -> None:
-    z = np.array([start, start + segment.length]) * 1e3
-    outer, bore = np.array([segment.diameters_at(share) for share in (0.0, 1.0)]).T * 500
+    scale = 1e3 * LENGTH.scale
+    z, half = np.array([start, start + segment.length]) * scale, scale / 2
+    outer, bore = np.array([segment.diameters_at(share) for share in (0.0, 1.0)]).T * half
     for side in (-1, 1):
         if segment.mass_diameter is not None:
-            axes.fill_between(z, side * outer, side * segment.mass_diameter * 500, color=STEEL_GREY, alpha=0.4, lw=0)
+            axes.fill_between(z, side * outer, side * segment.mass_diameter * half, color=STEEL_GREY, alpha=0.4, lw=0)
         axes.fill_between(z, side * bore, side * outer, facecolor=STEEL_GREY, edgecolor="#5b6770", lw=0.8)
 
 
@@ -270,9 +274,11 @@ def draw_shapes(axes: Axes, modes: Modes) -> None:
         shape = modes.deflection[number]
         shape = shape / np.max(np.abs(shape)) * (np.sign(shape[0]) or 1.0)
         label = f"mode {number + 1}: {modes.frequency[number]:.0f} Hz"
-        axes.plot(modes.position * 1e3, shape, color=colour, ls=dashes, lw=1.6, label=label)
+        axes.plot(modes.position * (1e3 * LENGTH.scale), shape, color=colour, ls=dashes, lw=1.6, label=label)
     axes.axhline(0, color="black", lw=0.6)
-    axes.set(xlabel="distance from the tool tip (mm)", ylabel="deflection / maximum (-)", title="mode shapes")
+    axes.set(
+        xlabel=f"distance from the tool tip ({LENGTH.unit})", ylabel="deflection / maximum (-)", title="mode shapes"
+    )
     axes.set_ylim(-1.1, 1.1)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), fontsize=8, ncols=2)
 

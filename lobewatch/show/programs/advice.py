@@ -15,6 +15,7 @@ from lobes import PocketShift, StabilityLobes
 from lobewatch.logbook import Analysis, LobeComparison, Logbook
 from lobewatch.logbook.chart_data import NO_POCKET_CODE
 from lobewatch.machine import REFERENCE_CUT, Machine
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.settings.drive_power import CutRange
 from lobewatch.show.programs.verdicts import (
     at_speed_text,
@@ -145,10 +146,8 @@ def advice_items(program: ProgramAdvice, machine: Machine) -> list[str]:
             first, *others = _alternative_items(program, machine)  # open measurements come first
             items += [f"Until the verdict is clear, {first[:1].lower()}{first[1:]}", *others]
     if verdict.is_beyond_drive:
-        deepest = math.floor(verdict.drive_limit * 1e5) / 100
-        items.append(
-            f"Drive limit: cut no deeper than {deepest:.2f} mm at this speed, or correct [drive] in machine.toml"
-        )
+        deepest = LENGTH.text_at_most(math.floor(verdict.drive_limit * 1e5) / 100, ".2f")
+        items.append(f"Drive limit: cut no deeper than {deepest} at this speed, or correct [drive] in machine.toml")
     return items
 
 
@@ -185,11 +184,13 @@ def _alternative_items(advice: ProgramAdvice, machine: Machine) -> list[str]:
         return [f"Run this depth at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}", *margin_items(best)]
     items = list[str]()
     if shallower is None or (best.speed_rpm, best.depth_mm) != (shallower.speed_rpm, shallower.depth_mm):
-        items.append(f"Run {best.depth_mm:g} mm at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}")
+        items.append(
+            f"Run {LENGTH.text_at_most(best.depth_mm)} at {format_rpm(best.speed_rpm)} rpm, {window_text(best)}"
+        )
         items += [f"Highest removal rate, {margins_text(best).lower()}", risk_text(best)]
     if shallower is not None:
         cut = "Or cut" if items else "Cut"
-        items.append(f"{cut} at most {shallower.depth_mm:g} mm at this speed, {window_text(shallower)}")
+        items.append(f"{cut} at most {LENGTH.text_at_most(shallower.depth_mm)} at this speed, {window_text(shallower)}")
         items += margin_items(shallower)
     return [*items, f"No stable speed for this depth {reach}"]
 
@@ -261,7 +262,7 @@ def _shift_json(shift: PocketShift) -> JsonObject:
 def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> Texts:
     """Return the newest diagram in words, its pockets, and the verdicts on the programs with this cut."""
     now, verdicts, low = comparison.now, comparison.verdicts, comparison.now.lobes.minimum
-    lowest = f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm"
+    lowest = f"lowest limit {LENGTH.text(low.depth * 1e3, '.3f')} at {low.speed_rpm:.0f} rpm"
     origin = [f"computed from the {now.source} of {now.assembly.tap_id}", tap_age_text(now.assembly)]
     texts: Texts = [
         f"{'stated cut' if now.assembly.is_stated else now.name}: {now.lobes.method_text}",
@@ -287,13 +288,20 @@ def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> T
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Return a table with a line for each recommended pocket."""
-    table = new_table("speed (rpm)", "stable (rpm)", "ap (mm)", "depth\nmargin", "f1\nmargin", "chatter\nat speed")
+    table = new_table(
+        "speed (rpm)", "stable (rpm)", f"ap ({LENGTH.unit})", "depth\nmargin", "f1\nmargin", "chatter\nat speed"
+    )
     for pocket in pockets:
         window = "{:.0f}..{:.0f}".format(*pocket.window_rpm)
         margin = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
         drop = f"{100 * pocket.drop_margin:.0f} %{' or more' if pocket.drop_margin >= CHECKED_DROPS[-1] else ''}"
         table.add_row(
-            f"{pocket.speed_rpm:.0f}", window, f"{pocket.depth_mm:.2f}", margin, drop, chance_text(pocket.chatter_risk)
+            f"{pocket.speed_rpm:.0f}",
+            window,
+            LENGTH.number(LENGTH.round_down(pocket.depth_mm), ".2f"),
+            margin,
+            drop,
+            chance_text(pocket.chatter_risk),
         )
     return table
 
@@ -304,6 +312,6 @@ def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
         before, after = shift.before, shift.after
         yield (
             f"pocket moved from {before.speed_rpm:.0f} to {after.speed_rpm:.0f} rpm ({100 * shift.speed_change:+.1f} %)"
-            f", its depth from {before.depth * 1e3:.2f} to {after.depth * 1e3:.2f} mm "
+            f", its depth from {LENGTH.number(before.depth * 1e3, '.2f')} to {LENGTH.text(after.depth * 1e3, '.2f')} "
             f"({100 * shift.depth_change:+.1f} %)"
         )

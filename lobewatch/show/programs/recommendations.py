@@ -11,6 +11,13 @@ from acquisition.errors import join_sentences
 from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.machine import ProgramTable
 from lobewatch.machine.journal.journal import format_command
+from lobewatch.machine.settings.display_units import (
+    CUTTING_SPEED,
+    FEED_PER_TOOTH,
+    FEED_RATE,
+    LENGTH,
+    REMOVAL_RATE,
+)
 from lobewatch.show.programs.advice import (
     LINE_REMARK_CODES,
     format_rpm,
@@ -123,7 +130,8 @@ def _recommended_lines(answer: Recommendation) -> Iterator[str]:
 
 def _setting_text(setting: Setting, answer: Recommendation) -> str:
     edge = cutting_speed(setting, answer.program)
-    return f"{format_rpm(setting.speed_rpm)} rpm, ap {setting.depth_mm:g} mm, cutting speed {edge:.0f} m/min"
+    depth, speed = LENGTH.text_at_most(setting.depth_mm), CUTTING_SPEED.text(edge, ".0f")
+    return f"{format_rpm(setting.speed_rpm)} rpm, ap {depth}, cutting speed {speed}"
 
 
 def _margin_items(setting: Setting, answer: Recommendation, feed: str = "") -> list[str]:
@@ -134,12 +142,13 @@ def _removal_rate_text(setting: Setting, answer: Recommendation) -> str:
     program = answer.program
     if answer.feed_mm is None:
         rate = removal_rate(setting, program, UNIT_FEED_MM)
-        return f"Removal rate {rate:.3g} cm3/min per {UNIT_FEED_MM:g} mm feed per tooth"
+        return f"Removal rate {REMOVAL_RATE.text(rate, '.3g')} per {FEED_PER_TOOTH.text(UNIT_FEED_MM)} feed per tooth"
     feeds = list(dict.fromkeys(answer.feed_mm))
-    rates = " to ".join(f"{removal_rate(setting, program, feed):.3g}" for feed in feeds)
-    speeds = " to ".join(format_rpm(round(feed * (program.teeth * setting.speed_rpm))) for feed in feeds)
-    per_tooth = " to ".join(f"{feed:.3g}" for feed in feeds)
-    return f"Removal rate {rates} cm3/min at {per_tooth} mm feed per tooth ({speeds} mm/min)"
+    rates = " to ".join(REMOVAL_RATE.number(removal_rate(setting, program, feed), ".3g") for feed in feeds)
+    rates_of_feed = [FEED_RATE.number(feed * (program.teeth * setting.speed_rpm), ".0f") for feed in feeds]
+    speeds = f"{' to '.join(format_rpm(float(rate)) for rate in rates_of_feed)} {FEED_RATE.unit}"
+    per_tooth = " to ".join(FEED_PER_TOOTH.number(feed, ".3g") for feed in feeds)
+    return f"Removal rate {rates} {REMOVAL_RATE.unit} at {per_tooth} {FEED_PER_TOOTH.unit} feed per tooth ({speeds})"
 
 
 def _other_remarks(answer: Recommendation) -> list[Remark]:
@@ -180,8 +189,15 @@ def _pitch_json(pitch: PitchEvaluation, depth_mm: float | None) -> JsonObject:
 
 def pitches_texts(proposal: PitchProposal, remarks: Sequence[Remark], depth_mm: float | None) -> Texts:
     """Return a table of the patterns, and the proposed one; depth_mm: requested depth of cut, None for any."""
-    headings = "<pitch\n(deg)", "<pattern", "limit (mm)\n98 % interval", "gain", "largest\nchip", "off-\ncentre"
-    table = new_table(*headings, *([] if depth_mm is None else [f"<verdict at\n{depth_mm:g} mm"]))
+    headings = (
+        "<pitch\n(deg)",
+        "<pattern",
+        f"limit ({LENGTH.unit})\n98 % interval",
+        "gain",
+        "largest\nchip",
+        "off-\ncentre",
+    )
+    table = new_table(*headings, *([] if depth_mm is None else [f"<verdict at\n{LENGTH.text(depth_mm)}"]))
     for pitch in (proposal.equal, *proposal.unequal):  # one line for each part of its angles, at least two
         verdict = [] if depth_mm is None else [[pitch.stability.value]]
         for cells in zip_longest(*_pitch_columns(pitch, pitch is proposal.equal), *verdict, fillvalue=""):
@@ -197,7 +213,7 @@ def _pitch_columns(pitch: PitchEvaluation, is_equal: bool) -> Iterator[list[str]
     """Return the lines of each column except the verdict."""
     gain, low, high = (f"{100 * share:+.0f}" for share in (pitch.gain, pitch.gain_low, pitch.gain_high))
     depths = pitch.limit, pitch.low, pitch.high
-    limit, least, most = (f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none" for depth in depths)
+    limit, least, most = (LENGTH.number(1e3 * depth, ".2f") if math.isfinite(depth) else "none" for depth in depths)
     yield textwrap.wrap(" ".join(f"{angle:.4g}" for angle in pitch.pattern.pitch_deg), MIN_COLUMN_WIDTH)
     yield [pitch.pattern.name]
     yield [limit, f"({least}..{most})"]
@@ -216,7 +232,9 @@ def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
     angles = ", ".join(f"{angle:g}" for angle in proposed.pattern.pitch_deg)
     share = math.ceil(100 * proposed.share_worse)
     largest, fed = proposed.pattern.feed_ratio_range[1], program.feed_per_tooth_mm
-    chip = "" if fed is None else f", {fed * largest:.3g} mm at {fed:g} mm feed per tooth"
+    chip = ""
+    if fed is not None:
+        chip = f", {FEED_PER_TOOTH.text(fed * largest, '.3g')} at {FEED_PER_TOOTH.text(fed)} feed per tooth"
     yield f"Best pitches {at}: pitch_deg = [{angles}]"
     yield from wrap_lines(
         [
@@ -230,7 +248,7 @@ def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:
 
 def _equal_pitch_reason(proposal: PitchProposal) -> str:
     if not math.isfinite(proposal.equal.limit):
-        return f"no stability limit up to {MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm:g} mm"
+        return f"no stability limit up to {LENGTH.text(MAX_PROGRAM_DEPTH_RATIO * proposal.verdict.program.depth_mm)}"
     if not proposal.unequal:
         return "no unequal pitch keeps chip load and balance within limits"
     return f"no unequal pitch raises the lower end of the 98 % interval by {100 * (MIN_PITCH_GAIN - 1):.0f} %"

@@ -12,6 +12,7 @@ from lobes.floquet.program_limit import MAX_PROGRAM_DEPTH_RATIO
 from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine, SpeedTable, UncertaintyTable
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement.chain_check import find_weakest_check
 from lobewatch.measurement.tap_age import format_age
 from lobewatch.show.terminal.output import JsonObject, Texts, count_noun, new_table, remark_lines
@@ -123,7 +124,7 @@ def limits_at_speed_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
         if not (verdict.n_cuts or math.isnan(verdict.limit_at_speed))
     ]
     if texts:
-        yield f"Limit at speed, lowest over the frequency drop (mm): {', '.join(texts)}"
+        yield f"Limit at speed, lowest over the frequency drop ({LENGTH.unit}): {', '.join(texts)}"
 
 
 def at_speed_text(verdicts: Sequence[Verdict]) -> str:
@@ -222,7 +223,6 @@ VERDICT_STYLES: Mapping[Stability, VerdictStyle] = {
     Stability.UNKNOWN: VerdictStyle("?", "doubt", "bold"),
 }
 """Style of each verdict, the same everywhere."""
-VERDICT_HEADINGS = "~program", "speed\n(rpm)", "ap\n(mm)", "limit (mm)\n98 % interval", "chatter\nrisk"
 
 
 def verdict_json(verdict: Verdict) -> JsonObject:
@@ -268,10 +268,17 @@ def limits_json(verdict: Verdict) -> JsonObject:
 
 def verdict_table(verdicts: Sequence[Verdict], margins: Sequence[str] = ()) -> Table:
     """Return a table with a line for each program; margins: f1 margin of each, if shown."""
-    table = new_table(*VERDICT_HEADINGS, *(["f1\nmargin"] if margins else []), "~verdict")
+    unit = LENGTH.unit
+    headings = "~program", "speed\n(rpm)", f"ap\n({unit})", f"limit ({unit})\n98 % interval", "chatter\nrisk"
+    table = new_table(*headings, *(["f1\nmargin"] if margins else []), "~verdict")
     for i, verdict in enumerate(verdicts):
         program = verdict.program
-        numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(verdict), chatter_risk_text(verdict))
+        numbers = (
+            f"{program.speed_rpm:g}",
+            LENGTH.number(program.depth_mm, "g"),
+            limits_text(verdict),
+            chatter_risk_text(verdict),
+        )
         is_limited = verdict.stability is Stability.STABLE and verdict.is_beyond_drive
         style = "bold" if is_limited else VERDICT_STYLES[verdict.stability].style
         table.add_row(escape(program.name), *numbers, *margins[i : i + 1], f"[{style}]{verdict_text(verdict)}[/]")
@@ -347,7 +354,7 @@ def is_safe(verdict: Verdict) -> bool:
 def _depth_text(depth: float, verdict: Verdict) -> str:
     mm = 1e3 * (_searched_depth(verdict) if math.isinf(depth) else depth)
     digits = 2 if mm < 99.995 else 1 if mm < 999.95 else 0
-    return f"{'> ' if math.isinf(depth) else ''}{mm:.{digits}f}"
+    return f"{'> ' if math.isinf(depth) else ''}{LENGTH.number(mm, f'.{digits}f')}"
 
 
 def _searched_depth(verdict: Verdict) -> float:

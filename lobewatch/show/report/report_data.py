@@ -17,6 +17,7 @@ from lobewatch.history.tap_measurements import measure_excluded_taps
 from lobewatch.logbook import Analysis
 from lobewatch.logbook.machine_forecast import MachineForecast, forecast_from_analysis
 from lobewatch.machine import Machine
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement import Estimate, Measurement
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
@@ -129,7 +130,7 @@ class ReportData:
     def tap_place(self) -> str:
         """Point of excitation and response, as text."""
         distance = self.machine.tap.position_mm
-        return f"{distance:g} mm from the tool tip" if distance else "at the tool tip"
+        return f"{LENGTH.text(distance)} from the tool tip" if distance else "at the tool tip"
 
     @property
     def unexplained_peaks(self) -> Sequence[UnexplainedPeak]:

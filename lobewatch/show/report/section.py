@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from acquisition import Frf
 from lobewatch.arrays import Floats
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.show.figures.drawing import render_svg
 from lobewatch.show.terminal.option_names import with_option_names
 
@@ -36,8 +37,8 @@ class NumberTable(NamedTuple):
     def from_lobes(cls, speed_rpm: Floats, depths: Iterable[tuple[str, Floats]]) -> Self:
         """Tabulate named limiting depths (m) over speed."""
         names, values = zip(*depths, strict=True)
-        heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in names)]
-        columns = np.column_stack([speed_rpm, *(1e3 * depth for depth in values)])
+        heads = ["speed (rpm)", *(f"{name}: limiting depth ({LENGTH.unit})" for name in names)]
+        columns = np.column_stack([speed_rpm, *(1e3 * LENGTH.scale * depth for depth in values)])
         return cls(heads, columns[:: math.ceil(speed_rpm.size / MAX_FIGURE_LINES)].tolist())
 
     @classmethod

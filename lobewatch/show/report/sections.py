@@ -12,6 +12,7 @@ import numpy as np
 from acquisition import merge_remarks
 from lobewatch.history import HistoryRow
 from lobewatch.machine import REFERENCE_CUT
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.monitoring import SeriesStatus
 from lobewatch.monitoring.change_detection import MIN_MONITORED_POINTS, SURE_CHANGE_SCORE
@@ -100,8 +101,8 @@ def make_programs(data: ReportData) -> list[Section]:
     if not data.programs:
         return []
     dates = {} if data.no_dates else {name: texts for name, *texts in trends.forecast_date_rows(data.outlook)}
-    heads = ["program", "verdict", *(DATE_HEADS if dates else ()), "run instead", "speed (rpm)", "ap (mm)"]
-    heads += ["limit, 98 % interval (mm)", "limit at speed (mm)", "ap margin"]
+    heads = ["program", "verdict", *(DATE_HEADS if dates else ()), "run instead", "speed (rpm)", f"ap ({LENGTH.unit})"]
+    heads += [f"limit, 98 % interval ({LENGTH.unit})", f"limit at speed ({LENGTH.unit})", "ap margin"]
     heads += ["chatter risk", "f1 margin", "first verdict"]
     table = DataTable(heads, [_program_row(program, dates) for program in data.programs], "words")
     checked = [program.verdict for program in data.programs if program.verdict.stability is not Stability.UNKNOWN]
@@ -125,7 +126,7 @@ def _program_row(program: ProgramAdvice, dates: dict[str, list[str]]) -> list[st
         *(dates.get(verdict.program.name, ["-", "-"]) if dates else ()),
         alternative_text(program),
         format_rpm(verdict.program.speed_rpm),
-        f"{verdict.program.depth_mm:g}",
+        LENGTH.number(verdict.program.depth_mm, "g"),
         verdicts.limits_text(verdict).replace("..", " to "),
         verdicts.limit_at_speed_text(verdict),
         verdicts.margin_text(verdict),
@@ -147,7 +148,11 @@ def alternative_text(program: ProgramAdvice) -> str:
         return "no change"
     if program.verdict.stability is Stability.UNKNOWN or assembly is None or not assembly.is_complete:
         return "unknown, reasons below"
-    texts = [f"{format_rpm(item.speed_rpm)} rpm, {item.depth_mm:g} mm" for item in settings if item is not None]
+    texts = [
+        f"{format_rpm(item.speed_rpm)} rpm, {LENGTH.text_at_most(item.depth_mm)}"
+        for item in settings
+        if item is not None
+    ]
     return " or ".join(dict.fromkeys(texts)) or "another tool (no stable speed)"
 
 
@@ -262,10 +267,12 @@ def make_events(data: ReportData) -> list[Section]:
 
 def make_test_cuts(data: ReportData) -> list[Section]:
     """Make the table of test cuts, the newest first."""
-    heads, rows = ["time", "cut", "tool", "rpm", "ap (mm)", "detected", "by"], list[list[str]]()
+    heads, rows = ["time", "cut", "tool", "rpm", f"ap ({LENGTH.unit})", "detected", "by"], list[list[str]]()
     for cut in reversed(data.analysis.cuts):
         about = [f"{cut.at.astimezone():%Y-%m-%d %H:%M}", cut.program or REFERENCE_CUT, cut.tool]
-        rows.append([*about, f"{cut.speed_rpm:.0f}", f"{1e3 * cut.depth:.4g}", cut_result_text(cut), cut.by])
+        rows.append(
+            [*about, f"{cut.speed_rpm:.0f}", LENGTH.number(1e3 * cut.depth, ".4g"), cut_result_text(cut), cut.by]
+        )
     table = DataTable(heads, rows, "words", numbers=NumberTable(heads, rows))
     return [Section("Test cuts", [table], "folded")] if rows else []
 

@@ -25,12 +25,20 @@ from rich.text import Text
 from acquisition import Remark, merge_remarks
 from acquisition.credentials import hide_passwords
 from acquisition.errors import CONTROL_CHARACTERS
+from lobewatch.machine.settings.display_units import metric_output
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-Json = Annotated[bool, typer.Option("--json", help="JSON on stdout.")]
+
+def _keep_metric(ctx: typer.Context, is_json: bool) -> bool:
+    if is_json:
+        ctx.with_resource(metric_output())
+    return is_json
+
+
+Json = Annotated[bool, typer.Option("--json", callback=_keep_metric, is_eager=True, help="JSON on stdout.")]
 
 JsonObject = dict[str, Any]
 """Object of the JSON output."""
@@ -82,12 +90,8 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
-        import msgspec  # only JSON output waits for it
-
-        plain = with_option_names_inside(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
-        exact = hide_passwords(
-            json.dumps(plain, allow_nan=False, indent=2, ensure_ascii=False)
-        )  # newlines only between
+        exact = hide_passwords(json.dumps(plain_json(payload), allow_nan=False, indent=2, ensure_ascii=False))
+        # newlines are only between lines
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
@@ -100,6 +104,14 @@ def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
         else:
             width = text.min_table_width if isinstance(text, SafeTable) else 0
             results.print(text, width=max(Console().width, width) if width else None)
+
+
+def plain_json(payload: JsonObject) -> JsonObject:
+    """Return an object as JSON knows it: records become objects, infinite and NaN become null."""
+    import msgspec  # only JSON output waits for it
+
+    plain: JsonObject = with_option_names_inside(msgspec.to_builtins(payload, enc_hook=lambda array: array.tolist()))
+    return plain
 
 
 def print_always(text: str) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from acquisition.errors import join_sentences
+from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.machine.setup_questions.draft import MachineDraft, SetupQuestion, find_daqs
 from lobewatch.machine.setup_questions.questions import DAQ_QUESTION, SETUP_QUESTIONS
 from lobewatch.show.terminal.output import notes
@@ -49,7 +50,7 @@ def _answer_by_option(draft: MachineDraft, question: SetupQuestion, answers: Map
 
 def _ask(draft: MachineDraft, question: SetupQuestion, number: int) -> MachineDraft:
     """Ask one question until its answer is valid."""
-    _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text}")
+    _print_notes(f"\n{number}/{len(SETUP_QUESTIONS)} {question.name}: {question.text.format(length=LENGTH.unit)}")
     _print_notes(f"    for example: {question.example}")
     while True:
         current = question.read_current(draft)

@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -153,7 +153,10 @@ def test_the_present_time_without_a_zone_is_local(text: str) -> None:
 @pytest.mark.parametrize("text", ["2026-11-01T10:00", "2026-11-01 10:00:00", "20261101T1000"])
 def test_a_local_time_needs_no_seconds(text: str) -> None:
     assert local_time(text) == datetime(2026, 11, 1, 10)  # noqa: DTZ001 (local time)
-    assert local_time(f"{text}Z") == datetime(2026, 11, 1, 10, tzinfo=UTC).astimezone().replace(tzinfo=None)
+    for offset in (5, -8):
+        zone = timezone(timedelta(hours=offset))
+        moment = datetime(2026, 11, 1, 10, tzinfo=zone).astimezone().replace(tzinfo=None)
+        assert local_time(f"{text}{offset:+03d}:00") == moment
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_where_nobody_sits_nothing_is_asked_and_the_template_is_as_it_was(run: R
     [
         ("speeds", "18000 1000", ("low_rpm=18000", "high_rpm=1000")),
         ("speeds", "1000,18000", ("1 number", "rpm")),
-        ("drive", "15 hp 40 Nm", ("'hp'",)),
+        ("drive", "15 lb 40 Nm", ("'lb'",)),
         ("daq", "/dev/ttyNOPE acme", ("'acme'", "taps, dataq")),
         ("daq", "7", ("7",)),
         ("hammer", "0 2.25", ("2 numbers", "mV/N")),

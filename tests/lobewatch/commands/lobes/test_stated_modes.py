@@ -59,6 +59,20 @@ def test_pockets_of_stated_modes_are_below_the_limit_of_the_semi_discretisation(
     assert {"modes-stated", "diameter-assumed"} <= {remark["code"] for remark in answer["remarks"]}
 
 
+def test_the_radial_depth_of_a_stated_cut_counts() -> None:
+    def lowest(*size: str) -> float:
+        return float(json.loads(invoke(["lobes", *MODES, *CUT, *size, "--json"]).stdout)["minimum_depth_mm"])
+
+    slot, thin = lowest("--diameter", "20"), lowest("--diameter", "20", "--radial-depth", "4")
+    material = materials_by_name()[fold_material_name("EN AW-6061")]
+    cut = Cut(4, 0.2, "down", material.tangential, material.radial)
+    x, y = [Mode(600.0, 0.03, 1e7)], [Mode(650.0, 0.03, 1.2e7)]
+    speeds = np.linspace(6000.0, 12000.0, 400)
+    feeds = [zero_order_lobes(*modes, cut, speeds).minimum.depth for modes in ((x, y), (y, x))]
+    assert thin == pytest.approx(1e3 * min(feeds), rel=0.002)
+    assert thin != pytest.approx(slot, rel=0.1)
+
+
 @pytest.mark.parametrize(("depth", "verdict"), [("0.2", "stable"), ("5", "not stable")])
 def test_a_setting_on_stated_modes_has_a_verdict(depth: str, verdict: str) -> None:
     answer = json.loads(invoke(["lobes", *MODES, *CUT, "--speed", "8600", "--depth", depth, "--json"]).stdout)

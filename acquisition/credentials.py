@@ -6,8 +6,11 @@ import sys
 from pathlib import Path
 from urllib.parse import unquote
 
-ADDRESS_PASSWORD = re.compile(r"""(?i)\b([a-z][a-z0-9+.-]*:/+[^\s/?#@:"'<>]*):([^\s"'<>]*)@""")
-"""User and password in an address, to its last at sign: a password may hold one that is not percent-encoded."""
+ADDRESS_PASSWORD = re.compile(r"""(?i)\b([a-z][a-z0-9+.-]{0,20}:/+[^\s/?#@:"'<>]{0,200}):([^\s"'<>]{0,1000})@""")
+"""User and password in an address, to its last at sign: a password may hold one that is not percent-encoded.
+
+The lengths are limited, so that a text made to be slow is not.
+"""
 QUERY_PASSWORD = re.compile(r"""(?i)\b((?:ssl)?password=)[^\s&"'<>]+""")
 """Password among the settings of an address or a connection text of PostgreSQL."""
 ARGUMENT_FIELDS = slice(45, 47)

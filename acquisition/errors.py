@@ -11,6 +11,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from acquisition.credentials import hide_passwords
+
 PERMISSION_ERRNOS = (errno.EACCES, errno.EPERM, errno.EROFS)
 """Error numbers of a place without write permission or without any."""
 REMEDY_BY_ERRNO = {
@@ -61,12 +63,12 @@ class DataError(ValueError):
 
 
 def format_error(error: Exception) -> str:
-    """Return any error as a sentence, with its type if it is unexpected."""
+    """Return any error as a sentence without passwords, with its type if it is unexpected."""
     if isinstance(error, OSError) and error.filename and error.strerror:
-        return format_os_error(error)
+        return hide_passwords(format_os_error(error))
     if isinstance(error, (ValueError, OSError, ArithmeticError)):
-        return str(error)
-    return f"unexpected {type(error).__name__}: {error}"
+        return hide_passwords(str(error))
+    return f"unexpected {type(error).__name__}: {hide_passwords(str(error))}"
 
 
 def format_os_error(error: OSError) -> str:

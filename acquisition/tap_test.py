@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal, Self
 
 from acquisition.channel import TapDirection, parse_direction
+from acquisition.credentials import hide_passwords
 from acquisition.errors import DataError, check_name
 from acquisition.frf import Frf
 from acquisition.hit import Hit
@@ -135,7 +136,7 @@ class Circumstances:
     operator: str = ""
     """Name of the person with the hammer."""
     machine_toml: str = ""
-    """Text of the machine file at that time."""
+    """Text of the machine file at that time, without passwords."""
     device: str = ""
     """Recording device: model, serial number and firmware of the DAQ, and how lost scans were detected."""
     conditions: Conditions = UNKNOWN_CONDITIONS
@@ -145,6 +146,7 @@ class Circumstances:
         parse_direction(self.direction)
         if self.created.tzinfo is None:
             raise ValueError(f"created={self.created} has no time zone. Give one, as in datetime.now(UTC).")
+        object.__setattr__(self, "machine_toml", hide_passwords(self.machine_toml))
 
     @property
     def device_identity(self) -> DeviceIdentity:

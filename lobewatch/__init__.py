@@ -5,4 +5,7 @@
 
 import lazy_loader
 
+from lobewatch.foreign_packages import guard_imports
+
+guard_imports()
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

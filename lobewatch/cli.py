@@ -17,6 +17,7 @@ import typer
 from lobewatch.commands import COMMANDS, GROUPS
 from lobewatch.commands.help_page import HelpCommand, HelpGroup, get_page_width
 from lobewatch.commands.verbosity import QUIET_HELP, VERBOSE_HELP, apply_verbosity
+from lobewatch.foreign_packages import ForeignPackageError, refuse_foreign_packages
 
 GC_THRESHOLD = 100_000
 """Number of new objects between two garbage collections. Imports make 200 000 objects that stay."""
@@ -28,6 +29,8 @@ class _LazyCommands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in COMMANDS:
             raise KeyError(name)
+        if name != "doctor":
+            refuse_foreign_packages()
         command = getattr(import_module(f"lobewatch.commands.{name}"), name)
         holder = typer.Typer(rich_markup_mode=None)
         if isinstance(command, typer.Typer):
@@ -124,6 +127,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # show "?" for characters that the console lacks
     try:
+        from acquisition.credentials import hide_arguments
+
+        hide_arguments()
         app(terminal_width=get_page_width())
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -131,6 +137,9 @@ def main() -> None:
     except Exception as error:
         if "--debug" in sys.argv:
             raise
+        if isinstance(error, ForeignPackageError):
+            sys.stderr.write(f"error: {error}\n")
+            sys.exit(2)
         from rich.markup import escape
 
         from acquisition.errors import format_error

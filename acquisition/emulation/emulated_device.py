@@ -204,6 +204,8 @@ class TcpWire:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
         self._listener = socket.create_server((address, number), family=family)
         self._host: socket.socket | None = None
+        self.host_address = ""
+        """Address and TCP port of the newest host."""
         host = f"[{address}]" if ":" in address else address
         self.port = f"socket://{host}:{self._listener.getsockname()[1]}"
         """Port that the host opens."""
@@ -231,24 +233,29 @@ class TcpWire:
             if writable:
                 del self.pending[: self._host.send(memoryview(self.pending)[:65536].tobytes())]
             data = self._host.recv(65536) if readable else None
-        except ConnectionError:
+        except BlockingIOError:
+            data = None
+        except OSError:
             data = b""
         if data == b"":
-            self._hang_up()
+            self.hang_up()
         return data or b""
 
     def close(self) -> None:
-        self._hang_up()
+        self.hang_up()
         self._listener.close()
 
     def _accept(self, timeout: float) -> bytes:
         self.pending.clear()
         if select.select([self._listener], [], [], timeout)[0]:
-            self._host = self._listener.accept()[0]
-            self._host.setblocking(False)
+            with contextlib.suppress(OSError):  # the host may be gone again
+                self._host, (address, number, *_) = self._listener.accept()
+                self._host.setblocking(False)
+                self.host_address = f"{address}:{number}"
         return b""
 
-    def _hang_up(self) -> None:
+    def hang_up(self) -> None:
+        """Disconnect the host."""
         if self._host is not None:
             self._host.close()
             self._host = None

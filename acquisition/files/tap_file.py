@@ -10,7 +10,9 @@ import contextlib
 import functools
 import hashlib
 import io
-from collections.abc import Sequence
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
 from importlib.metadata import version
@@ -21,13 +23,14 @@ import numpy as np
 
 from acquisition.channel import parse_direction
 from acquisition.errors import DataError
-from acquisition.file_io import atomic_write, read_regular_file
+from acquisition.file_io import MAX_FILE_SIZE, atomic_write, read_regular_file
 from acquisition.files import hdf5_file, raw_hits
 from acquisition.files.contents.contents import Format
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.hit_fault import HitFlags
 from acquisition.hit_quality.decide_hits import decide_stored_hits
+from acquisition.subprocess_guard import SUBPROCESS_TIMEOUT, limit_resources, run_in_subprocess
 from acquisition.tap_test import Circumstances, Conditions, HitDecision, SourceFile, TapTest
 
 if TYPE_CHECKING:
@@ -36,6 +39,10 @@ if TYPE_CHECKING:
 TAP_FORMAT_NAME = "lobewatch-tap"
 TAP_FORMAT_VERSION, TAP_FORMAT_VERSION_WITHOUT_FORCE = 1, 2
 """Version of a file, and of one without force and FRF, which older programs cannot read."""
+DAMAGE_ERRORS = (OSError, LookupError, RuntimeError, TypeError, ValueError, ArithmeticError, MemoryError)
+"""Errors that damaged HDF5 content leads to."""
+FOREIGN_READ_CPU_TIME, FOREIGN_READ_CPU_TIME_PER_BYTE = 1.0, 0.2e-6
+"""Processor time of reading a file of unknown origin (s), any file and per byte, chosen: over ten times that of one."""
 SOURCE_CHUNK_SIZE = 1_000_000
 """Number of bytes of a replayed file that are packed together."""
 
@@ -128,12 +135,9 @@ def read_tap(path: Path | str) -> TapTest:
         For another or a damaged file.
     """
     with _open_tap_file(Path(path)) as file:
-        try:
-            hits, flags = raw_hits.read_raw_hits(file)
-            tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
-            return TapTest(tap_id, about, frf, hits, flags, _read_source(file), _read_decisions(file, flags))
-        except KeyError as error:
-            raise DataError(f"{path}: incomplete tap file ({error}). Restore the file from a backup.") from error
+        hits, flags = raw_hits.read_raw_hits(file)
+        tap_id, about, frf = file.attrs["id"], _read_circumstances(file), _read_frf(file)
+        return TapTest(tap_id, about, frf, hits, flags, _read_source(file), _read_decisions(file, flags))
 
 
 def _read_decisions(file: h5py.File, flags: Sequence[HitFlags]) -> tuple[HitDecision, ...]:
@@ -229,13 +233,14 @@ def read_hit_name(path: Path | str) -> str:
         return str(file.attrs.get("file", ""))
 
 
-def _open_tap_file(path: Path) -> h5py.File:
+@contextlib.contextmanager
+def _open_tap_file(path: Path) -> Iterator[h5py.File]:
+    """Open a tap file or hit file. DataError if it is another or a damaged file, also while it is read."""
     content = read_regular_file(path)
     if hdf5_file.has_wrong_checksum(content):
         raise DataError(f"{path}: content changed after writing (SHA-256 differs). Restore the file from a backup.")
-    with contextlib.ExitStack() as closed_on_error:
-        try:
-            file = closed_on_error.enter_context(hdf5_file.open_hdf5(io.BytesIO(content), "r"))
+    try:
+        with hdf5_file.open_hdf5(io.BytesIO(content), "r") as file:
             if file.attrs.get("format") != TAP_FORMAT_NAME:
                 fault = f"HDF5 file, but not a tap test of lobewatch (attribute format is not {TAP_FORMAT_NAME!r})"
                 raise DataError(f"{path}: {fault}")
@@ -244,11 +249,14 @@ def _open_tap_file(path: Path) -> h5py.File:
                 fault = f"tap file version {version} is newer than {newest}, the newest readable version"
                 raise DataError(f"{path}: {fault}. Update lobewatch.")
             hdf5_file.check_unpacked_size(file, len(content), path)
-        except (OSError, LookupError, RuntimeError) as error:
-            fault = f"unreadable or truncated HDF5 file ({error})"
-            raise DataError(f"{path}: {fault}. Restore the file from a backup.") from error
-        closed_on_error.pop_all()
-    return file
+            yield file
+    except DataError:
+        raise
+    except KeyError as error:
+        raise DataError(f"{path}: incomplete tap file ({error}). Restore the file from a backup.") from error
+    except DAMAGE_ERRORS as error:
+        fault = f"unreadable or truncated HDF5 file ({error})"
+        raise DataError(f"{path}: {fault}. Restore the file from a backup.") from error
 
 
 def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
@@ -321,9 +329,28 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
     Such hits were undone, hit another spot, had too narrow a force band, were not evaluated, or were not needed.
     Without hits the FRF is read.
     """
+    status = path.stat()
+    _check_in_subprocess(path, status.st_mtime_ns, status.st_size)
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _NON_SIGNAL_FLAGS]
     return kept or read_tap(path).required_frf
+
+
+@functools.lru_cache(maxsize=16)
+def _check_in_subprocess(path: Path, _changed: int, size: int) -> None:
+    """Read a file of unknown origin in a subprocess first: HDF5 may crash or hang on it. DataError if it does."""
+    seconds = FOREIGN_READ_CPU_TIME + FOREIGN_READ_CPU_TIME_PER_BYTE * size
+    try:
+        run_in_subprocess(__name__, str(path), str(seconds), patience=SUBPROCESS_TIMEOUT + seconds)
+    except subprocess.SubprocessError as error:
+        raise DataError(f"{path}: damaged file, crashes or hangs the reader. Export the file again.") from error
+
+
+def main() -> None:
+    """Read the named file within the given processor time (s). Faults that Python notices are no failure."""
+    limit_resources(float(sys.argv[2]), MAX_FILE_SIZE)
+    with contextlib.suppress(*DAMAGE_ERRORS):
+        read_tap(sys.argv[1])
 
 
 def read_judged_tap(path: Path) -> TapTest | None:
@@ -348,3 +375,6 @@ TAP_FORMAT = Format(
     lambda path: read_tap_hits(path)[1],
     lambda path: decide_stored_hits(read_tap(path)).required_frf,
 )
+
+if __name__ == "__main__":
+    main()

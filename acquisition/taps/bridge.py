@@ -9,15 +9,20 @@ import numpy as np
 
 from acquisition.channel import Block
 from acquisition.emulation.emulated_device import TcpWire
-from acquisition.errors import DeviceError
+from acquisition.errors import DeviceError, join_sentences
 from acquisition.source import Device
 from acquisition.taps import protocol
-from acquisition.taps.protocol import FrameDecoder, MessageType, TapsServer
+from acquisition.taps.protocol import FrameDecoder, HostileFrameError, MessageType
+from acquisition.taps.server import TapsServer
 
 BRIDGE_BUFFER_BYTES = 4 << 20
 """Bytes kept for a slow host: 20 s of two channels at 51.2 kHz and 16 bits. Later scans are dropped and reported."""
 MAX_UNCLOCKED_BACKLOG_BYTES = 1 << 16
 """Backlog at which a device without a clock waits for its host (bytes). Nothing is dropped."""
+MAX_DAMAGED_PIECES = 16
+"""Damaged frames of one host at which its connection is closed, chosen. A probe of another driver sends a few."""
+FIRST_FRAME_TIMEOUT = 10.0
+"""Time for the first frame of a host (s), chosen. A silent host must not keep others out."""
 REOPEN_INTERVAL = 0.5
 """Time between two attempts to reopen the device (s)."""
 
@@ -30,7 +35,7 @@ class TapsBridge(TapsServer):
     open_device
         Function that opens the device.
     tell
-        Function called with a sentence when the device goes away or comes back.
+        Function called with a sentence when the device goes away or comes back, and when a host is disconnected.
     address
         Address of this computer to listen at.
     number
@@ -115,10 +120,36 @@ class TapsBridge(TapsServer):
         self._stop()
 
     def _answer(self, timeout: float) -> None:
+        """Answer the host. One that sends no TAPS/1 is disconnected, so that the next one gets its turn."""
+        had_host = self.wire.has_host
         self._serve_host(timeout)
-        if not self.wire.has_host:
+        if not had_host:
             self._decoder = FrameDecoder()
+            self._accepted_at = time.monotonic()
+        if not self.wire.has_host:
             self._stop()
+        elif fault := self._find_host_fault():
+            self._refuse(HostileFrameError(fault))
+
+    def _find_host_fault(self) -> str:
+        """Return the fault of the bytes received so far from the host, empty without one."""
+        if self._decoder.is_overlong:
+            return f"a frame is longer than {protocol.MAX_FRAME} bytes"
+        if self._decoder.dropped > MAX_DAMAGED_PIECES:
+            return f"{self._decoder.dropped} frames are damaged"
+        if len(self.wire.pending) > 2 * BRIDGE_BUFFER_BYTES:
+            return f"{len(self.wire.pending)} bytes of answers are not read"
+        if not self._decoder.accepted and time.monotonic() - self._accepted_at > FIRST_FRAME_TIMEOUT:
+            return f"no frame within {FIRST_FRAME_TIMEOUT:g} s"
+        return ""
+
+    def _refuse(self, error: HostileFrameError) -> None:
+        """Disconnect the host after what is pending for it has been sent, as far as it reads."""
+        text = f"the connection from {self.wire.host_address} was closed, because {error}"
+        self._tell(join_sentences(text, "Check the program on that computer"))
+        self.wire.exchange(0.0)
+        self.wire.hang_up()
+        self._stop()
 
     def _info(self) -> dict[str, Any]:
         clocked = self.device.follows_clock

@@ -11,7 +11,8 @@ from acquisition.channel import Channel
 from acquisition.emulation.emulated_device import EmulatorThread, SignalFunction, quantise
 from acquisition.source import DeviceIdentity, Event, EventKind
 from acquisition.taps import protocol
-from acquisition.taps.protocol import MessageType, TapsServer
+from acquisition.taps.protocol import MessageType
+from acquisition.taps.server import TapsServer
 
 NOISE_BYTES = bytes(range(7, 71)) + b"\x00" + bytes(range(200, 230))
 """Bytes that are no frame. Their end damages the next frame."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import enum
 import json
+import re
 import struct
-import time
 import zlib
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import accumulate
+from typing import Any, NamedTuple
 
 import numpy as np
 from cobs import cobs
@@ -21,9 +22,6 @@ from cobs import cobs
 from acquisition.arrays import Codes
 from acquisition.channel import Block, Channel
 from acquisition.source import DeviceIdentity, Event, EventKind
-
-if TYPE_CHECKING:
-    from acquisition.emulation.emulated_device import Wire
 
 MAX_FRAME = 8192
 """Longest decoded frame (bytes)."""
@@ -35,13 +33,22 @@ FRAME_OVERHEAD = 28
 """Bytes of a DATA frame besides its samples."""
 NO_TEMPERATURE = -327.68
 """Temperature in STATUS of a device without a thermometer (degC)."""
-STATUS_INTERVAL = 0.5
-"""Time between STATUS frames (s)."""
 MAX_ENCODED_FRAME = MAX_FRAME + -(-MAX_FRAME // 254)
 """Longest frame in COBS, without its delimiter (bytes)."""
 _FRAME_HEADER = struct.Struct("<BBHI")
 _DATA_HEADER = struct.Struct("<QHBBI")
 _STATUS_BODY = struct.Struct("<QQIIh")
+
+
+MAX_JSON_DEPTH = 8
+"""Deepest nesting of the JSON in CONFIG and INFO. TAPS/1 needs 3."""
+MAX_REASON_LENGTH = 200
+"""Longest text of a NACK, chosen."""
+_JSON_STRING = re.compile(r'"(?:[^"\\]|\\.)*"?')
+
+
+class HostileFrameError(ValueError):
+    """Raised for input that no TAPS/1 program sends: its connection is closed."""
 
 
 class MessageType(enum.IntEnum):
@@ -139,6 +146,22 @@ def decode_frame(encoded: bytes) -> Frame | None:
     return Frame(kind, seq, bytes(raw[_FRAME_HEADER.size : -4]), session, flags)
 
 
+def parse_object(body: bytes) -> dict[str, Any]:
+    """Parse the JSON object in a CONFIG or INFO body. HostileFrameError for anything else, or deep nesting."""
+    try:
+        text = body.decode()
+        brackets = re.findall(r"[][{}]", _JSON_STRING.sub("", text))
+        depth = max(accumulate(1 if bracket in "[{" else -1 for bracket in brackets), default=0)
+        if depth > MAX_JSON_DEPTH:
+            raise ValueError(f"nested {depth} deep, limit {MAX_JSON_DEPTH}")
+        content = json.loads(text)
+        if not isinstance(content, dict):
+            raise ValueError("not an object")
+    except ValueError as error:
+        raise HostileFrameError(f"the JSON in a frame is invalid ({error})") from error
+    return content
+
+
 class FrameDecoder:
     """Decoder of a byte stream into frames. It drops and counts damaged ones."""
 
@@ -146,6 +169,10 @@ class FrameDecoder:
         self._rest = b""
         self.dropped = 0
         """Number of pieces between two delimiters that were no frame."""
+        self.accepted = 0
+        """Number of frames."""
+        self.is_overlong = False
+        """True while the unfinished piece is longer than any frame."""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames that these bytes complete.
@@ -157,8 +184,10 @@ class FrameDecoder:
         """
         *pieces, unfinished = (self._rest + data).split(b"\x00")
         self._rest = unfinished[: MAX_ENCODED_FRAME + 1]  # what is too long stays too long until its delimiter comes
+        self.is_overlong = len(self._rest) > MAX_ENCODED_FRAME
         frames = [decode_frame(piece) for piece in pieces if piece]
         good = [frame for frame in frames if frame is not None]
+        self.accepted += len(good)
         self.dropped += len(frames) - len(good)
         return good
 
@@ -169,6 +198,11 @@ def encode_data(first_scan: int, codes: Codes, bits: int = 16, overload: int = 0
     words = codes.T.astype("<i4", order="C").view(np.uint8).reshape(-1, 4)
     header = _DATA_HEADER.pack(first_scan, n_scans, n_channels, SAMPLE_BITS.index(bits), overload)
     return header + words[:, : bits // 8].tobytes()
+
+
+def max_scans_per_frame(n_channels: int, bits: int) -> int:
+    """Return the most scans that fit into a DATA frame with words of so many bits."""
+    return (MAX_FRAME - FRAME_OVERHEAD) * 8 // (n_channels * bits)
 
 
 def decode_data(body: bytes) -> Block:
@@ -243,94 +277,6 @@ class EventLog:
         names[None] = "force or acceleration"
         standing = [(event.kind, names.get(event.channel, f"(channel {event.channel})")) for event in self._standing]
         return " ".join(_FAULT_TEXTS[EventKind(kind)].format(name) for kind, name in standing)
-
-
-class TapsServer:
-    """Device's end of a TAPS/1 wire. It answers the commands of the host and counts what it sends."""
-
-    wire: Wire
-    _channels: tuple[Channel, ...]
-    _rate: float
-
-    def _power_on(self) -> None:
-        """Begin without a session or settings of a host."""
-        self._decoder = FrameDecoder()
-        self._seq = self._session = 0
-        self._bits, self._per_frame = SAMPLE_BITS[0], 512
-        self._begin_count(0)
-        self._streaming = False
-
-    def _begin_count(self, n_scans: int) -> None:
-        """Begin to count the scans of a session of this many, 0 for endless."""
-        self._streaming, self._lost, self._n_scans = True, False, n_scans
-        self._scan = self._sent = self._overruns = self._peak = 0
-        self._status_due = time.monotonic()
-
-    def _info(self) -> dict[str, Any]:
-        """Return the body of INFO."""
-        raise NotImplementedError
-
-    def _start(self, n_scans: int) -> None:
-        """Start a session of this many scans, 0 for endless."""
-        raise NotImplementedError
-
-    def _stop(self) -> None:
-        """End the session."""
-        self._streaming = False
-
-    def _configure(self, config: dict[str, Any]) -> None:
-        if self._streaming:
-            raise ValueError("CONFIG is not allowed while streaming. Send STOP first.")
-        if config["fs"] != self._rate or config["channels"] != list(range(len(self._channels))):
-            raise ValueError(f"CONFIG {config} is not supported by this device")
-        self._bits, self._per_frame = SAMPLE_BITS[config["format"]], int(config["samples_per_frame"])
-
-    def _serve_host(self, timeout: float) -> None:
-        """Send what is pending, and execute and answer the commands that have arrived."""
-        for frame in self._decoder.feed(self.wire.exchange(timeout)):
-            about = frame.seq.to_bytes(4, "little")
-            try:
-                if frame.type == MessageType.HELLO:
-                    self._send(MessageType.INFO, json.dumps(self._info()).encode())
-                    continue
-                self._execute(frame)
-                self._send(MessageType.ACK, about + b"\x00\x00")
-            except (ValueError, LookupError, TypeError) as error:
-                self._send(MessageType.NACK, about + b"\x01\x00" + str(error).encode())
-
-    def _execute(self, frame: Frame) -> None:
-        """Execute a command. ValueError, LookupError or TypeError reject it."""
-        if frame.type == MessageType.CONFIG:
-            self._configure(json.loads(frame.body))
-        elif frame.type == MessageType.START:
-            self._start(int.from_bytes(frame.body, "little"))
-        elif frame.type == MessageType.STOP:
-            self._stop()
-        else:
-            raise ValueError(f"unknown command {frame.type:#04x}")
-
-    def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
-        self.wire.pending += encode_frame(Frame(kind, self._seq, body, self._session, flags))
-        self._seq = (self._seq + 1) % 2**32
-
-    def _send_data(self, codes: Codes, overload: int) -> None:
-        """Send the next scans. Those lost before them are reported."""
-        body = encode_data(self._scan, codes, self._bits, overload)
-        self._send(MessageType.DATA, body, LOST_BEFORE_FLAG if self._lost else 0)
-        self._lost = False
-        self._sent += codes.shape[1]
-
-    def _note_fill(self, capacity: int) -> None:
-        """Note how full a buffer of this size (bytes) is."""
-        self._peak = max(self._peak, min(100 * len(self.wire.pending) // capacity, 100))
-
-    def _report_status(self, temperature: float) -> None:
-        """Send the status if it is due. temperature: of the board (degC)."""
-        now = time.monotonic()
-        if now >= self._status_due:
-            self._status_due = now + STATUS_INTERVAL
-            status = DeviceStatus(self._scan, self._sent, self._peak, self._overruns, temperature)
-            self._send(MessageType.STATUS, status.encode())
 
 
 KNOWS_SENSORS_KEY = "emulates_sensors"

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from acquisition.channel import Block, Channel
-from acquisition.errors import DeviceError
+from acquisition.errors import DeviceError, check_name
 from acquisition.ports.serial_ports import SILENCE_TIMEOUT, SerialLink
 from acquisition.source import ClosedOnExit, DeviceIdentity, Event
 from acquisition.taps import protocol
@@ -40,16 +40,24 @@ def probe_taps(link: SerialLink) -> DeviceIdentity | None:
         for frame in decoder.feed(link.read(remaining)):
             if frame.type == MessageType.INFO:
                 try:
-                    return parse_identity(json.loads(frame.body))
-                except (ValueError, AttributeError):
+                    return parse_identity(protocol.parse_object(frame.body))
+                except ValueError:
                     return None
     return None
 
 
 def parse_identity(info: dict[str, Any]) -> DeviceIdentity:
     """Return the identity of the device that sent this INFO."""
-    words = (str(info.get(key) or "") for key in ("model", "serial", "fw"))
+    words = [str(info.get(key) or "") for key in ("model", "serial", "fw")]
+    for word in words:
+        check_name(word, "INFO")
     return DeviceIdentity(*words, knows_sensors=bool(info.get(protocol.KNOWS_SENSORS_KEY)))
+
+
+MAX_SCANS = 2**53
+"""Scan index that no stream reaches: 28 years at MAX_SAMPLE_RATE. Larger numbers are not exact as floats."""
+MAX_SAMPLE_RATE = 1e7
+"""Highest sample rate that a device may offer (Hz), chosen: a hundred times that of a tap test."""
 
 
 class ScanStream:
@@ -79,7 +87,9 @@ class ScanStream:
             block = protocol.decode_data(frame.body)
         except ValueError:
             block = None
-        if block is None or block.codes.shape[0] != self._n_channels or block.first_scan < self._next_scan:
+        expected = range(self._next_scan, MAX_SCANS)
+        fits = block is not None and block.codes.size and block.codes.shape[0] == self._n_channels
+        if block is None or not fits or block.first_scan not in expected:
             self.refused += 1
             return None
         lost = block.first_scan - self._next_scan or int(bool(frame.flags & protocol.LOST_BEFORE_FLAG))
@@ -135,7 +145,6 @@ class TapsSource(ClosedOnExit):
         try:
             self._command(MessageType.STOP)
             self._info, self.channels = self._identify()
-            self.identity = parse_identity(self._info)
             self.follows_clock = self._info.get("clock_ppm", 0) is not None
             self.sample_rate = self._configure(sample_rate)
         except BaseException:
@@ -197,18 +206,22 @@ class TapsSource(ClosedOnExit):
                 raise DeviceError(text, "Switch the DAQ off and on, then repeat the command")
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
+        """Ask for INFO. DeviceError if it cannot be used."""
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
         try:
-            info = json.loads(body)
+            info = protocol.parse_object(body)
             channels = _parse_channels(info)
             rates = [float(rate) for rate in info["fs_choices"]]
-            if not rates or not all(0 < rate < float("inf") for rate in rates):
-                raise ValueError(f"fs_choices={info['fs_choices']} must be sample rates above 0")
+            if not rates or not all(0 < rate <= MAX_SAMPLE_RATE for rate in rates):
+                raise ValueError(
+                    f"fs_choices={info['fs_choices']} must be sample rates above 0, at most {MAX_SAMPLE_RATE:g} Hz"
+                )
             info["fs_choices"] = rates
             for key in ("model", "serial"):
                 if not info[key]:
                     raise ValueError(f"{key} is empty")
-        except (ValueError, KeyError, TypeError) as error:
+            self.identity = parse_identity(info)
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
             text = f"the DAQ on {self._link.port} sends invalid channel data ({type(error).__name__}: {error})"
             raise DeviceError(text, "Update the firmware of the DAQ. It must send the INFO frame of TAPS/1") from error
         return info, channels
@@ -221,7 +234,7 @@ class TapsSource(ClosedOnExit):
             raise ValueError(f"sample rate {rate:g} Hz is not one of {listed} Hz, the rates of this device")
         form = next(form for form, bits in enumerate(SAMPLE_BITS) if self._info["adc_bits"] <= bits)
         channels = [entry["i"] for entry in self._info["channels"]]
-        fit = (protocol.MAX_FRAME - protocol.FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
+        fit = protocol.max_scans_per_frame(len(channels), SAMPLE_BITS[form])
         scans = min(max(MIN_SCANS_PER_FRAME, round(self._frame_time * rate)), fit)
         config = {"fs": rate, "channels": channels, "format": form, "samples_per_frame": scans}
         self._command(MessageType.CONFIG, json.dumps(config).encode())
@@ -260,7 +273,7 @@ class TapsSource(ClosedOnExit):
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
         about = int.from_bytes(frame.body[:4], "little")
         if frame.type == MessageType.NACK and about == self._seq:
-            text = frame.body[6:].decode(errors="replace")
+            text = frame.body[6 : 6 + protocol.MAX_REASON_LENGTH].decode(errors="replace")
             raise DeviceError(f"the DAQ on {self._link.port} rejects a command ({text})")
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
 
@@ -272,6 +285,11 @@ def _parse_channels(info: dict[str, Any]) -> tuple[Channel, ...]:
     """
     if not 2 <= info["adc_bits"] <= SAMPLE_BITS[-1]:
         raise ValueError(f"adc_bits={info['adc_bits']} is not between 2 and {SAMPLE_BITS[-1]}")
+    if not info["channels"]:
+        raise ValueError("channels is empty")
+    for entry in info["channels"]:
+        for key in ("sensor_serial", "sens_date"):
+            check_name(str(entry.get(key) or ""), key)
     if len({entry["i"] for entry in info["channels"]}) != len(info["channels"]):
         raise ValueError("two channels have the same number (key i)")
     return tuple(

@@ -99,7 +99,7 @@ class LineDecoder(_RowDecoder):
     def feed(self, data: bytes) -> Iterator[PrintedRows]:
         """Yield the rows that these bytes complete."""
         *lines, self._rest = (self._rest + data).split(b"\n")
-        self._rest = self._rest[-MAX_LINE_BYTES:]
+        self._rest = self._rest[: MAX_LINE_BYTES + 1]  # what is too long stays too long until its end comes
         if lines and not self._begun:
             self._begun, lines = True, lines[1:]
         texts = [line.strip() for line in lines]
@@ -109,14 +109,18 @@ class LineDecoder(_RowDecoder):
         yield from self._split_at_broken(self._parse_line(text) for text in texts if text not in silent)
 
     def _parse_line(self, line: bytes) -> list[float]:
-        """Return the finite numbers of a line, as many as in the first, none if it contains anything else."""
-        words = line.translate(NUMBER_SEPARATORS).split(b",")
+        """Return the numbers of a line, as many as in the first, none if it contains anything else.
+
+        No counter, code or voltage reaches the largest modulus of a counter.
+        """
+        words = line[: MAX_LINE_BYTES + 1].translate(NUMBER_SEPARATORS).split(b",")
         try:
             row = [float(word) for word in words if word]
         except ValueError:
             return []
-        if len(row) not in self._counts or not np.isfinite(row).all():
-            return []
+        is_short = len(line) <= MAX_LINE_BYTES and len(row) in self._counts
+        if not is_short or not all(abs(number) < COUNTER_MODULI[-1] for number in row):
+            return []  # also NaN and infinity
         self._columns = self._columns or len(row)
         return row if len(row) == self._columns else []
 
@@ -132,6 +136,8 @@ class FrameFormat(NamedTuple):
     """True if a checksum follows the values."""
 
 
+MAX_UNFRAMED_BYTES = 1 << 16
+"""Bytes kept without a frame in them, chosen: 5 s at 115 200 baud. Earlier bytes are a broken frame."""
 MIN_FRAMES_IN_STEP = 16
 """Consecutive frames that show where frames without checksum begin."""
 
@@ -166,7 +172,9 @@ class SimpleFrameDecoder(_RowDecoder):
                 words = np.frombuffer(payload, "<i2").tolist()
                 yield [words[0] & 0xFFFF, *words[1:]] if form.counter else words
             self._begun, place = self._begun or good, begin + (self._size if good else 1)
-        self._rest = received[place:]
+        self._rest = received[place:][-MAX_UNFRAMED_BYTES:]
+        if self._begun and len(received) - place > MAX_UNFRAMED_BYTES:
+            yield []
 
     def _find_start(self, received: bytes, place: int) -> int:
         """Return where the next frame begins, the end of these bytes if that is unknown."""

@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
+from weakref import WeakSet
 
 import numpy as np
 
@@ -86,7 +87,7 @@ def search_audio() -> Sequence[DeviceAddress]:
     DeviceError
         The library is not installed.
     """
-    devices = library_device.load_library("sounddevice").query_devices()
+    devices = _list_devices(library_device.load_library("sounddevice"))
     return [_make_address(entry) for entry in devices if entry["max_input_channels"] >= 2]
 
 
@@ -115,7 +116,7 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         The device does not have an input, range or rate.
     """
     library = library_device.load_library("sounddevice")
-    entry = _find_sound_device(library.query_devices(), port.removeprefix("audio:"))
+    entry = _find_sound_device(_list_devices(library), port.removeprefix("audio:"))
     numbers = tuple(sensor.number for sensor in inputs)
     library_device.check_input_numbers(inputs, entry["max_input_channels"], entry["name"])
     rate, calibration = sample_rate or AUDIO_DEFAULT_RATE, parse_name_calibration(entry["name"])
@@ -130,6 +131,22 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
         cure = "Check that no other program uses the sound device"
         raise DeviceError(f"{port} cannot be opened ({error})", cure) from error
     return LibraryDevice(port, reader, _make_address(entry).identity, channels, rate, "callback status")
+
+
+def _list_devices(library: Any) -> Sequence[dict[str, Any]]:
+    """List the sound devices as they are connected now.
+
+    PortAudio reads its list once, when it is initialised, and closes all streams when it is terminated
+    (PortAudio API reference, Pa_Terminate). While a stream is open, the old list therefore stays.
+    """
+    try:
+        if not _OPEN_READERS:
+            for name in ("_terminate", "_initialize"):  # sounddevice has no public name for them
+                getattr(library, name, bool)()
+        devices: Sequence[dict[str, Any]] = library.query_devices()
+    except library.PortAudioError as error:
+        raise DeviceError(f"the sound devices cannot be listed ({error})", "Start the sound service") from error
+    return devices
 
 
 class AudioReader(StreamReader):
@@ -149,10 +166,15 @@ class AudioReader(StreamReader):
             self._stream.close()
             text = f"the sound device samples at {actual:g} Hz instead of {rate:g} Hz"
             raise DeviceError(text, f"Set sample_rate_hz = {actual:g} in [daq]")
+        _OPEN_READERS.add(self)
 
     def start(self) -> None:
         self._blocks = queue.SimpleQueue()
         super().start()
+
+    def close(self) -> None:
+        _OPEN_READERS.discard(self)
+        super().close()
 
     def read(self, timeout: float) -> VoltageBlock | None:
         try:
@@ -163,6 +185,10 @@ class AudioReader(StreamReader):
     def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
         volts = np.asarray(data, np.float64).T[self._numbers] * self._volts
         self._blocks.put(VoltageBlock(volts, lost_before=int(bool(status.input_overflow))))
+
+
+_OPEN_READERS = WeakSet[AudioReader]()
+"""Readers whose stream is open."""
 
 
 def _make_address(entry: dict[str, Any]) -> DeviceAddress:

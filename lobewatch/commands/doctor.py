@@ -22,6 +22,12 @@ def doctor(
       lobewatch doctor
       lobewatch doctor mill-3 --json
     """
+    from lobewatch.foreign_packages import FOREIGN_PACKAGE_CURE, describe_foreign_packages
+
+    if foreign := describe_foreign_packages():  # nothing else can be examined
+        finding = {"subject": "foreign packages", "state": "hinders", "text": foreign, "cure": FOREIGN_PACKAGE_CURE}
+        emit({"findings": [finding], "hinder": 1}, as_json, f"✗ {foreign}. {FOREIGN_PACKAGE_CURE}.")
+        raise Exit(1)
     from lobewatch.sensors.computer_check import check_computer
     from lobewatch.show.sensors import findings_json, findings_texts
 

@@ -36,6 +36,7 @@ def export(
       lobewatch export mills --append fleet
       lobewatch export mills --to postgresql://mills@db.example/plant
     """
+    from acquisition.credentials import restore_password
     from lobewatch.fleet.fleet import find_machines
     from lobewatch.fleet.tap_table import read_all_tables
     from lobewatch.show.fleet.export_files import append_months, write_table
@@ -50,7 +51,7 @@ def export(
     elif append is not None:
         outcome = append_months(tables, append)
     else:
-        outcome = upsert_table(tables, str(to))
+        outcome = upsert_table(tables, restore_password(str(to)))
     for key, reason in damaged.items():
         print_always(f"machine left out: {key}: {reason}")
     n_machines, (place, *_) = len(machines) - len(damaged), outcome.fields.values()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import DataError, Remark, Trigger
+from acquisition.credentials import hide_passwords
 from acquisition.errors import format_error
 from acquisition.file_io import MAX_SETTINGS_FILE_SIZE, read_regular_file
 from acquisition.files.hdf5_file import has_valid_checksum
@@ -169,7 +170,7 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
     copy = ""
     with contextlib.suppress(DataError):  # a newer lobewatch has written it
         copy = folder.read(newest).circumstances.machine_toml if newest else ""
-    text = folder.toml_text
+    text = hide_passwords(folder.toml_text)
     if newest is not None and copy and text != copy:
         differences = list(difflib.unified_diff(copy.splitlines(), text.splitlines(), n=0, lineterm=""))[2:]
         changed = [f"{line[0]} {line[1:]}" for line in differences if line[0] in "+-"]

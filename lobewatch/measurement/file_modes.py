@@ -16,6 +16,7 @@ from lobewatch.measurement import exponential_window as windows
 from lobewatch.measurement.file_frf import FileFrf, read_file_frf
 from lobewatch.measurement.hit_remarks import drop_explained_remedies, find_hit_remarks
 from lobewatch.measurement.recording_questions import check_quantity
+from lobewatch.measurement.repeated_samples import repeated_samples_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.tap_measurement import mode_edits_remarks
 from lobewatch.measurement.touch_remarks import touch_remarks
@@ -157,6 +158,7 @@ def fit_file_modes(
     changes = tuple(find_hit_remarks(hits, band))
     modes, fitted = drop_explained_remedies(modes, changes), drop_explained_remedies(fitted, changes)
     found = (*_fit_remarks(modes, frf, band), *changes)
+    found = (*repeated_samples_remarks(hits), *found)
     remarks = (*file_frf.remarks, *touch_remarks(hits), *fit_remarks, *windowed, *found)
     picked = tuple(modal.pick_peaks(frf, band))
     of_hits = file_frf.faults, file_frf.flags, file_frf.decisions, file_frf.n_found, file_frf.places
@@ -172,7 +174,8 @@ def _fit_decay_modes(
     state = modal.edit_modes(extract_decay_modes(decays.hits, band), by_hand)
     changes = tuple(find_hit_remarks(decays.hits, band))
     modes = drop_explained_remedies(modal.modes_from_decays(state), changes)
-    fit_remarks = (*mode_edits_remarks(by_hand), *decay_remarks(sensor), *_fit_remarks(modes, state.frf, band))
+    of_sensor = (*decay_remarks(sensor), *repeated_samples_remarks(decays.hits))
+    fit_remarks = (*mode_edits_remarks(by_hand), *of_sensor, *_fit_remarks(modes, state.frf, band))
     remarks = (*decays.remarks, *fit_remarks, *changes)
     of_hits = decays.faults, decays.flags, decays.decisions, decays.n_found, decays.places
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand, *of_hits)

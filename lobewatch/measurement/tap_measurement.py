@@ -24,6 +24,7 @@ from lobewatch.measurement.hit_remarks import (
     find_changes_in_band,
     select_uncovered_changes,
 )
+from lobewatch.measurement.repeated_samples import repeated_samples_remarks
 from lobewatch.measurement.sensor_effects import FrfFit, decay_remarks, extract_decay_modes, fit_on_time
 from lobewatch.measurement.series_modes import find_series_questions
 from lobewatch.measurement.series_questions import NO_REFERENCE, SeriesReference
@@ -134,7 +135,8 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = NO_MODE_EDITS) 
     by_hand: mode edits; if they are impossible, the fitted modes stay, with a remark.
     """
     about, band = tap.circumstances, None if tap.frf is None else questions.check_band_coverage(tap.frf, machine)
-    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *(() if band is None else (band,)))
+    remarks = (*find_choice_remarks(tap.flags, tap.decisions), *repeated_samples_remarks(tap.accepted))
+    remarks += () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _thread_controller().limit(limits=1):
         try:

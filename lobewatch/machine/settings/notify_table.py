@@ -30,6 +30,10 @@ class Broker(NamedTuple):
     prefix: str
     """First levels of all topics."""
 
+    def __repr__(self) -> str:
+        """Return the address without the password, for logs and tracebacks."""
+        return f"Broker({self.without_password!r})"
+
     @property
     def address(self) -> str:
         """Address without the password."""
@@ -75,15 +79,16 @@ class NotifyTable(TomlTable, frozen=True):
 def parse_broker(address: str) -> Broker:
     """Parse mqtt://[user[:password]@]host[:port][/prefix]; ValueError for any other text."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
-    allowed = "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption."
+    allowed = "Give mqtt://HOST or mqtt://USER@HOST:PORT/PREFIX, with mqtts:// for encryption and %XX for other signs."
     refusal = f"mqtt={hidden!r} is not the address of a broker. {allowed}"
     url = urlsplit(address)
+    is_encoded = not set(address) & set("#?\"'<> \t") and "@" not in url.path
     try:
         port = url.port
     except ValueError:
         raise ValueError(refusal) from None
     prefix = url.path.strip("/") or "lobewatch"
-    if url.scheme not in DEFAULT_MQTT_PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
+    if url.scheme not in DEFAULT_MQTT_PORTS or not url.hostname or not is_encoded or "+" in prefix:
         raise ValueError(refusal)
     port = port or DEFAULT_MQTT_PORTS[url.scheme]
     password = unquote(url.password or "") or (_find_password(url.hostname, port) if url.username else "")

@@ -7,6 +7,7 @@ from itertools import chain
 from typing import Any
 
 from acquisition import DataError
+from acquisition.credentials import split_password
 from acquisition.errors import join_sentences
 from lobewatch.fleet.tap_table import TAP_NUMBER_COLUMNS, TapTestTable
 from lobewatch.show.fleet.export_files import EXPORT_COLUMNS, ExportOutcome
@@ -64,9 +65,10 @@ def upsert_table(tables: Iterable[TapTestTable], address: str) -> ExportOutcome:
     With TimescaleDB the table becomes a hypertable. Raise DataError without psycopg, for an invalid address, and if
     the server fails. Rows written before that stay.
     """
+    address, password = split_password(address)
     place, remaining = server_name(address), iter(tables)
     read = written = set_aside = 0
-    with _connection(address, place) as connection:
+    with _connection(address, password, place) as connection:
         is_hypertable = _make_table(connection)
         while (counts := _write_next(connection, remaining)) is not None:
             read, written, set_aside = read + counts[0], written + counts[1], set_aside + counts[2]
@@ -95,14 +97,14 @@ def server_name(address: str) -> str:
 
 
 @contextmanager
-def _connection(address: str, place: str) -> Iterator[Any]:
+def _connection(address: str, password: str, place: str) -> Iterator[Any]:
     """Open a connection; raise DataError for any failure of it."""
     import psycopg
     from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
     given = conninfo_to_dict(address)
     missing = {name: value for name, value in CONNECTION_TIMEOUTS.items() if name not in given}
-    watchful = make_conninfo(address, **missing)
+    watchful = make_conninfo(address, **missing, **({"password": password} if password else {}))
     try:
         with psycopg.connect(watchful, autocommit=True) as connection:
             connection.execute(f"SET lock_timeout = '{POSTGRES_LOCK_WAIT}s'")

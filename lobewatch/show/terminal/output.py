@@ -23,6 +23,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquisition import Remark, merge_remarks
+from acquisition.credentials import hide_passwords
 from acquisition.errors import CONTROL_CHARACTERS
 from lobewatch.machine.settings.display_units import metric_output
 from lobewatch.show.terminal.option_names import with_option_names, with_option_names_inside
@@ -89,9 +90,8 @@ results = SafeConsole(highlight=False, soft_wrap=True, emoji=False, width=max(Co
 def emit(payload: JsonObject, as_json: bool, *texts: str | Table) -> None:
     """Print one JSON object, or the texts and tables; records in it become objects, infinite and NaN become null."""
     if as_json:
-        exact = json.dumps(
-            plain_json(payload), allow_nan=False, indent=2, ensure_ascii=False
-        )  # newlines only between lines
+        exact = hide_passwords(json.dumps(plain_json(payload), allow_nan=False, indent=2, ensure_ascii=False))
+        # newlines are only between lines
         exact = CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}", exact)
         if results.is_terminal:
             results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
@@ -163,8 +163,9 @@ def count_noun(count: int, noun: str) -> str:
 
 
 def make_printable(text: str, kept: str = "\n\t") -> str:
-    """Replace control characters except those to keep, and name options instead of library fields."""
-    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", with_option_names(text))
+    """Replace control characters except those to keep, hide passwords, and name options instead of library fields."""
+    named = hide_passwords(with_option_names(text))
+    return CONTROL_CHARACTERS.sub(lambda match: match[0] if match[0] in kept else "\ufffd", named)
 
 
 def pick(record: Any, *names: str) -> JsonObject:

@@ -270,6 +270,31 @@ def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPat
         audio.open("audio:USB", settings)
 
 
+def test_the_list_of_sound_devices_is_read_again_unless_a_stream_is_open(
+    monkeypatch: pytest.MonkeyPatch, wiring: Wiring
+) -> None:
+    """Check a replugged device with another number, as PortAudio lists it after it was initialised again."""
+    audio, settings, log = find_driver("audio"), DeviceSettings(48000.0, inputs(10.0)), list[str]()
+    library, replugged = (fake_sounddevice(wiring, (*others, "USB Audio"), 10.0) for others in ((), ("HDMI",)))
+
+    def initialize() -> None:
+        log.append("initialize")
+        library.__dict__.update({name: replugged.__dict__[name] for name in ("query_devices", "check_input_settings")})
+
+    monkeypatch.setitem(sys.modules, "sounddevice", library)
+    with audio.open("audio:USB Audio", settings):
+        library.__dict__.update(_terminate=lambda: log.append("terminate"), _initialize=initialize)
+        assert audio.search is not None
+        assert [device.address for device in audio.search()] == ["audio:USB Audio"]
+        assert log == []
+    with audio.open("audio:USB Audio", settings):
+        assert log == ["terminate", "initialize"]
+        with pytest.raises(DeviceError, match="audio:0"):
+            audio.open("audio:0", settings)
+    with audio.open("audio:1", settings):
+        assert log == ["terminate", "initialize"] * 2
+
+
 def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -> None:
     """Check 53 134 counts per m/s^2: at 10 mV each they are 1.578765 V of full scale."""
     audio, scale = find_driver("audio"), 2**23 / 53134 * 0.01

@@ -37,6 +37,10 @@ MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
+MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
+"""Smallest share of chatter in the energy of the unexplained peaks, and of faint chatter or few side bands; chosen.
+
+Lossy coding, music and another spindle make many lines, of which few happen to be one tooth passing apart."""
 MIN_SIDEBANDS = 3
 """Number of peaks of a sideband family that proves chatter."""
 FLIP_TOLERANCE = 0.003
@@ -252,6 +256,10 @@ def _evaluate_peaks(
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
+    share = classification.share_of_chatter(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width)
+    is_weak = len(chatter.peaks) < MIN_SIDEBANDS or ratio < MIN_SINGLE_PEAK_ENERGY
+    if share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE):
+        return sound._replace(verdict="cannot tell", reason="other-source")
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
 
@@ -275,7 +283,13 @@ def _remove_ripple(peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed
 
 
 def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
-    """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
+    """Evaluate as stable, unless few harmonics are heard, or louder ones than runout and uneven teeth make them."""
+    if (
+        sound.spectrum
+        and sound.spindle_speed
+        and classification.is_narrow(peaks, sound.spectrum, sound.spindle_speed, teeth)
+    ):
+        return sound._replace(verdict="cannot tell", reason="slow-sampling")
     power, order = peaks.comb.amplitude**2, peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))

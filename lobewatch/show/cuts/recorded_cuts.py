@@ -43,6 +43,10 @@ FAULTS: Mapping[str, Fault] = {
         "is not explained by spindle, flutes or air, and has no side bands of chatter",
         "Cut a little deeper, and check whether the tone is there without cutting",
     ),
+    "other-source": Fault(
+        "most lines besides tooth passing belong to no chatter, but to music, another machine or a low bit rate",
+        "Record the cut alone, as WAV or with 96 kbit/s or more",
+    ),
     "slow-sampling": Fault("the sample rate covers fewer than three harmonics of tooth passing", "Use a higher rate"),
 }
 """Fault for each reason without a verdict."""

@@ -132,7 +132,7 @@ class DashboardServer(WebServerThread):
         self._verifier = threading.Thread(target=self._table.fleet.verify_until, args=(self._end,), daemon=True)
         pages = {"/": "dashboard.html", "/tap/{machine}/": "screen.html", "/phone/": "phone.html"}
         add_pages(self.application, pages)
-        add_recording_upload(self.application, "/phone/")
+        add_recording_upload(self.application, "/phone/", lambda: self._table.fleet.machines)
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
         router.add_get("/machines", self._list)

@@ -8,8 +8,9 @@ from acquisition.errors import join_sentences
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
 from lobewatch.logbook.cut_comparison import CutComparison, find_worst_cut
-from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, parts_texts, recorded_cut_remarks
+from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, recorded_cut_remarks
 from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.programs.part_texts import parts_texts
 from lobewatch.show.terminal.output import JsonObject, remark_lines
 
 

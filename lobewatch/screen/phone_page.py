@@ -47,7 +47,7 @@ def add_recording_upload(
                 return web.json_response(refuse("too-large", text), status=413)
             answer = await asyncio.to_thread(evaluate_upload, content, cut, *kept)
         if "saved" in answer:
-            await asyncio.to_thread(lambda: publish_status(Logbook.open(*kept)))
+            await asyncio.to_thread(lambda: publish_status(Logbook.open(kept[0])))
         return web.json_response(answer, status=422 if "error" in answer else 200)
 
     application.router.add_post(f"{prefix}recording", evaluate)

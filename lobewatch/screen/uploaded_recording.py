@@ -4,7 +4,7 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -195,7 +195,8 @@ def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
 def _hear(signal: CutSignal, cut: UploadedCut) -> JsonObject:
     """Evaluate a cut of an unknown machine, and keep it nowhere."""
     comparisons, found = hear_signal(signal, "recording", cut.request)
-    return _answer(comparisons, next_speeds_json(found), recording_texts(comparisons), next_speeds_texts(found))
+    shown = recording_texts(comparisons)
+    return _answer(comparisons, next_speeds_json(found), shown, next_speeds_texts(found))
 
 
 def _keep(signal: CutSignal, cut: UploadedCut, folder: Path) -> JsonObject:
@@ -212,18 +213,18 @@ def _keep(signal: CutSignal, cut: UploadedCut, folder: Path) -> JsonObject:
     except (OSError, ValueError) as error:
         return refuse("not-kept", format_error(error))
     speeds, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
-    answer = _answer(comparisons, {"next_speeds": [], **speeds}, [*texts, *remark_lines(remarks)], ())
+    shown = [*recording_texts(comparisons), *remark_lines(remarks)]
+    answer = _answer(comparisons, {"next_speeds": [], **speeds}, shown, texts if speeds else ())
     return answer | {"saved": [kept.id for kept in stored]}
 
 
 def _answer(
-    comparisons: Sequence[CutComparison], speeds: JsonObject, texts: Iterable[object], more: Sequence[object]
+    comparisons: Sequence[CutComparison], speeds: JsonObject, shown: Sequence[str], more: Sequence[object]
 ) -> JsonObject:
     """Return the answer of the page: the worst cut of a recording, the next speeds and texts."""
     worst = find_worst_cut(comparisons)
     finding = reason_text(worst) if worst.detected.verdict == "cannot tell" else ""
     sentence = next((text for text in reversed(more) if isinstance(text, str)), "")
-    shown = [text for text in texts if isinstance(text, str)]
     return recorded_cut_json(worst) | speeds | {"finding": finding, "texts": shown, "next_text": sentence}
 
 

@@ -73,8 +73,9 @@ def evaluate_cut(
     verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that with the loudest cut.
     Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there in air make a speed,
     which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
-    "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing
-    are recorded, folded ones too), "teeth-contradicted" (the harmonics are those of another number of teeth).
+    "faint", "unexplained-tone" (a peak without sidebands), "other-source" (most unexplained peaks are no chatter),
+    "slow-sampling" (fewer than three harmonics of tooth passing are recorded, folded ones too), "teeth-contradicted"
+    (the harmonics are those of another number of teeth).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 

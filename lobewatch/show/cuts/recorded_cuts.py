@@ -105,7 +105,13 @@ def _speed_conflict(comparison: CutComparison) -> Fault:
     return Fault(finding, f"{change} --pulses by {round(max(measured / lines, lines / measured))}, or correct --speed")
 
 
+MAX_SHOWN_ENERGY_RATIO = 10.0
+"""Energy ratio above which only that is shown: clear chatter; chosen."""
+
+
 def _energy_text(ratio: float) -> str:
+    if ratio > MAX_SHOWN_ENERGY_RATIO:
+        return f"energy outside the spindle harmonics: above {MAX_SHOWN_ENERGY_RATIO:g} times that in the harmonics"
     digits = ".2g" if ratio < 1 else ".0f"
     return f"energy outside the spindle harmonics: {100 * ratio:{digits}} % of the energy in the harmonics"
 

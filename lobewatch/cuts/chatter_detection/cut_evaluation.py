@@ -19,7 +19,7 @@ from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
 from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
@@ -257,12 +257,20 @@ def _evaluate_peaks(
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
-    share = classification.share_of_chatter(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width)
-    is_weak = len(chatter.peaks) < MIN_SIDEBANDS or ratio < MIN_SINGLE_PEAK_ENERGY
-    if share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE):
+    if _is_other_source(sound, peaks.unexplained, chatter, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="other-source")
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _is_other_source(sound: CutEvaluation, left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
+    """Return whether most unexplained peaks are no chatter, of which faint evidence needs a larger share."""
+    if sound.spindle_speed is None:
+        return False
+    is_weak = len(chatter.peaks) < MIN_SIDEBANDS or sound.energy_ratio < MIN_SINGLE_PEAK_ENERGY
+    is_weak |= classification.has_own_comb(left, chatter, bin_width)
+    share = classification.share_of_chatter(left, chatter, sound.spindle_speed.frequency, bin_width)
+    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
 
 
 def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:

@@ -289,10 +289,26 @@ RIPPLE_DISTANCE = 30.0
 """Distance from a line of chatter within which it is widened by ripple (Hz), the highest frequency of a ripple."""
 
 
+MIN_OWN_HARMONICS, MAX_OWN_HARMONICS = 4, 12
+"""Smallest number of harmonics, and highest one, by which a tone is that of another machine; chosen."""
+
+
+def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
+    """Return whether chatter has more harmonics than side bands, as tooth passing of another spindle has; in Hz."""
+    order = np.round(left.frequency / chatter.frequency)
+    reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
+    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
+    return np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1)
+
+
 def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:
-    """Return the energy of chatter, with its harmonics and the ripple of its lines, over that of all peaks; in Hz."""
-    near = np.abs(left.frequency[:, np.newaxis] - chatter.peaks.frequency) < RIPPLE_DISTANCE
-    is_chatter = np.any(near, axis=1) | (_find_explained(left, chatter.frequency, turn, bin_width) > 0)
+    """Return the energy of chatter, with the ripple of its lines, over that of all peaks; in Hz.
+
+    Harmonics of the chatter frequency count unless they are the comb of another spindle.
+    """
+    is_chatter = np.any(np.abs(left.frequency[:, np.newaxis] - chatter.peaks.frequency) < RIPPLE_DISTANCE, axis=1)
+    if not has_own_comb(left, chatter, bin_width):
+        is_chatter |= _find_explained(left, chatter.frequency, turn, bin_width) > 0
     return left[is_chatter].energy / left.energy
 
 

@@ -99,7 +99,7 @@ def evaluate_requested(logbook: Logbook, names: Sequence[str], cut: Mapping[str,
     incomplete = [table for table in machine.all_programs if table.is_incomplete and table.name in chosen]
     has_complete = any(table.name in chosen for table in machine.program)
     verdicts = logbook.verdicts(names=chosen if names else None) if has_complete else []
-    verdicts = _evaluate_untapped(logbook, verdicts)
+    verdicts = [_mention_cuts_without_verdict(logbook, verdict) for verdict in _evaluate_untapped(logbook, verdicts)]
     return RequestedVerdicts(verdicts, [_recommend_for_program(logbook, table) for table in incomplete])
 
 
@@ -116,6 +116,22 @@ def _evaluate_untapped(logbook: Logbook, verdicts: list[Verdict]) -> list[Verdic
         evaluate_by_sound(verdict, machine, cuts, since) if needs_cuts(verdict.program) else verdict
         for verdict in verdicts
     ]
+
+
+def _mention_cuts_without_verdict(logbook: Logbook, verdict: Verdict) -> Verdict:
+    """Add a remark on the recorded cuts of a program, or reference cuts of its tool, that have no verdict."""
+    since, program = logbook.files.baseline, verdict.program
+    found = [
+        f"{cut.id} ({cut.reason})"
+        for cut in logbook.files.contents.cuts
+        if cut.word == "cannot tell" and not cut.excluded and (since is None or cut.at >= since)
+        if cut.tool == program.tool and cut.program in (program.name, None)
+    ]
+    if not found:
+        return verdict
+    text = f"test cuts without a verdict do not count: {', '.join(found)}"
+    remark = Remark("cuts-without-verdict", program.name, text, "Record these cuts again")
+    return replace(verdict, remarks=(*verdict.remarks, remark))
 
 
 def propose_requested_pitch(logbook: Logbook, cut: Mapping[str, Any]) -> PitchProposal:

@@ -138,7 +138,7 @@ class DashboardServer(WebServerThread):
             "/lobes/": "lobes.html",
         }
         add_pages(self.application, pages)
-        add_recording_upload(self.application, "/phone/")
+        add_recording_upload(self.application, "/phone/", lambda: self._table.fleet.machines)
         add_stated_lobes(self.application, "/lobes/")
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router

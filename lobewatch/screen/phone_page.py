@@ -1,10 +1,16 @@
 """Serve the page that takes a recording of a cut made on a phone."""
 
 import asyncio
-from typing import Unpack
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Unpack
 
 from aiohttp import web
 
+from lobewatch.logbook import Logbook
+from lobewatch.machine import MachineFolder
+from lobewatch.notify.publish_status import publish_status
 from lobewatch.screen.uploaded_recording import MAX_UPLOAD_BYTES, evaluate_upload, parse_uploaded_cut, refuse
 from lobewatch.screen.web_server import ServerOptions, WebServerThread, add_pages
 
@@ -14,12 +20,19 @@ UPLOAD_CHUNK_BYTES = 1 << 16
 """Size of the parts that an upload is read in (bytes); chosen."""
 
 
-def add_recording_upload(application: web.Application, prefix: str) -> None:
-    """Serve the evaluation of uploaded recordings at `prefix`recording, one at a time."""
+def add_recording_upload(
+    application: web.Application, prefix: str, folders: Callable[[], Mapping[str, Path]] = dict
+) -> None:
+    """Serve the evaluation of uploaded recordings at `prefix`recording, one at a time.
+
+    folders: returns the machine folders by name in whose journals a cut can be kept, listed at `prefix`machines.
+    """
     busy = asyncio.Lock()
+    find_folder = _add_machine_list(application, prefix, folders)
 
     async def evaluate(request: web.Request) -> web.Response:
         cut = parse_uploaded_cut(request.query)
+        kept = [find_folder(cut.machine)] if cut.machine else []
         if busy.locked():
             text = "lobewatch evaluates another recording. Send this recording again in a minute."
             return web.json_response(refuse("busy", text), status=409)
@@ -32,10 +45,46 @@ def add_recording_upload(application: web.Application, prefix: str) -> None:
             if content is None:
                 text = f"the recording is larger than {MAX_UPLOAD_BYTES / 1e6:g} MB. Send a shorter recording."
                 return web.json_response(refuse("too-large", text), status=413)
-            answer = await asyncio.to_thread(evaluate_upload, content, cut)
+            answer = await asyncio.to_thread(evaluate_upload, content, cut, *kept)
+        if "saved" in answer:
+            await asyncio.to_thread(lambda: publish_status(Logbook.open(kept[0])))
         return web.json_response(answer, status=422 if "error" in answer else 200)
 
     application.router.add_post(f"{prefix}recording", evaluate)
+
+
+def _add_machine_list(
+    application: web.Application, prefix: str, folders: Callable[[], Mapping[str, Path]]
+) -> Callable[[str], Path]:
+    """Serve the list of machines and their programs, and return a function that finds the folder of a machine."""
+
+    def find_folder(name: str) -> Path:
+        folder = folders().get(name)
+        if folder is None:
+            raise web.HTTPNotFound(text="this machine does not exist")
+        return folder
+
+    async def list_machines(_: web.Request) -> web.Response:
+        return web.json_response({"machines": sorted(folders())})
+
+    async def list_programs(request: web.Request) -> web.Response:
+        folder = find_folder(request.match_info["machine"])
+        return web.json_response({"programs": await asyncio.to_thread(_list_cuts, folder)})
+
+    application.router.add_get(f"{prefix}machines", list_machines)
+    application.router.add_get(f"{prefix}machines/{{machine}}", list_programs)
+    return find_folder
+
+
+def _list_cuts(folder: Path) -> list[dict[str, Any]]:
+    """List the cuts of machine.toml with flutes, and with speed and depth if they have some."""
+    tables = MachineFolder(folder).machine.cut_tables
+    keys = ("teeth", "speed_rpm", "depth_mm")
+    return [{"name": name} | {key: _known(getattr(cut, key, None)) for key in keys} for name, cut in tables.items()]
+
+
+def _known(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 async def _read_recording(request: web.Request) -> bytearray | None:

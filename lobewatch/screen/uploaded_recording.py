@@ -4,26 +4,31 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from acquisition import DataError
+from acquisition.errors import format_error
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_cut import MICROPHONE_SENSOR
 from acquisition.files.readers.read_audio import MissingDecoderError, decode_audio
 from acquisition.subprocess_guard import limit_resources, run_in_subprocess
 from lobewatch.arrays import Floats
-from lobewatch.logbook.cut_comparison import find_worst_cut
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.cut_comparison import CutComparison, compare_cuts, find_worst_cut, store_recorded_cuts
 from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
 from lobewatch.machine.settings.cut_tables import ProgramTable
+from lobewatch.machine.settings.requested_cut import find_cut_setting
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
 from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
 from lobewatch.show.cuts.recorded_cuts import reason_text, recorded_cut_json, recording_texts
+from lobewatch.show.listen_answers import stored_answer
 from lobewatch.show.terminal.option_names import with_option_names_inside
-from lobewatch.show.terminal.output import JsonObject
+from lobewatch.show.terminal.output import JsonObject, remark_lines
 
 MAX_UPLOAD_BYTES = 50_000_000
 """Largest size of an uploaded recording (bytes); chosen, five minutes of stereo WAV at 44.1 kHz have 53 MB."""
@@ -54,6 +59,10 @@ class UploadedCut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Highest speed of the machine (rpm)."""
     depth_mm: float | None = None
     """Axial depth of cut (mm)."""
+    machine: str = ""
+    """Machine in whose journal the cut is kept; empty to keep it nowhere."""
+    program: str = ""
+    """Program of that machine, or "reference cut"."""
 
     @property
     def range_rpm(self) -> tuple[float, float]:
@@ -95,18 +104,30 @@ def parse_uploaded_cut(query: Mapping[str, str]) -> UploadedCut:
     if not (low <= cut.speed_rpm <= high and low < high):
         text = f"speed {cut.speed_rpm:g} is not between the lowest speed {low:g} and the highest speed {high:g}"
         raise ValueError(f"{text}. Correct one of them.")
+    if bool(cut.machine) != bool(cut.program):
+        missing = "program" if cut.machine else "machine"
+        raise ValueError(f"no {missing} is chosen. Choose machine and program, or neither.")
     return cut
 
 
-def evaluate_upload(content: bytes | bytearray, cut: UploadedCut) -> JsonObject:
+def evaluate_upload(content: bytes | bytearray, cut: UploadedCut, folder: Path | None = None) -> JsonObject:
     """Return the result of a recording, or `error` and its `code`, whatever the file contains.
 
-    Codes: "unreadable", "no-decoder", "sample-rate", "too-long", "too-large", "too-slow", "failed".
+    Codes: "unreadable", "no-decoder", "sample-rate", "too-long", "too-large", "too-slow", "not-kept", "failed".
+
+    Parameters
+    ----------
+    content
+        Bytes of the file.
+    cut
+        Entered values.
+    folder
+        Machine folder in whose journal the cut is kept; None to keep it nowhere.
     """
     try:
         entered = msgspec.json.encode(cut).decode()
-        limits = str(MAX_CPU_SECONDS), str(MAX_MEMORY)
-        output = run_in_subprocess(__name__, entered, *limits, patience=MAX_WAIT_SECONDS, content=content)
+        arguments = entered, str(MAX_CPU_SECONDS), str(MAX_MEMORY), *([str(folder)] if folder else [])
+        output = run_in_subprocess(__name__, *arguments, patience=MAX_WAIT_SECONDS, content=content)
     except subprocess.TimeoutExpired:
         return _too_slow()
     except subprocess.CalledProcessError as error:
@@ -135,14 +156,19 @@ def main() -> None:
     """Write the result of the recording on standard input to standard output as JSON."""
     cut = msgspec.json.decode(sys.argv[1], type=UploadedCut)
     content = sys.stdin.buffer.read()
-    limit_resources(*map(float, sys.argv[2:]))
-    sys.stdout.write(json.dumps(with_option_names_inside(_evaluate(content, cut))))
+    limit_resources(*map(float, sys.argv[2:4]))
+    folder = Path(sys.argv[4]) if len(sys.argv) > 4 else None
+    sys.stdout.write(json.dumps(with_option_names_inside(_evaluate(content, cut, folder))))
 
 
-def _evaluate(content: bytes, cut: UploadedCut) -> JsonObject:
+def _evaluate(content: bytes, cut: UploadedCut, folder: Path | None) -> JsonObject:
     try:
         rate, columns = decode_audio(content, "recording", MAX_RECORDING_SECONDS)
-        return _find_fault(rate, columns) or _hear(rate, columns, cut)
+        if fault := _find_fault(rate, columns):
+            return fault
+        loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
+        signal = CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR)
+        return _hear(signal, cut) if folder is None else _keep(signal, cut, folder)
     except MissingDecoderError as error:
         return refuse("no-decoder", str(error))
     except DataError as error:
@@ -166,14 +192,40 @@ def _find_fault(rate: float, columns: Floats) -> JsonObject | None:
     return None
 
 
-def _hear(rate: float, columns: Floats, cut: UploadedCut) -> JsonObject:
-    loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
-    comparisons, found = hear_signal(CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR), "recording", cut.request)
+def _hear(signal: CutSignal, cut: UploadedCut) -> JsonObject:
+    """Evaluate a cut of an unknown machine, and keep it nowhere."""
+    comparisons, found = hear_signal(signal, "recording", cut.request)
+    shown = recording_texts(comparisons)
+    return _answer(comparisons, next_speeds_json(found), shown, next_speeds_texts(found))
+
+
+def _keep(signal: CutSignal, cut: UploadedCut, folder: Path) -> JsonObject:
+    """Evaluate a cut of a machine, and keep it in its journal, as `listen` does with a file."""
+    try:
+        logbook = Logbook.open(folder)
+        setting = find_cut_setting(logbook.machine, cut.program, cut.speed_rpm, cut.depth_mm)
+        if setting.cut.teeth != cut.teeth:
+            text = f"{cut.teeth} flutes are not the {setting.cut.teeth} flutes of {cut.program}"
+            return refuse("not-kept", f"{text}. Correct the number of flutes.")
+        logbook.folder.refuse_damage()
+        comparisons = compare_cuts(logbook, setting, signal)
+        earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, None)
+    except (OSError, ValueError) as error:
+        return refuse("not-kept", format_error(error))
+    speeds, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
+    shown = [*recording_texts(comparisons), *remark_lines(remarks)]
+    answer = _answer(comparisons, {"next_speeds": [], **speeds}, shown, texts if speeds else ())
+    return answer | {"saved": [kept.id for kept in stored]}
+
+
+def _answer(
+    comparisons: Sequence[CutComparison], speeds: JsonObject, shown: Sequence[str], more: Sequence[object]
+) -> JsonObject:
+    """Return the answer of the page: the worst cut of a recording, the next speeds and texts."""
     worst = find_worst_cut(comparisons)
     finding = reason_text(worst) if worst.detected.verdict == "cannot tell" else ""
-    sentence = next((text for text in reversed(next_speeds_texts(found)) if isinstance(text, str)), "")
-    more = {"finding": finding, "texts": recording_texts(comparisons), "next_text": sentence}
-    return recorded_cut_json(worst) | next_speeds_json(found) | more
+    sentence = next((text for text in reversed(more) if isinstance(text, str)), "")
+    return recorded_cut_json(worst) | speeds | {"finding": finding, "texts": shown, "next_text": sentence}
 
 
 if __name__ == "__main__":

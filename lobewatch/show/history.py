@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from typing import Any
 
@@ -24,6 +24,7 @@ from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.settings.display_units import LENGTH
 from lobewatch.measurement.hit_choice import format_decisions
 from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.programs.part_texts import parts_texts
 from lobewatch.show.terminal.output import JsonObject, align_columns, blank_nonfinite, format_csv, pick
 from lobewatch.show.terminal.sentences import wrap_lines
 
@@ -49,7 +50,8 @@ def cut_result_text(cut: CutEntry) -> str:
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
         heard += f" at {cut.chatter_frequency_hz:.5g}{'' if error is None else f' +- {2 * error:.2g}'} Hz"
-    return heard + (f" ({cut.reason})" if cut.reason else "")
+    parts = "".join(f", {text}" for text in parts_texts(cut.parts))
+    return heard + (f" ({cut.reason})" if cut.reason else "") + parts
 
 
 def mass_check_result_text(check: MassCheckEntry) -> str:
@@ -79,6 +81,7 @@ def cut_json(cut: CutEntry) -> JsonObject:
         "by": cut.by,
         **power_json(cut.power),
         "reason": cut.reason,
+        "parts": [asdict(part) for part in cut.parts],
         "recording": cut.recording and cut.recording.file,
         "excluded": cut.excluded,
     }

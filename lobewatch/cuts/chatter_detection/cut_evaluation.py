@@ -19,7 +19,7 @@ from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
 from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
@@ -45,6 +45,10 @@ MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
+MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
+"""Smallest share of chatter in the energy of the unexplained peaks, and of faint chatter or few side bands; chosen.
+
+Lossy coding, music and another spindle make many lines, of which few happen to be one tooth passing apart."""
 MIN_SIDEBANDS = 3
 """Number of peaks of a sideband family that proves chatter."""
 FLIP_TOLERANCE = 0.003
@@ -77,8 +81,9 @@ def evaluate_cut(
     verdict is that of the loudest evidence: of the axis with the loudest chatter, else of that with the loudest cut.
     Reasons without a verdict: "speed-not-found", "no-air" (also where only peaks that are there in air make a speed,
     which is named), "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
-    "faint", "unexplained-tone" (a peak without sidebands), "slow-sampling" (fewer than three harmonics of tooth passing
-    are recorded, folded ones too), "teeth-contradicted" (the harmonics are those of another number of teeth).
+    "faint", "unexplained-tone" (a peak without sidebands), "other-source" (most unexplained peaks are no chatter),
+    "slow-sampling" (fewer than three harmonics of tooth passing are recorded, folded ones too), "teeth-contradicted"
+    (the harmonics are those of another number of teeth).
 
     Example: tooth passing of four teeth at 6000 rpm, its harmonics and a little noise.
 
@@ -262,8 +267,20 @@ def _evaluate_peaks(
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
+    if _is_other_source(sound, peaks.unexplained, chatter, spectrum.bin_width):
+        return sound._replace(verdict="cannot tell", reason="other-source")
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _is_other_source(sound: CutEvaluation, left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
+    """Return whether most unexplained peaks are no chatter, of which faint evidence needs a larger share."""
+    if sound.spindle_speed is None:
+        return False
+    is_weak = len(chatter.peaks) < MIN_SIDEBANDS or sound.energy_ratio < MIN_SINGLE_PEAK_ENERGY
+    is_weak |= classification.has_own_comb(left, chatter, bin_width)
+    share = classification.share_of_chatter(left, chatter, sound.spindle_speed.frequency, bin_width)
+    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
 
 
 def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:
@@ -285,7 +302,13 @@ def _remove_ripple(peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed
 
 
 def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
-    """Evaluate as stable, unless spindle harmonics are louder than runout and uneven teeth make them."""
+    """Evaluate as stable, unless few harmonics are heard, or louder ones than runout and uneven teeth make them."""
+    if (
+        sound.spectrum
+        and sound.spindle_speed
+        and classification.is_narrow(peaks, sound.spectrum, sound.spindle_speed, teeth)
+    ):
+        return sound._replace(verdict="cannot tell", reason="slow-sampling")
     power, order = peaks.comb.amplitude**2, peaks.tooth_order
     tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
     uneven = float(np.sum(power[~run_out & ~tooth]))

@@ -174,6 +174,19 @@ def _has_gaps(power: Floats, teeth: int, other: int) -> bool:
     return bool(np.all(gaps < MAX_GAP_POWER * np.minimum(own[:-1], own[1:])))
 
 
+CLEAR_BAND_SHARE = 0.85
+"""Share of half the sample rate that every recorder passes on: 3.4 of 4 kHz of a telephone (ITU-T G.712)."""
+
+
+def is_narrow(peaks: PeaksByOrigin, spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
+    """Return whether fewer than three tooth passing harmonics are heard, as not more fit into the band."""
+    band = CLEAR_BAND_SHARE * spectrum.sample_rate / 2
+    heard = np.concatenate([peaks.comb.frequency[peaks.tooth_order == 0], peaks.folded.frequency]) < band
+    return bool(
+        band < MIN_TOOTH_HARMONICS * teeth * turning.frequency and np.count_nonzero(heard) < MIN_TOOTH_HARMONICS
+    )
+
+
 def classify_peaks(
     peaks: SpectralPeaks, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> PeaksByOrigin:
@@ -270,6 +283,33 @@ def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_w
     """Return whether chatter has a peak k tooth passings or one turn away: a cut makes them, a pump does not. In Hz."""
     apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
     return len(chatter.peaks) > 1 or bool(np.any(apart < spectral.PEAK_TOLERANCE * bin_width))
+
+
+RIPPLE_DISTANCE = 30.0
+"""Distance from a line of chatter within which it is widened by ripple (Hz), the highest frequency of a ripple."""
+
+
+MIN_OWN_HARMONICS, MAX_OWN_HARMONICS = 4, 12
+"""Smallest number of harmonics, and highest one, by which a tone is that of another machine; chosen."""
+
+
+def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
+    """Return whether chatter has more harmonics than side bands, as tooth passing of another spindle has; in Hz."""
+    order = np.round(left.frequency / chatter.frequency)
+    reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
+    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
+    return np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1)
+
+
+def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:
+    """Return the energy of chatter, with the ripple of its lines, over that of all peaks; in Hz.
+
+    Harmonics of the chatter frequency count unless they are the comb of another spindle.
+    """
+    is_chatter = np.any(np.abs(left.frequency[:, np.newaxis] - chatter.peaks.frequency) < RIPPLE_DISTANCE, axis=1)
+    if not has_own_comb(left, chatter, bin_width):
+        is_chatter |= _find_explained(left, chatter.frequency, turn, bin_width) > 0
+    return left[is_chatter].energy / left.energy
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_width: float) -> Floats:

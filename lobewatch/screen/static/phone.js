@@ -20,6 +20,36 @@ for (const [id, other] of [["record", "choose"], ["choose", "record"]]) {
   });
 }
 
+let programs = [];
+
+const option = (name, text = name) => Object.assign(document.createElement("option"), { value: name, textContent: text });
+
+ask("machines").then(({ machines }) => {
+  at("machine").append(...machines.map((name) => option(name)));
+  at("keep").hidden = !machines.length;
+}).catch(() => {});
+
+at("machine").addEventListener("change", async () => {
+  const machine = at("machine").value;
+  try {
+    programs = machine ? (await ask(`machines/${encodeURIComponent(machine)}`)).programs : [];
+  } catch (error) {
+    programs = [];
+    fail(error.message);
+  }
+  at("program").replaceChildren(...programs.map(({ name }) => option(name)));
+  at("program").disabled = !programs.length;
+  enterProgram();
+});
+
+// Enters what machine.toml says of the program.
+function enterProgram() {
+  const chosen = programs.find(({ name }) => name === at("program").value) ?? {};
+  for (const id of ["teeth", "speed_rpm", "depth_mm"]) if (chosen[id] != null) at(id).value = chosen[id];
+}
+
+at("program").addEventListener("change", enterProgram);
+
 function show(id) {
   for (const part of ["error", "busy", "result"]) at(part).hidden = part !== id;
   at(id).scrollIntoView();
@@ -65,6 +95,8 @@ function showResult(answer) {
   put("word", WORDS[answer.word]);
   put("figure", hz === null ? "" : `${hz.toFixed(0)} Hz`);
   put("reason", answer.finding);
+  put("kept", answer.saved ? `Kept in the journal of ${at("machine").value} as ${answer.saved.join(", ")}` : "");
+  at("kept").hidden = !answer.saved;
   at("speeds").replaceChildren(...answer.next_speeds.map(speedItem));
   put("next-text", answer.next_text);
   at("texts").replaceChildren(...answer.texts.map((text) => element("li", text)));
@@ -76,7 +108,7 @@ at("form").addEventListener("submit", async (event) => {
   event.preventDefault();
   if (!recording) return fail("No recording yet. Record a cut or choose a file.");
   if (recording.size > MAX_MB * 1e6) return fail(`The recording is larger than ${MAX_MB} MB. Send a shorter recording.`);
-  const values = STORED.map((id) => [id, at(id).value]).filter(([, value]) => value);
+  const values = [...STORED, "machine", "program"].map((id) => [id, at(id).value]).filter(([, value]) => value);
   for (const id of STORED) localStorage.setItem(id, at(id).value);
   const clock = startClock();
   at("send").disabled = true;

@@ -1,27 +1,13 @@
-"""Show the parts of a recorded cut, and the remarks on its ripple."""
+"""Show the place and the ripple of a recorded cut, and the remarks on it."""
 
-from collections.abc import Sequence
 from dataclasses import asdict
 
 from acquisition import Remark
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.machine.journal.entries import PartVerdict
 from lobewatch.show.terminal.output import JsonObject
 
 MICROPHONE_NOTE = "microphone: other machines may be recorded too, and the vibration of the tool stays unknown"
 """Limits of a recording by microphone."""
-
-
-def part_text(part: PartVerdict) -> str:
-    """Return the verdict on a part of a cut with its times, such as "chatter at 1760 Hz from 1.6 to 4.6 s"."""
-    at = "" if part.hz is None else f" at {part.hz:.0f} Hz"
-    word = "period-two chatter" if part.verdict == "flip" else part.verdict
-    return f"{word}{at} from {part.from_s:.1f} to {part.to_s:.1f} s"
-
-
-def parts_texts(parts: Sequence[PartVerdict]) -> list[str]:
-    """Return the verdicts on the parts of a cut in one text, empty if they are one part."""
-    return [", ".join(map(part_text, parts))] if len(parts) > 1 else []
 
 
 def recorded_cut_remarks(comparison: CutComparison) -> list[Remark]:

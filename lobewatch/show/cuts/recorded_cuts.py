@@ -9,8 +9,9 @@ from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation
 from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.spindle_speed import is_pulse_multiple
 from lobewatch.logbook.cut_comparison import CutComparison, find_worst_cut
-from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, parts_texts, recorded_cut_remarks
+from lobewatch.show.cuts.cut_parts import MICROPHONE_NOTE, parts_json, recorded_cut_remarks
 from lobewatch.show.programs.materials import power_json, power_text
+from lobewatch.show.programs.part_texts import parts_texts
 from lobewatch.show.terminal.output import JsonObject, remark_lines
 
 
@@ -43,6 +44,10 @@ FAULTS: Mapping[str, Fault] = {
     "unexplained-tone": Fault(
         "is not explained by spindle, flutes or air, and has no side bands of chatter",
         "Cut a little deeper, and check whether the tone is there without cutting",
+    ),
+    "other-source": Fault(
+        "most lines besides tooth passing belong to no chatter, but to music, another machine or a low bit rate",
+        "Record the cut alone, as WAV or with 96 kbit/s or more",
     ),
     "slow-sampling": Fault("the sample rate covers fewer than three harmonics of tooth passing", "Use a higher rate"),
 }

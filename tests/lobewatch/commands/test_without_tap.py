@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,10 @@ import scipy.io.wavfile
 from typer.testing import CliRunner, Result
 
 from lobewatch.cli import app
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder_updates import add_event
+from lobewatch.machine.journal.entries import PartVerdict
+from lobewatch.show.history import cut_json, cut_result_text
 from lobewatch.show.terminal.option_names import with_option_names
 
 Shop = Any
@@ -260,3 +264,23 @@ def test_air_of_an_earlier_cut_serves_a_tool_without_a_tap_test(untapped: Shop, 
     assert (first["word"], first["air_from"]) == ("stable", None)
     again = json.loads(run("listen", untapped.path, *common, "--file", alone, "--dry-run").stdout)
     assert (again["word"], again["air_from"]) == ("stable", first["id"])
+
+
+def test_a_cut_without_a_verdict_is_named_by_check_until_it_is_excluded(untapped: Shop, tmp_path: Path) -> None:
+    silence = tmp_path / "silence.wav"
+    scipy.io.wavfile.write(silence, RATE, np.zeros(2 * RATE, np.float32))
+    run("listen", untapped.path, "--program", "A", "--file", silence, "--sensor", "microphone")
+    told = {remark["code"]: remark["text"] for remark in check(untapped)["remarks"]}
+    assert "c1 (no-cut)" in told["cuts-without-verdict"]
+    run("exclude", untapped.path, "c1", "--reason", "silence")
+    assert "cuts-without-verdict" not in {remark["code"] for remark in check(untapped)["remarks"]}
+
+
+def test_the_history_shows_the_parts_of_a_cut_with_times(untapped: Shop, tmp_path: Path) -> None:
+    run("listen", untapped.path, "--program", "A", "--file", passes(tmp_path, [CHATTER]), "--sensor", "microphone")
+    cut = Logbook.open(untapped.path).files.contents.cuts[-1]
+    (part,) = cut_json(cut)["parts"]
+    assert (part["verdict"], part["hz"]) == ("chatter", pytest.approx(CHATTER, abs=1.0))
+    assert 0.5 < part["from_s"] < part["to_s"] < 3.5
+    two = replace(cut, parts=(PartVerdict(0.0, 1.6, "stable"), PartVerdict(1.6, 4.6, "chatter", 1760.0)))
+    assert all(time in cut_result_text(two) for time in ("0.0 to 1.6 s", "1.6 to 4.6 s"))

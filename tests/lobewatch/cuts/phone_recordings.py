@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import NamedTuple
 
 import numpy as np
@@ -73,6 +74,27 @@ def telephone(sound: Floats) -> Floats:
     slow = scipy.signal.resample_poly(sound, 80, 441)
     band = scipy.signal.butter(6, TELEPHONE_BAND, "bandpass", fs=TELEPHONE_RATE, output="sos")
     return np.asarray(scipy.signal.sosfilt(band, slow))
+
+
+def code_lossily(sound: Floats, codec: str, kbit: int) -> tuple[Floats, float]:
+    """Return a sound after a real encoder (libmp3lame, aac or libopus) at a bit rate, and its sample rate (Hz)."""
+    import av
+
+    file, rate = io.BytesIO(), 48000 if codec == "libopus" else RATE
+    with av.open(file, "w", format={"libmp3lame": "mp3", "aac": "mp4"}.get(codec, "webm")) as output:
+        stream = output.add_stream(codec, rate=rate)
+        stream.bit_rate, stream.layout = 1000 * kbit, "mono"
+        size = stream.codec_context.frame_size or None
+        resampler = av.AudioResampler(format=stream.format, layout="mono", rate=rate, frame_size=size)
+        frame = av.AudioFrame.from_ndarray(sound[np.newaxis].astype(np.float32), format="fltp", layout="mono")
+        frame.sample_rate = RATE
+        for part in [*resampler.resample(frame), *resampler.resample(None), None]:
+            output.mux(stream.encode(part))
+    file.seek(0)
+    with av.open(file, "r") as coded:
+        plain = av.AudioResampler(format="fltp", layout="mono")
+        parts = [piece.to_ndarray() for frame in coded.decode(audio=0) for piece in plain.resample(frame)]
+    return np.clip(np.concatenate(parts, axis=1)[0].astype(np.float64), -1, 1), rate
 
 
 def as_signal(sound: Floats, rate: float = RATE) -> CutSignal:

@@ -15,6 +15,7 @@ from tests.lobewatch.cuts.phone_recordings import (
     TELEPHONE_BAND,
     TELEPHONE_RATE,
     as_signal,
+    code_lossily,
     draw_cut,
     play_music,
     telephone,
@@ -57,7 +58,19 @@ def speed_off(random: np.random.Generator) -> CutEvaluation:
 
 
 KINDS: dict[str, tuple[Callable[[np.random.Generator], CutEvaluation], set[str]]] = {
-    "music": (music, {"speed-not-found", "unexplained-tone", "no-air", "knock", "no-cut", "faint"}),
+    "music": (
+        music,
+        {
+            "speed-not-found",
+            "unexplained-tone",
+            "no-air",
+            "knock",
+            "no-cut",
+            "faint",
+            "other-source",
+            "teeth-contradicted",
+        },
+    ),
     "music from the start": (music_from_the_start, {"no-cut", "no-air", "knock", "speed-not-found", "too-short"}),
     "silence": (silence, {"no-cut"}),
     "noise floor": (noise_floor, {"no-cut", "no-air", "speed-not-found"}),
@@ -67,7 +80,7 @@ KINDS: dict[str, tuple[Callable[[np.random.Generator], CutEvaluation], set[str]]
 """Recordings, and the reasons that say why there is no verdict."""
 
 
-MAX_WRONG_SHARE = {"music": 0.25, "two spindles": 0.25}
+MAX_WRONG_SHARE = {"music": 0.15, "two spindles": 0.1}
 """Largest share of wrong `chatter` in the long round. The goal is 0, missed: docs/studies/cuts.md."""
 
 
@@ -94,6 +107,30 @@ def test_a_telephone_tells_what_lies_in_its_band(seeds: Sequence[int], chatters:
         assert heard.verdict in ("cannot tell", "chatter" if chatters else "stable"), seed
         assert cut.chatter is None or heard.chatter is None or abs(heard.chatter.frequency - cut.chatter) < 2, seed
     assert np.mean(told) >= 0.9
+
+
+OTHER_CODECS = (("libmp3lame", 16), ("aac", 24), ("libopus", 16), ("libopus", 32))
+"""Encoders and bit rates (kbit/s) of the long round."""
+
+
+@pytest.mark.parametrize("chatters", [False, True])
+@pytest.mark.parametrize(
+    ("codec", "kbit"), [("libmp3lame", 32), *(pytest.param(*each, marks=pytest.mark.long) for each in OTHER_CODECS)]
+)
+@pytest.mark.parametrize("seeds", [FEW, pytest.param(MANY, marks=pytest.mark.long)], ids=["few", "many"])
+def test_lossy_coding_makes_no_other_verdict(seeds: Sequence[int], codec: str, kbit: int, chatters: bool) -> None:
+    pytest.importorskip("av")
+    for seed in seeds:
+        cut = draw_cut(np.random.default_rng(seed), chatters)
+        sound, rate = code_lossily(cut.sound, codec, kbit)
+        assert hear(sound, cut.teeth, cut.rpm, rate).verdict in ("cannot tell", "chatter" if chatters else "stable")
+
+
+def test_two_harmonics_of_a_telephone_are_not_stable() -> None:
+    """Tooth passing at 1170 Hz has its third harmonic above 3.4 kHz."""
+    cut = draw_cut(np.random.default_rng(108), False)
+    assert 2 < TELEPHONE_BAND[1] / (cut.teeth * cut.rpm / 60) < 3
+    assert hear(telephone(cut.sound), cut.teeth, cut.rpm, TELEPHONE_RATE).reason == "slow-sampling"
 
 
 @pytest.mark.parametrize("level", [0.3, 1.0])

@@ -24,6 +24,7 @@ import soundfile
 from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.readers.read_audio import decode_audio
+from lobewatch.logbook import Logbook
 from lobewatch.logbook.heard_cuts import ASSUMED_RANGE
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer, RecordingServer, phone_page, uploaded_recording
@@ -293,6 +294,43 @@ def test_the_dashboard_serves_the_page_too(tmp_path: Path, monkeypatch: pytest.M
         assert send(server, b"sound", "/phone/recording", headers={"Authorization": ""})[0] == 401
         assert send(server, b"sound", "/phone/recording", teeth=0)[0] == 409
         assert send(server, b"sound", "/phone/recording") == (200, {"size": 5, "teeth": FLUTES})
+
+
+def journal_cuts(folder: Path) -> list[Any]:
+    return list(Logbook.open(folder).files.contents.cuts)
+
+
+@pytest.fixture
+def mill(tmp_path: Path) -> Path:
+    """Machine that was never tapped, with a program of the recorded cut."""
+    make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
+    return tmp_path / "mill"
+
+
+def test_a_cut_of_a_chosen_machine_is_kept_and_the_next_speed_uses_all_cuts(mill: Path) -> None:
+    """Nothing is written without a choice, with half of one, for an unknown machine, or without the full token."""
+    sound, program = encode(sound_of_a_cut(), "WAV"), next(iter(Logbook.open(mill).machine.cut_tables))
+    with DashboardServer(mill.parent) as server:
+        teeth = Logbook.open(mill).machine.cut_tables[program].teeth
+        chosen = {"machine": "mill", "program": program, "speed_rpm": RPM * FLUTES / teeth, "teeth": teeth}
+        chosen |= {"low_rpm": 4000, "depth_mm": 1}
+        refused = [
+            send(server, sound, "/phone/recording")[0],
+            send(server, sound, "/phone/recording", **chosen | {"program": ""})[0],
+            send(server, sound, "/phone/recording", **chosen | {"machine": "../mill"})[0],
+            send(server, sound, "/phone/recording", **chosen | {"teeth": teeth + 1})[0],
+            send(
+                server, sound, "/phone/recording", **chosen, headers={"Authorization": f"Bearer {server.watch_token}"}
+            )[0],
+        ]
+        assert refused == [200, 409, 404, 422, 403]
+        assert journal_cuts(mill) == []
+        kept = [send(server, sound, "/phone/recording", **chosen) for _ in range(2)]
+    assert [answer["saved"] for _, answer in kept] == [["c1"], ["c2"]], kept
+    found = [(cut.id, cut.word, cut.by) for cut in journal_cuts(mill)]
+    assert found == [("c1", "chatter", "microphone"), ("c2", "chatter", "microphone")]
+    first, second = (answer["next_speeds"][0] for _, answer in kept)
+    assert second["depth_mm"] < first["depth_mm"] == 1.0
 
 
 SIZES = ((1280, 657), (820, 1180), (390, 844))

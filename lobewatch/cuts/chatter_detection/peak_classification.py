@@ -298,7 +298,7 @@ def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -
     order = np.round(left.frequency / chatter.frequency)
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
     is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
-    return np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1)
+    return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1))
 
 
 def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.signal
@@ -82,7 +82,7 @@ def code_lossily(sound: Floats, codec: str, kbit: int) -> tuple[Floats, float]:
 
     file, rate = io.BytesIO(), 48000 if codec == "libopus" else RATE
     with av.open(file, "w", format={"libmp3lame": "mp3", "aac": "mp4"}.get(codec, "webm")) as output:
-        stream = output.add_stream(codec, rate=rate)
+        stream: Any = output.add_stream(codec, rate=rate)
         stream.bit_rate, stream.layout = 1000 * kbit, "mono"
         size = stream.codec_context.frame_size or None
         resampler = av.AudioResampler(format=stream.format, layout="mono", rate=rate, frame_size=size)
@@ -91,6 +91,7 @@ def code_lossily(sound: Floats, codec: str, kbit: int) -> tuple[Floats, float]:
         for part in [*resampler.resample(frame), *resampler.resample(None), None]:
             output.mux(stream.encode(part))
     file.seek(0)
+    coded: Any
     with av.open(file, "r") as coded:
         plain = av.AudioResampler(format="fltp", layout="mono")
         parts = [piece.to_ndarray() for frame in coded.decode(audio=0) for piece in plain.resample(frame)]

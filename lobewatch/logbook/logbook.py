@@ -41,22 +41,14 @@ class Logbook:
     >>> from tempfile import TemporaryDirectory
     >>> from lobewatch.machine import make_machine_folder
     >>> with TemporaryDirectory() as parent:
-    ...     logbook = Logbook.open(make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml").parent)
-    ...     status = logbook.status()
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     status = Logbook.open(toml.parent).status()
     >>> status.status.value, [reason.code for reason in status.reasons]
     ('unknown', ['never-tapped'])
     """
 
     def __init__(self, folder: MachineFolder, now: datetime | None = None) -> None:
-        """Read nothing yet.
-
-        Parameters
-        ----------
-        folder
-            Folder of the machine.
-        now
-            Time that ages are counted to. None for the present time.
-        """
+        """Read nothing yet. Ages are counted to `now`, None for the present time."""
         self._now = now
         self.folder = folder
         """Folder of the machine."""
@@ -222,7 +214,7 @@ class Logbook:
         Parameters
         ----------
         tap
-            Tap test to store.
+            Tap test.
         now
             Time of a live test, which is checked against the clock. None for a recorded test.
         asked
@@ -233,7 +225,7 @@ class Logbook:
         if not self.is_current:
             self._invalidate()
         newest = (place.entry for place in self.files.places[-1:])
-        codes = *find_clock_questions(tap.circumstances.created, now, newest), *asked
+        codes = (*find_clock_questions(tap.circumstances.created, now, newest), *asked)
         codes += find_device_questions(self.folder, tap.circumstances)
         analysis, is_newest = self._current_analysis, self.files.add(self.folder.commit(tap, codes, answered))
         self._current_analysis = self._make_analysis(analysis.measurements) if is_newest and analysis else None

@@ -79,8 +79,11 @@ class CutComparison:
         tapped = () if self.assembly is None else (*(self.assembly.x or ()), *(self.assembly.y or ()))
         return min((mode.frequency for mode in tapped), key=lambda mode: abs(mode - frequency), default=None)
 
-    def to_recorded_cut(self, at: datetime, begin: float = 0.0) -> CutEntry:
-        """Make the journal entry of a cut made at a time (UTC); begin: of its part of the recording (s)."""
+    def to_recorded_cut(self, at: datetime, begin: float = 0.0, upload: str = "") -> CutEntry:
+        """Make the journal entry of a cut made at a time (UTC); begin: of its part of the recording (s).
+
+        upload: SHA-256 of the file that a phone sent.
+        """
         chatter = self.detected.chatter
         return CutEntry(
             "",
@@ -93,6 +96,7 @@ class CutComparison:
             software=lobewatch_version(),
             reason=self.detected.reason,
             parts=tuple(part.shift(-begin) for part in self.detected.part_verdicts),
+            upload=upload,
         )
 
 
@@ -147,13 +151,26 @@ def _evaluate_with_any_air(
 
 
 def store_recorded_cuts(
-    folder: MachineFolder, comparisons: Sequence[CutComparison], signal: CutSignal, at: datetime | None
+    folder: MachineFolder,
+    comparisons: Sequence[CutComparison],
+    signal: CutSignal,
+    at: datetime | None,
+    upload: str = "",
+    kept: Sequence[CutEntry] = (),
 ) -> list[CutEntry]:
-    """Store each cut with its part of the recording. `at` is the time of the cut, None for now."""
-    time = resolve_cutting_time(at, datetime.now(UTC))
+    """Store each cut with its part of the recording, and return the entries of all.
+
+    `at` is the time of the cut, None for now. upload: SHA-256 of the file that a phone sent; kept: first cuts of that
+    file that are in the journal already.
+    """
+    time = kept[0].at if kept else resolve_cutting_time(at, datetime.now(UTC))
     parts = [comparison.detected.parts for comparison in comparisons]
     begins, ends = [0.0, *(part.end for part in parts[:-1])], [*(part.begin for part in parts[1:]), signal.duration]
+    left = list(zip(comparisons, begins, ends, strict=True))[len(kept) :]
     return [
-        store_cut(folder, comparison.to_recorded_cut(time, begin), signal.slice_time(begin, end))
-        for comparison, begin, end in zip(comparisons, begins, ends, strict=True)
+        *kept,
+        *(
+            store_cut(folder, comparison.to_recorded_cut(time, begin, upload), signal.slice_time(begin, end))
+            for comparison, begin, end in left
+        ),
     ]

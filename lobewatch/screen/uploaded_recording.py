@@ -1,5 +1,6 @@
 """Evaluate the recording of a cut that a browser sent, in a subprocess with limits on length, time and memory."""
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -20,8 +21,9 @@ from lobewatch.arrays import Floats
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import CutComparison, compare_cuts, find_worst_cut, store_recorded_cuts
 from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
+from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.settings.cut_tables import ProgramTable
-from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.machine.settings.requested_cut import CutSetting, find_cut_setting
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
 from lobewatch.show.cuts.next_speeds import next_speeds_json, next_speeds_texts
@@ -129,10 +131,10 @@ def evaluate_upload(content: bytes | bytearray, cut: UploadedCut, folder: Path |
         arguments = entered, str(MAX_CPU_SECONDS), str(MAX_MEMORY), *([str(folder)] if folder else [])
         output = run_in_subprocess(__name__, *arguments, patience=MAX_WAIT_SECONDS, content=content)
     except subprocess.TimeoutExpired:
-        return _too_slow()
+        return _too_slow(content, folder)
     except subprocess.CalledProcessError as error:
         if -error.returncode == getattr(signal, "SIGXCPU", None):  # Windows has no such signal
-            return _too_slow()
+            return _too_slow(content, folder)
         crashed = error.returncode < 0
         return refuse("unreadable", "the file crashes its decoder. Record the cut again.") if crashed else _failed()
     answer: JsonObject = json.loads(output)
@@ -144,8 +146,23 @@ def refuse(code: str, text: str) -> JsonObject:
     return {"code": code, "error": text}
 
 
-def _too_slow() -> JsonObject:
+def _too_slow(content: bytes | bytearray, folder: Path | None) -> JsonObject:
+    """Return the answer to a recording whose evaluation was stopped, perhaps after its cuts were stored."""
+    kept = [cut.id for cut in _find_kept_cuts(Logbook.open(folder), content)] if folder else []
+    if kept:
+        text = f"the cut is kept as {', '.join(kept)}, but the next speeds need more than {MAX_CPU_SECONDS:g} s"
+        return refuse("too-slow", f"{text}. Run lobewatch suggest on the computer.") | {"saved": kept}
     return refuse("too-slow", f"the recording needs more than {MAX_CPU_SECONDS:g} s of computing. Send a shorter one.")
+
+
+def _find_kept_cuts(logbook: Logbook, content: bytes | bytearray) -> list[CutEntry]:
+    """Find the cuts of a file that are in the journal already, which the same file must not store again."""
+    upload = _hash_upload(content)
+    return [cut for cut in logbook.files.contents.cuts if cut.upload == upload and not cut.excluded]
+
+
+def _hash_upload(content: bytes | bytearray) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def _failed() -> JsonObject:
@@ -168,7 +185,7 @@ def _evaluate(content: bytes, cut: UploadedCut, folder: Path | None) -> JsonObje
             return fault
         loudest = columns[int(np.argmax(np.std(columns, axis=1)))]
         signal = CutSignal(loudest, rate, sensor=MICROPHONE_SENSOR)
-        return _hear(signal, cut) if folder is None else _keep(signal, cut, folder)
+        return _hear(signal, cut) if folder is None else _keep(signal, cut, folder, content)
     except MissingDecoderError as error:
         return refuse("no-decoder", str(error))
     except DataError as error:
@@ -199,23 +216,37 @@ def _hear(signal: CutSignal, cut: UploadedCut) -> JsonObject:
     return _answer(comparisons, next_speeds_json(found), shown, next_speeds_texts(found))
 
 
-def _keep(signal: CutSignal, cut: UploadedCut, folder: Path) -> JsonObject:
-    """Evaluate a cut of a machine, and keep it in its journal, as `listen` does with a file."""
+def _keep(signal: CutSignal, cut: UploadedCut, folder: Path, content: bytes) -> JsonObject:
+    """Evaluate a cut of a machine, and keep it in its journal once, as `listen` does with a file."""
     try:
         logbook = Logbook.open(folder)
         setting = find_cut_setting(logbook.machine, cut.program, cut.speed_rpm, cut.depth_mm)
-        if setting.cut.teeth != cut.teeth:
-            text = f"{cut.teeth} flutes are not the {setting.cut.teeth} flutes of {cut.program}"
-            return refuse("not-kept", f"{text}. Correct the number of flutes.")
+        kept = _find_kept_cuts(logbook, content)
+        if fault := _find_setting_fault(setting, cut, kept):
+            return refuse("not-kept", fault)
         logbook.folder.refuse_damage()
         comparisons = compare_cuts(logbook, setting, signal)
-        earlier, stored = logbook.cuts, store_recorded_cuts(logbook.folder, comparisons, signal, None)
+        earlier = [entry for entry in logbook.cuts if entry not in kept]
+        upload, kept = _hash_upload(content), kept[: len(comparisons)]
+        stored = store_recorded_cuts(logbook.folder, comparisons, signal, None, upload, kept)
     except (OSError, ValueError) as error:
         return refuse("not-kept", format_error(error))
     speeds, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
     shown = [*recording_texts(comparisons), *remark_lines(remarks)]
     answer = _answer(comparisons, {"next_speeds": [], **speeds}, shown, texts if speeds else ())
-    return answer | {"saved": [kept.id for kept in stored]}
+    return answer | {"saved": [entry.id for entry in stored]}
+
+
+def _find_setting_fault(setting: CutSetting, cut: UploadedCut, kept: Sequence[CutEntry]) -> str:
+    """Return why a cut cannot be kept with a setting; empty if it can."""
+    if setting.cut.teeth != cut.teeth:
+        text = f"{cut.teeth} flutes are not the {setting.cut.teeth} flutes of {cut.program}"
+        return f"{text}. Correct the number of flutes."
+    as_entered = setting.program, setting.speed_rpm, setting.depth
+    if any((entry.program, entry.commanded_rpm, entry.depth) != as_entered for entry in kept):
+        ids = ", ".join(entry.id for entry in kept)
+        return f"this recording is kept as {ids} with other values. Exclude {ids} first."
+    return ""
 
 
 def _answer(

@@ -95,6 +95,8 @@ class CutEntry:
     """Power of the cut; None if it was not read."""
     parts: tuple[PartVerdict, ...] = ()
     """Verdicts on the parts of the cut, from the beginning of its recording; empty without them."""
+    upload: str = ""
+    """SHA-256 of the file from which a phone's page stored the cut; empty for other cuts."""
     excluded: str = ""
     """Reason of its exclusion, from other lines; empty if included."""
 
@@ -131,8 +133,9 @@ class CutEntry:
         """Journal line."""
         fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
         del fields["cut"]["process_damping"]
-        if not self.parts:
-            del fields["parts"]
+        for name in ("parts", "upload"):
+            if not fields[name]:
+                del fields[name]
         return {"kind": CUT_LINE_KIND, **fields, "at": self.at.isoformat()}
 
 

@@ -23,9 +23,12 @@ import soundfile
 
 from acquisition.arrays import Floats
 from acquisition.errors import DataError
+from acquisition.files.cut_file import CutSignal
 from acquisition.files.readers.read_audio import decode_audio
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.heard_cuts import ASSUMED_RANGE
+from lobewatch.logbook.cut_comparison import store_recorded_cuts
+from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
+from lobewatch.machine import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
 from lobewatch.screen import DashboardServer, RecordingServer, phone_page, uploaded_recording
 
@@ -36,9 +39,9 @@ Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 
 
-def sound_of_a_cut(chatter: float | None = CHATTER) -> Floats:
+def sound_of_a_cut(chatter: float | None = CHATTER, seed: int = 0) -> Floats:
     """Return one second of air, two of cutting and half a second of air, as shares of the full scale."""
-    random, seconds = np.random.default_rng(0), np.arange(round(3.5 * RATE)) / RATE
+    random, seconds = np.random.default_rng(seed), np.arange(round(3.5 * RATE)) / RATE
     passing = FLUTES * RPM / 60
     lines = [(k * passing, 0.2 / k) for k in range(1, 12)]
     if chatter:
@@ -309,7 +312,8 @@ def mill(tmp_path: Path) -> Path:
 
 def test_a_cut_of_a_chosen_machine_is_kept_and_the_next_speed_uses_all_cuts(mill: Path) -> None:
     """Nothing is written without a choice, with half of one, for an unknown machine, or without the full token."""
-    sound, program = encode(sound_of_a_cut(), "WAV"), next(iter(Logbook.open(mill).machine.cut_tables))
+    sound, again = (encode(sound_of_a_cut(seed=seed), "WAV") for seed in (0, 1))
+    program = next(iter(Logbook.open(mill).machine.cut_tables))
     with DashboardServer(mill.parent) as server:
         teeth = Logbook.open(mill).machine.cut_tables[program].teeth
         chosen = {"machine": "mill", "program": program, "speed_rpm": RPM * FLUTES / teeth, "teeth": teeth}
@@ -325,12 +329,44 @@ def test_a_cut_of_a_chosen_machine_is_kept_and_the_next_speed_uses_all_cuts(mill
         ]
         assert refused == [200, 409, 404, 422, 403]
         assert journal_cuts(mill) == []
-        kept = [send(server, sound, "/phone/recording", **chosen) for _ in range(2)]
-    assert [answer["saved"] for _, answer in kept] == [["c1"], ["c2"]], kept
+        kept = [send(server, recording, "/phone/recording", **chosen) for recording in (sound, again, sound)]
+        deeper = send(server, sound, "/phone/recording", **chosen | {"depth_mm": 2})
+    assert (deeper[0], deeper[1]["code"]) == (422, "not-kept")
+    assert [answer["saved"] for _, answer in kept] == [["c1"], ["c2"], ["c1"]], kept
     found = [(cut.id, cut.word, cut.by) for cut in journal_cuts(mill)]
     assert found == [("c1", "chatter", "microphone"), ("c2", "chatter", "microphone")]
-    first, second = (answer["next_speeds"][0] for _, answer in kept)
-    assert second["depth_mm"] < first["depth_mm"] == 1.0
+    first, second, repeated = (answer["next_speeds"][0] for _, answer in kept)
+    assert second["depth_mm"] == repeated["depth_mm"] < first["depth_mm"] == 1.0
+
+
+def test_a_recording_that_is_stopped_after_its_cut_is_kept_says_so_and_keeps_it_once(
+    mill: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program, table = next(iter(Logbook.open(mill).machine.cut_tables.items()))
+    speed = RPM * FLUTES / table.teeth
+    entered = uploaded_recording.UploadedCut(table.teeth, speed, depth_mm=1, machine="mill", program=program)
+    sound, run = encode(sound_of_a_cut(), "WAV"), uploaded_recording.run_in_subprocess
+
+    def stop(*arguments: str, **options: Any) -> bytes:
+        run(*arguments, **options)
+        raise subprocess.TimeoutExpired("python", 0)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(uploaded_recording, "run_in_subprocess", stop)
+        stopped = uploaded_recording.evaluate_upload(sound, entered, mill)
+    assert (stopped["code"], stopped["saved"]) == ("too-slow", ["c1"])
+    assert uploaded_recording.evaluate_upload(sound, entered, mill)["saved"] == ["c1"]
+    assert len(journal_cuts(mill)) == 1
+
+
+def test_only_the_passes_that_are_not_kept_yet_are_stored(mill: Path) -> None:
+    sound = np.concatenate([sound_of_a_cut(seed=seed) for seed in (0, 1)])
+    signal, folder = CutSignal(sound, RATE, sensor="microphone"), MachineFolder(mill)
+    passes, _ = hear_signal(signal, "two.wav", CutFileRequest(FLUTES, RPM, 1.0))
+    first = store_recorded_cuts(folder, passes[:1], signal, None, "a")
+    every = store_recorded_cuts(folder, passes, signal, None, "a", first)
+    assert [cut.id for cut in every] == [cut.id for cut in journal_cuts(mill)] == ["c1", "c2"]
+    assert len({(cut.at, cut.upload) for cut in journal_cuts(mill)}) == 1
 
 
 SIZES = ((1280, 657), (820, 1180), (390, 844))

@@ -120,11 +120,13 @@ def join_windows(axes: Floats, windows: Sequence[HeardWindow], parts: CutParts, 
             begin, end = _chatter_times(axes, [windows[i] for i in group], rate)
             times[number] = begin if number else times[number]
             times[number + 1] = end if number + 1 < len(groups) else times[number + 1]
+    times = np.maximum.accumulate(times).tolist()  # chatter may last beyond the middle of the next windows
     return tuple(
         PartVerdict(
             round(float(begin), 3), round(float(end), 3), windows[group[0]].verdict, _loudest(windows, group).hz
         )
         for group, (begin, end) in zip(groups, pairwise(times), strict=True)
+        if begin < end
     )
 
 

@@ -45,13 +45,17 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         heard = sorted([*heard, *_pick_striking(axes, short, heard)], key=_center)
     heard = compare_with_stable(axes, rate, heard)
     joined = windowing.join_windows(axes, [_summarize(sound) for sound in heard], parts, rate)
-    return _with_usual_speed(_worst_window(heard), heard)._replace(part_verdicts=joined)
+    return with_usual_speed(_worst_window(heard), heard)._replace(part_verdicts=joined)
 
 
-def _with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> CutEvaluation:
-    """Return an evaluation with the median speed of all windows, as all axes have one speed."""
-    speeds = sorted(sound.spindle_speed for sound in heard if sound.spindle_speed is not None)
-    return worst if worst.spindle_speed is None else worst._replace(spindle_speed=speeds[len(speeds) // 2])
+def with_usual_speed(worst: CutEvaluation, heard: Sequence[CutEvaluation]) -> CutEvaluation:
+    """Return an evaluation with the median speed of the longest windows, as shorter ones resolve it worse."""
+    longest = max(map(_length, heard))
+    whole = [sound.spindle_speed for sound in heard if _length(sound) == longest]
+    speeds = sorted(speed for speed in whole if speed is not None)
+    if worst.spindle_speed is None or not speeds:
+        return worst
+    return worst._replace(spindle_speed=speeds[len(speeds) // 2])
 
 
 def _center(sound: CutEvaluation) -> int:

@@ -19,7 +19,7 @@ from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
 from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
@@ -45,12 +45,6 @@ MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
-MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
-"""Smallest share of chatter in the energy of the unexplained peaks, and of faint chatter or few side bands; chosen.
-
-Lossy coding, music and another spindle make many lines, of which few happen to be one tooth passing apart."""
-MIN_SIDEBANDS = 3
-"""Number of peaks of a sideband family that proves chatter."""
 FLIP_TOLERANCE = 0.003
 """Distance from half the tooth passing frequency, relative to that, within which chatter is of period two (flip)."""
 MAX_UNEVEN_ENERGY = 5.0
@@ -112,6 +106,9 @@ def evaluate_cut(
     sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
     sounds = [_compare_with_ripple(sound, even, ripple) for sound in _compare_axes(sounds)]
     sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
+    tooth = speed.frequency * teeth
+    if speed == known.speed and sound.chatter and classification.has_other_spacing(sound.chatter, tooth):
+        return _speed_not_found(sound.spectrum or spectra[0], np.nan)
     others = None if sound.peaks is None else sound.peaks.unexplained
     if is_measured or known.speed or sound.verdict == "stable" or not others:
         return sound
@@ -163,7 +160,7 @@ def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | No
 
 def _least_energy(chatter: ChatterPeaks) -> float:
     """Return the smallest energy of unexplained peaks over that of the comb that is chatter."""
-    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
+    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= classification.MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
 
 
 def _evaluate_axis(
@@ -252,8 +249,24 @@ def _evaluate_peaks(
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return sound._replace(verdict="cannot tell", reason="slow-sampling")
-    if other := classification.find_other_teeth(peaks.comb, speed, teeth):
-        return sound._replace(verdict="cannot tell", reason="teeth-contradicted", comb_teeth=other)
+    other = classification.find_other_teeth(peaks.comb, speed, teeth)
+    found = _evaluate_unexplained(sound, peaks, spectrum, speed, signal, other or teeth, immersion, known)
+    if not other or found.reason == "other-source":
+        return found
+    return sound._replace(verdict="cannot tell", reason="teeth-contradicted", comb_teeth=other)
+
+
+def _evaluate_unexplained(
+    sound: CutEvaluation,
+    peaks: PeaksByOrigin,
+    spectrum: Spectrum,
+    speed: SpindleSpeed,
+    signal: Floats,
+    teeth: int,
+    immersion: float,
+    known: KnownCut,
+) -> CutEvaluation:
+    """Evaluate the unexplained peaks of an axis; sound: as if it was stable."""
     if not len(peaks.unexplained):
         return _evaluate_stable(sound, peaks, teeth, immersion)
     tooth = speed.frequency * teeth
@@ -267,20 +280,11 @@ def _evaluate_peaks(
         return sound._replace(verdict="cannot tell", reason="faint")
     if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
         return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
-    if _is_other_source(sound, peaks.unexplained, chatter, spectrum.bin_width):
+    is_faint = ratio < MIN_SINGLE_PEAK_ENERGY
+    if classification.is_other_source(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width, is_faint):
         return sound._replace(verdict="cannot tell", reason="other-source")
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
-
-
-def _is_other_source(sound: CutEvaluation, left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
-    """Return whether most unexplained peaks are no chatter, of which faint evidence needs a larger share."""
-    if sound.spindle_speed is None:
-        return False
-    is_weak = len(chatter.peaks) < MIN_SIDEBANDS or sound.energy_ratio < MIN_SINGLE_PEAK_ENERGY
-    is_weak |= classification.has_own_comb(left, chatter, bin_width)
-    share = classification.share_of_chatter(left, chatter, sound.spindle_speed.frequency, bin_width)
-    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
 
 
 def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:

@@ -285,6 +285,19 @@ def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_w
     return len(chatter.peaks) > 1 or bool(np.any(apart < spectral.PEAK_TOLERANCE * bin_width))
 
 
+MAX_SPACING_DIFFERENCE = 2e-3
+"""Largest relative difference between spacing of side bands and tooth passing; chosen, that of usual speeds."""
+
+
+def has_other_spacing(chatter: ChatterPeaks, tooth_frequency: float) -> bool:
+    """Return whether the side bands of chatter are not one tooth passing (Hz) apart, so that its speed is wrong."""
+    order = np.round((chatter.peaks.frequency - chatter.frequency) / tooth_frequency)
+    if not np.ptp(order):
+        return False
+    spacing = float(np.polyfit(order, chatter.peaks.frequency, 1)[0])
+    return abs(spacing / tooth_frequency - 1) > MAX_SPACING_DIFFERENCE
+
+
 RIPPLE_DISTANCE = 30.0
 """Distance from a line of chatter within which it is widened by ripple (Hz), the highest frequency of a ripple."""
 
@@ -299,6 +312,21 @@ def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
     is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
     return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1))
+
+
+MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
+"""Smallest share of chatter in the energy of the unexplained peaks, and of faint chatter or few side bands; chosen.
+
+Lossy coding, music and another spindle make many lines, of which few happen to be one tooth passing apart."""
+MIN_SIDEBANDS = 3
+"""Number of peaks of a sideband family that proves chatter."""
+
+
+def is_other_source(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float, is_faint: bool) -> bool:
+    """Return whether most unexplained peaks are no chatter, of which weak evidence needs a larger share; in Hz."""
+    is_weak = is_faint or len(chatter.peaks) < MIN_SIDEBANDS or has_own_comb(left, chatter, bin_width)
+    share = share_of_chatter(left, chatter, turn, bin_width)
+    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
 
 
 def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:

@@ -8,9 +8,9 @@ import numpy as np
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_detection import MAX_CUT_TIME, MIN_CUT_TIME, CutParts
-from lobewatch.cuts.chatter_detection.cut_evaluation import MIN_SIDEBANDS, CutEvaluation, CutRecording, evaluate_cut
+from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_cut
 from lobewatch.cuts.chatter_detection.cut_windows import NOTHING_KNOWN, KnownCut
-from lobewatch.cuts.chatter_detection.peak_classification import MIN_TOOTH_HARMONICS
+from lobewatch.cuts.chatter_detection.peak_classification import MIN_SIDEBANDS, MIN_TOOTH_HARMONICS
 from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
 AIR_REASONS = ("no-air", "no-cut")

@@ -169,6 +169,7 @@ def _lowest_limits(frequency: Floats, loops: Sequence[Complexes], teeth: int, sp
         chatter.reshape(-1)[place[is_lowest]] = hz[is_lowest]
     limits = np.where(np.isinf(limits), minimum_filter1d(limits, GAP_SPEEDS, axis=1), limits)
     lowest = np.min(limits, axis=1, keepdims=True)
+    lowest[np.isinf(lowest)] = 1.0  # no lobe in the range: deep cuts are stable at all speeds
     return SampledLobes(np.minimum(limits / lowest, MAX_GAIN), chatter)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.arrays import Floats
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation
+from lobewatch.logbook.cut_comparison import find_worst_cut
 from lobewatch.logbook.heard_cuts import CutFileRequest, hear_signal
 from tests.lobewatch.cuts.phone_recordings import (
     RATE,
@@ -26,9 +27,9 @@ FEW, MANY = (0, 1), range(2, 22)
 
 
 def hear(sound: Floats, teeth: int, rpm: float, rate: float = RATE) -> CutEvaluation:
-    """Return the evaluation of the last cut in a recording, as of a file on the command line."""
+    """Return the evaluation of the worst cut in a recording, as of a file on the command line."""
     comparisons, _ = hear_signal(as_signal(sound, rate), "cut.wav", CutFileRequest(teeth, rpm))
-    return comparisons[-1].detected
+    return find_worst_cut(comparisons).detected
 
 
 def music(random: np.random.Generator) -> CutEvaluation:
@@ -60,18 +61,13 @@ def speed_off(random: np.random.Generator) -> CutEvaluation:
 KINDS: dict[str, tuple[Callable[[np.random.Generator], CutEvaluation], set[str]]] = {
     "music": (
         music,
-        {
-            "speed-not-found",
-            "unexplained-tone",
-            "no-air",
-            "knock",
-            "no-cut",
-            "faint",
-            "other-source",
-            "teeth-contradicted",
-        },
+        {"speed-not-found", "unexplained-tone", "no-air", "knock", "no-cut", "faint", "other-source"},
     ),
-    "music from the start": (music_from_the_start, {"no-cut", "no-air", "knock", "speed-not-found", "too-short"}),
+    "music from the start": (
+        music_from_the_start,
+        {"no-cut", "no-air", "knock", "speed-not-found", "too-short", "unexplained-tone", "on-spindle-lines"}
+        | {"teeth-contradicted"},
+    ),
     "silence": (silence, {"no-cut"}),
     "noise floor": (noise_floor, {"no-cut", "no-air", "speed-not-found"}),
     "clipped": (clipped, {"overload"}),
@@ -80,8 +76,8 @@ KINDS: dict[str, tuple[Callable[[np.random.Generator], CutEvaluation], set[str]]
 """Recordings, and the reasons that say why there is no verdict."""
 
 
-MAX_WRONG_SHARE = {"music": 0.15, "two spindles": 0.1}
-"""Largest share of wrong `chatter` in the long round. The goal is 0, missed: docs/studies/cuts.md."""
+MAX_WRONG_SHARE = {"music": 0.15, "music from the start": 0.15, "two spindles": 0.1}
+"""Largest share of wrong verdicts in the long round. The goal is 0, missed: docs/studies/cuts.md."""
 
 
 @pytest.mark.parametrize("kind", KINDS)

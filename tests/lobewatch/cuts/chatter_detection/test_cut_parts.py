@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from lobewatch.cuts.chatter_detection import earlier_air
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
+from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, join_windows
 from lobewatch.cuts.chatter_detection.load_ripple import compute_evenness, find_ripple_peaks
-from lobewatch.cuts.chatter_detection.peak_classification import classify_peaks, find_other_teeth
+from lobewatch.cuts.chatter_detection.peak_classification import (
+    ChatterPeaks,
+    classify_peaks,
+    find_other_teeth,
+    has_other_spacing,
+)
 from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, compute_spectrum, find_separate_peaks
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
-from lobewatch.cuts.chatter_detection.window_evaluation import compare_with_stable
+from lobewatch.cuts.chatter_detection.window_evaluation import compare_with_stable, with_usual_speed
 from lobewatch.cuts.chatter_detection.without_air import evaluate_without_air
 
 Floats = NDArray[np.float64]
@@ -206,6 +212,39 @@ def test_a_line_that_is_as_loud_in_the_stable_windows_makes_no_part_chatter() ->
     louder = np.atleast_2d(recording(6.0, add=chatter(0.1, 2.5)))
     compared = compare_with_stable(louder, RATE, [windows[0], *stable])
     assert [window.verdict for window in compared] == ["chatter", "stable", "stable"]
+
+
+def test_the_speed_of_a_cut_is_that_of_its_longest_windows(early: CutEvaluation) -> None:
+    assert early.spindle_speed is not None
+    windows = [
+        early._replace(
+            parts=early.parts._replace(cut=slice(0, size)), spindle_speed=early.spindle_speed._replace(frequency=turn)
+        )
+        for size, turn in ((4, 101.0), (1, 90.0), (4, 100.0), (1, 91.0), (4, 102.0))
+    ]
+    assert with_usual_speed(windows[1], windows).speed_rpm == 60 * 101.0
+
+
+@pytest.mark.parametrize(("spacing", "differs"), [(200.0, False), (200.3, False), (198.9, True), (201.0, True)])
+def test_side_bands_of_another_spacing_belong_to_another_speed(spacing: float, differs: bool) -> None:
+    """Harmonics that a sensor without a filter folds back are one tooth passing of their own speed apart."""
+    frequency = 320.0 + spacing * np.arange(3)
+    peaks = SpectralPeaks(frequency, np.ones(3), np.full(3, 1e3))
+    assert has_other_spacing(ChatterPeaks(320.0, 0.1, peaks), 200.0) == differs
+    assert not has_other_spacing(ChatterPeaks(320.0, 0.1, peaks[:1]), 200.0)
+
+
+def test_parts_between_overlapping_windows_with_chatter_end_after_they_begin() -> None:
+    signal = np.atleast_2d(recording(6.0, add=chatter(0.0, 6.0)))
+    seconds = ((1.0, 3.1, 1760.0), (2.0, 4.0, None), (2.8, 4.8, 1760.0), (5.0, 7.0, None))
+    windows = [
+        HeardWindow(slice(round(a * RATE), round(b * RATE)), "chatter" if hz else "cannot tell", hz, 9.0)
+        for a, b, hz in seconds
+    ]
+    parts = join_windows(signal, windows, CutEvaluation("chatter", "").parts._replace(begin=1.0, end=7.0), RATE)
+    assert [part.verdict for part in parts] == ["chatter", "chatter", "cannot tell"]
+    assert all(part.from_s < part.to_s for part in parts)
+    assert [part.to_s for part in parts[:-1]] == [part.from_s for part in parts[1:]]
 
 
 @pytest.mark.parametrize(("begin", "verdict"), [(0.5, "chatter"), (9.0, "stable")])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lobewatch.cuts.learning.next_speed import HeardCut, suggest_speeds
+from lobewatch.cuts.learning.sampled_lobes import MAX_GAIN, sample_lobes
 
 RANGE = (8000.0, 24000.0)
 
@@ -102,6 +104,17 @@ def test_without_a_chatter_frequency_there_is_no_speed(cuts: list[HeardCut], rea
 def test_a_range_without_a_pocket_says_so() -> None:
     assert suggest_speeds([chatter(18000, 1370)], 2, (14500.0, 19000.0)).reason == "no-speed-in-range"
     assert suggest_speeds([chatter(18000, 1370)], 2, (50000.0, 90000.0)).reason == "no-speed-in-range"
+
+
+def test_samples_without_a_lobe_in_the_range_count_as_stable() -> None:
+    """Tooth passing is 7 to 10 times a frequency, above the fastest lobe of some samples."""
+    limits = sample_lobes([200.0], 4, np.geomspace(20_000.0, 30_000.0, 20)).limits
+    assert np.all(limits >= 1)
+    is_free = np.all(limits == MAX_GAIN, axis=1)
+    assert 0 < np.count_nonzero(is_free) < len(limits) / 2
+    assert np.all(np.min(limits[~is_free], axis=1) == 1)
+    found = suggest_speeds([chatter(25_000, 200)], 4, (20_000.0, 30_000.0))
+    assert all(math.isfinite(speed.relative_depth) for speed in found.speeds)
 
 
 def test_without_a_pocket_the_next_cut_is_less_deep() -> None:

@@ -35,7 +35,7 @@ PIECE = 0.25
 LOUD = 0.8
 """Quantile of the level that is taken to be a cut."""
 WINDOW = 2.0
-"""Length of a window of air, and of the middle of a cut that was not found (s)."""
+"""Length of a window of air, of the reference, and of the middle of a cut that was not found (s)."""
 AROUND, HARMONICS = 0.05, 16
 """Relative distance up to which the comb is looked for, and its highest multiple."""
 CLEAR = 3.0
@@ -46,7 +46,10 @@ SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
 """Orders from a multiple of a clear comb within which chatter is false."""
-COLUMNS = "recordings, cut found, speed of one axis, axes apart, of all axes, words on all axes, not told, on harmonics"
+COLUMNS = (
+    "recordings, cut found, speed of one axis, axes apart, of all axes, words on all axes, not told, both verdicts, "
+    "on harmonics"
+)
 """Headings of the table."""
 NOT_FOUND = ("no-cut", "no-air", "too-short")
 """Reasons that say that no one cut was found."""
@@ -130,6 +133,8 @@ class Tally:
     on_harmonic: int = 0
     pairs: int = 0
     apart: int = 0
+    contrary: int = 0
+    """Recordings with stable and chattering parts."""
 
     def add(self, cuts: list[CutEvaluation], comb: Comb) -> None:
         """One more recording."""
@@ -137,6 +142,8 @@ class Tally:
         self.cuts += 1
         self.found += len(cuts) == 1 and heard.parts.reason not in NOT_FOUND
         self.words[heard.verdict if heard.verdict != "cannot tell" else heard.reason] += 1
+        verdicts = {part.verdict for cut in cuts for part in cut.part_verdicts}
+        self.contrary += "stable" in verdicts and bool(verdicts & {"chatter", "flip"})
         self.speeds[_speed_word(heard, comb)] += 1
         self.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
 
@@ -215,9 +222,13 @@ def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
 
 
 def steady_part(file: list[Axis], heard: CutEvaluation) -> slice:
-    """Return the evaluated part, else the middle of the loud part."""
+    """Return the end of the steady part of a cut, else the middle of the loud part.
+
+    The window that decides the verdict may be too short to resolve the speed.
+    """
     if heard.parts.cut.stop > heard.parts.cut.start:
-        return heard.parts.cut
+        parts, rate = heard.parts, file[0].rate
+        return slice(round(max(parts.steady_begin, parts.steady_end - WINDOW) * rate), round(parts.steady_end * rate))
     begin, end = loud_part(file[0].signal, file[0].rate)
     half = min(round(WINDOW * file[0].rate), end - begin) // 2
     return slice((begin + end) // 2 - half, (begin + end) // 2 + half)
@@ -269,7 +280,8 @@ def row(source: Source, each: Tally, together: Tally) -> str:
     false = each.on_harmonic + together.on_harmonic
     return (
         f"| {source.title} | {each.found} of {each.cuts} | {each.speed_text} | {each.apart} of {each.pairs} | "
-        f"{together.speed_text} | {words} | {together.words.total() - words_told} of {together.cuts} | {false} |"
+        f"{together.speed_text} | {words} | {together.words.total() - words_told} of {together.cuts} | "
+        f"{together.contrary} | {false} |"
     )
 
 

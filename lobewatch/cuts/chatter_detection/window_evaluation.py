@@ -39,7 +39,7 @@ def evaluate_windows(evaluate: Evaluate, axes: Floats, parts: CutParts, rate: fl
         known = known._replace(speed=sound.spindle_speed or known.speed)
         heard.insert(0, sound)
     heard = _settle_contradictions(evaluate, parts, rate, heard, known)
-    if len(places) > 1 and known.speed and _is_partly_stable(heard):
+    if len(places) > 1 and known.speed and _has_speed_without_chatter(heard):
         about = known._replace(is_begun=True, is_short=True)
         short = [evaluate(place, about) for place in windowing.place_short_windows(parts, rate)]
         heard = sorted([*heard, *_pick_striking(axes, short, heard)], key=_center)
@@ -152,11 +152,10 @@ def _has_grown(
     return level(loudest) > MIN_GROWTH * float(np.median([level(heard[i]) for i in stable]))
 
 
-def _is_partly_stable(heard: Sequence[CutEvaluation]) -> bool:
-    """Return whether most windows of a cut have a speed, some are stable, and none chatters."""
+def _has_speed_without_chatter(heard: Sequence[CutEvaluation]) -> bool:
+    """Return whether most windows of a cut have a speed, and none chatters."""
     n_known = sum(sound.peaks is not None for sound in heard)
-    is_stable = any(sound.verdict == "stable" for sound in heard)
-    return is_stable and n_known > len(heard) / 2 and all(sound.chatter is None for sound in heard)
+    return n_known > len(heard) / 2 and all(sound.chatter is None for sound in heard)
 
 
 def _worst_window(heard: Sequence[CutEvaluation]) -> CutEvaluation:

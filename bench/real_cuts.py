@@ -221,22 +221,26 @@ def _comb_scores(axis: Axis, part: slice) -> tuple[Floats, Floats]:
     return tried, np.asarray(score / np.median(score))
 
 
-def steady_part(file: list[Axis], heard: CutEvaluation) -> slice:
-    """Return the end of the steady part of a cut, else the middle of the loud part.
+def reference(file: list[Axis], heard: CutEvaluation) -> list[Comb]:
+    """Return the combs of the window with the median frequency, as a spindle slows down where the load grows.
 
-    The window that decides the verdict may be too short to resolve the speed.
+    The windows are all those of the steady part of a cut, else the middle of the loud part.
     """
-    if heard.parts.cut.stop > heard.parts.cut.start:
-        parts, rate = heard.parts, file[0].rate
-        return slice(round(max(parts.steady_begin, parts.steady_end - WINDOW) * rate), round(parts.steady_end * rate))
-    begin, end = loud_part(file[0].signal, file[0].rate)
-    half = min(round(WINDOW * file[0].rate), end - begin) // 2
-    return slice((begin + end) // 2 - half, (begin + end) // 2 + half)
+    parts, rate = heard.parts, file[0].rate
+    begin, end = loud_part(file[0].signal, rate)
+    first = ((begin + end) / rate - WINDOW) / 2
+    starts = np.array([max(first, begin / rate)])
+    if parts.cut.stop > parts.cut.start:
+        starts = np.arange(parts.steady_begin, max(parts.steady_end - WINDOW, parts.steady_begin) + 1e-9, WINDOW / 2)
+        end = round(parts.steady_end * rate)
+    windows = [slice(round(start * rate), min(round((start + WINDOW) * rate), end)) for start in starts.tolist()]
+    combs = sorted((comb_of(file, window) for window in windows), key=lambda axes: axes[0].frequency)
+    return combs[len(combs) // 2]
 
 
 def judge_file(file: list[Axis], each: Tally, together: Tally) -> None:
     """Count a file, its axes separately and together."""
-    combs, speeds = comb_of(file, steady_part(file, longest(listened(file)))), []
+    combs, speeds = reference(file, longest(listened(file))), []
     for axis, comb in zip(file, combs, strict=True):
         cuts = listened([axis])
         each.add(cuts, comb)

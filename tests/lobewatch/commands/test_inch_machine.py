@@ -10,9 +10,11 @@ from typing import Any
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from typer.testing import Result
 
 from lobewatch.machine.settings.display_units import FEED_PER_TOOTH, FEED_RATE, LENGTH, REMOVAL_RATE, shown_units
+from lobewatch.machine.settings.setting_questions import find_all_questions
 from lobewatch.machine.setup_questions.draft import MachineDraft
 from lobewatch.machine.setup_questions.questions import find_setup_question
 from tests.lobewatch.commands.invoke import invoke
@@ -95,6 +97,24 @@ def test_the_report_is_in_inches(inch: Shop) -> None:
     page = (inch.path / "report.html").read_text("utf-8")
     assert "ap (in)" in page
     assert "(mm)" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_refused_depths_are_in_inches(inch: Shop) -> None:
+    options = "--tool", "reference", "--material", "AA 7075", "--teeth", "4", "--diameter", "1/2"
+    with pytest.raises(ValueError, match=r"--depth 2\.5 is deeper .* 0\.5 in\."):
+        ask("recommend", str(inch.path), *options, "--depth", "2.5")
+    with pytest.raises(ValueError, match=r"--depth 0 is not above 0.* in\."):
+        ask("observe", str(inch.path), "--program", "A", "--depth", "0", "--stable")
+
+
+def test_questions_about_settings_are_in_inches(inch: Shop) -> None:
+    slow = replace(inch.logbook.machine.program[0], tool_diameter_mm=25.4, speed_rpm=10.0)
+    machine = replace(inch.logbook.machine, program=(slow,), tap=replace(inch.logbook.machine.tap, stick_out_mm=999.0))
+    with shown_units("inch"):
+        reasons = {question.key: question.reason for question in find_all_questions(machine)}
+    assert "2.62 sfm" in reasons["speed_rpm"]
+    assert "outside 9.84" in reasons["speed_rpm"]
+    assert "diameters of 1 in," in reasons["stick_out_mm"]
 
 
 def answer(units: Any, name: str, text: str) -> MachineDraft:

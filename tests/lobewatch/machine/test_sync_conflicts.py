@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,18 @@ def test_the_other_side_is_named_whatever_its_name_and_joined_by_rebuild(two: Tw
     assert [event.text for event in contents.events] == ["belt changed"]
     assert {file.name for file in (a.path / "sync-conflicts").iterdir()} == conflicts
     assert rebuild_files(a.path) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems store no such name")
+def test_a_file_whose_name_is_no_text_is_named_and_joined(two: TwoCopies) -> None:
+    a, b = map(MachineFolder, two.paths)
+    add_event(b, "belt changed")
+    (a.path / os.fsdecode(b"journal\xff.jsonl")).write_bytes((b.path / NAMES[0]).read_bytes())
+    texts = [*map(str, verify(a.path).remarks), *map(str, a.contents().remarks)]
+    assert [text.count("\\udcff.jsonl") for text in texts] == [1, 1]
+    texts += rebuild_files(a.path)
+    assert "".join(texts).encode()
+    assert [event.text for event in MachineFolder(a.path).contents().events] == ["belt changed"]
 
 
 def test_identities_of_both_sides_are_renumbered_with_all_that_names_them(two: TwoCopies) -> None:

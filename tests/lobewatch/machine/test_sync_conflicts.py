@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from acquisition import Circumstances, SourceFile, TapTest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import (
     add_event,
@@ -26,6 +28,7 @@ from lobewatch.machine.verify_files import verify
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from tests.lobewatch.machine.synced_folders import (
     CONFLICT_NAMES,
+    FRF,
     TwoCopies,
     find_remaining_problems,
     read_files,
@@ -230,6 +233,18 @@ def test_a_tap_test_with_the_identity_of_another_one_gets_its_own(two: TwoCopies
     assert MachineFolder(two.paths[0]).read(taps["tap_3-2"]).circumstances.operator == taps["tap_3-2"].operator
     assert {taps[name].operator for name in ("tap_3", "tap_3-2")} == {"no 1", "no 2"}
     assert verify(two.paths[0]).damage == ()
+
+
+def test_a_recording_that_both_computers_replayed_counts_once(two: TwoCopies) -> None:
+    source = SourceFile("tap.csv", b"1,2")
+    for path, name in zip(two.paths, ("tap_8", "tap_7"), strict=True):
+        about = Circumstances("m", datetime(2026, 3, 1, tzinfo=UTC))
+        MachineFolder(path).commit(TapTest(name, about, FRF, source=source))
+    two.sync(0, 0)
+    assert any("tap_8" in text for text in rebuild_files(two.paths[0]))
+    taps = {tap.id: bool(tap.excluded) for tap in MachineFolder(two.paths[0]).taps()}
+    assert (taps["tap_7"], taps["tap_8"]) == (False, True)
+    assert rebuild_files(two.paths[0]) == []
 
 
 def test_other_settings_are_named_with_both_values_until_a_person_decides(two: TwoCopies) -> None:

@@ -9,7 +9,7 @@ import msgspec
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file
-from lobewatch.machine.folder_files import format_path
+from lobewatch.machine.journal.file_names import format_path
 from lobewatch.monitoring.status_rules import FOLDER_COPIED
 
 TAP_LINE_MARK = b'"kind": "tap"'

@@ -15,11 +15,15 @@ from acquisition.files.hdf5_file import has_valid_checksum
 from lobewatch.machine import folder as contents
 from lobewatch.machine.daq_rates import read_stored_devices
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.folder_files import format_path
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
 from lobewatch.machine.journal import journal
 from lobewatch.machine.journal import read_entries as journal_entries
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, DAMAGED_FOLDER_NAME, LOBEWATCH_FILES
+from lobewatch.machine.journal.file_names import (
+    CONFLICTS_FOLDER_NAME,
+    DAMAGED_FOLDER_NAME,
+    LOBEWATCH_FILES,
+    format_path,
+)
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
 from lobewatch.machine.journal.sync_conflicts import list_sync_remarks
 from lobewatch.machine.journal.tap_entry import TapEntry

@@ -25,6 +25,11 @@ _OTHER_OWN_NAME = re.compile(
 _OWN_NAMES_BELOW = {"taps": re.compile(r"\..*|.*\.(h5|tmp)", re.DOTALL), "cuts": re.compile(r"\..*|c\d+\.h5|.*\.tmp")}
 
 
+def format_path(path: Path | str) -> str:
+    """Return a path as valid UTF-8, with invalid bytes escaped."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
 def list_foreign_names(folder: Path | str) -> list[str]:
     """Return the names in a machine folder that lobewatch does not use, sorted; empty if it cannot be listed."""
     return [name for name in _list_names(folder) if name not in _OWN_NAMES and not _OTHER_OWN_NAME.fullmatch(name)]

@@ -8,8 +8,7 @@ from pathlib import Path
 from acquisition import read_tap, write_tap
 from acquisition.errors import join_sentences
 from acquisition.file_io import read_regular_file
-from lobewatch.machine.folder_files import format_path
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, move_aside
+from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, format_path, move_aside
 from lobewatch.machine.journal.join_lines import compute_fact_mark, join_lines
 from lobewatch.machine.journal.journal import Journal, JournalEntry, JournalReading
 from lobewatch.machine.journal.sync_conflicts import ConflictFile, find_conflict_files

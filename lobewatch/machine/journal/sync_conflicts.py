@@ -14,8 +14,7 @@ from typing import Any, Literal
 from acquisition import Remark
 from acquisition.file_io import open_regular_file
 from acquisition.files.hdf5_file import HDF5_SIGNATURE
-from lobewatch.machine.folder_files import format_path
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, JOURNAL_NAME, list_foreign_files
+from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, JOURNAL_NAME, format_path, list_foreign_files
 from lobewatch.machine.journal.join_lines import compute_fact_mark, find_open_contradictions
 from lobewatch.machine.journal.journal import (
     PREVIOUS_DIGEST_KEY,
